@@ -199,7 +199,7 @@ fn energy_audits_of_all_groups() {
     let check = crumple_ok(folder.path(), &["db", "check", "curves.h5"]);
     // At 3 km/h a step is a good part of the crush.
     let findings: Vec<&str> = check.lines().collect();
-    assert!(findings[0].starts_with("vehicle-pair/3kmh: contact: it lies in a step of 0.63 mm"));
+    assert!(findings[0].starts_with("vehicle-pair/3kmh: contact: it lies between two states 0.63 mm apart"));
     assert_eq!(findings[1..], ["20 cases checked, 1 finding"], "{check}");
 }
 
@@ -931,7 +931,7 @@ fn scenarios_choose_the_force() {
     let bare: Vec<&str> = text.lines().filter(|l| !l.starts_with('#')).collect();
     std::fs::write(here.join("bare.csv"), bare.join("\n")).unwrap();
     let warned = run("file = \"bare.csv\"")["warnings"].to_string();
-    assert!(warned.contains("its file does not say which force it holds"), "{warned}");
+    assert!(warned.contains("its file does not state which force it holds"), "{warned}");
     assert!(warned.contains("it has no unloading stiffness: it unloads with its steepest rise"));
     scenario("file = \"bare.csv\"");
     assert!(crumple_ok(here, &["simulate", "s.toml"]).contains("unknown"));
@@ -956,7 +956,7 @@ fn scenarios_choose_the_force() {
     let export = ["export", "old.json", "--to", "csv", "--force", "body"];
     assert!(crumple_fails(here, 1, &export).contains("no body force"));
     let error = crumple_fails(here, 2, &["export", "old.json", "--to", "csv"]);
-    assert!(error.contains("say --force contact"), "{error}");
+    assert!(error.contains("use --force contact"), "{error}");
     let error = crumple_fails(here, 1, &["export", "a.json", "--to", "json", "--units", "mm-t-s"]);
     assert!(error.contains("json is always in SI"), "{error}");
     let error = crumple_fails(here, 1, &["export", "a.json", "--to", "csv", "--units", "in-kg-s"]);

@@ -404,11 +404,11 @@ fn wrong_ends_are_refused() {
         "front of vehicle \"A2\" comes from a model",
     );
     fails("ends = \"end\"", "ends = \"edn\"", "there is no curve \"edn\" in [curves]");
-    fails("[contact]", "[contact]\ncurve = \"nose\"", "stands between ends that come from models");
+    fails("[contact]", "[contact]\ncurve = \"nose\"", "lies between ends that come from models");
     fails(
         "ends = \"end\"",
         "behind = \"nose\", ends = \"end\"",
-        "stands between ends that come from models",
+        "lies between ends that come from models",
     );
     let file = "end = { file = \"lead50.csv\" }";
     fails("end = { model = \"vehicle-pair.model\" }", file, "ends of vehicle \"A1\" needs mass");

@@ -374,7 +374,7 @@ fn uneven_curves_for_lsdyna_are_noted() {
     };
     let record = notes(&["curves.h5", "--group", "lead-car-wall", "--case", "48kmh"]);
     assert!(
-        record.contains("its points are uneven, so LCINT is 20000, the most that is asked for"),
+        record.contains("its points are unevenly spaced, so LCINT is 20000, the largest used"),
         "{record}"
     );
     assert!(fs::read_to_string(here.join("x.k")).unwrap().contains("         0     20000\n"));
@@ -729,7 +729,7 @@ fn groups_and_several_speeds_are_exported_at_once() {
     t(
         2,
         &["export", "lead50.json", "--to", "csv", "--speed", "50km/h"],
-        "is of one speed and mass",
+        "has one speed and mass",
     );
     t(1, &["export", "lead50.json", "--to", "mat", "--units", UNITS], "mat is always in SI");
     t(
@@ -795,7 +795,7 @@ fn the_targets_rebound_is_said() {
     let own = notes(&["--force", "contact", "--material", "mat121"]);
     let [theirs, ours] = restitutions(&own[0])[..] else { panic!("{own:?}") };
     assert_eq!(theirs, ours);
-    assert!(soft.iter().any(|note| note.contains("the largest force goes from")), "{soft:?}");
+    assert!(soft.iter().any(|note| note.contains("the peak force changes from")), "{soft:?}");
     // A change that would be too large is refused.
     let arguments =
         ["export", "curves.h5", "--group", "vehicle-pair", "--speed", "3km/h", "--to", "lsdyna"];

@@ -488,7 +488,7 @@ fn other_layouts_are_refused() {
         });
         let error = crumple_fails(folder.path(), 1, &["db", "ls", "curves.h5"]);
         let expected = format!(
-            "curves.h5: its layout has version {version}, this program reads versions 2 to 3: build the database anew"
+            "curves.h5: its layout has version {version}, this program reads versions 2 to 3: build the database again"
         );
         assert!(error.contains(&expected), "{error}");
     }
@@ -638,7 +638,7 @@ fn build_keeps_what_others_put_into_the_database() {
     let before = fs::read(&path).unwrap();
     let error = crumple_fails(here, 1, &["build", study.to_str().unwrap(), "-o", "curves.h5"]);
     assert!(
-        error.contains("curves.h5 holds what crumple has not written and would lose by writing it again: attribute lead-car-wall/36kmh/force_N/units, attribute lead-car-wall/36kmh/reviewed_by, dataset lead-car-wall/36kmh/photo"),
+        error.contains("curves.h5 holds objects that crumple did not write and would lose by rewriting the file: attribute lead-car-wall/36kmh/force_N/units, attribute lead-car-wall/36kmh/reviewed_by, dataset lead-car-wall/36kmh/photo"),
         "{error}"
     );
     assert!(fs::read(&path).unwrap() == before);
@@ -938,8 +938,8 @@ fn a_folder_that_is_not_there_is_named() {
     };
     t("nodir/x.csv", "the folder nodir does not exist: create it, or name another");
     t("no/dir/x.csv", "the folder no/dir does not exist: create it, or name another");
-    t("m.model/x.csv", "m.model is a file and no folder: name another");
-    t("m.model/in/x.csv", "m.model is a file and no folder: name another");
+    t("m.model/x.csv", "m.model is a file, not a folder: name another");
+    t("m.model/in/x.csv", "m.model is a file, not a folder: name another");
     assert_eq!(entries(here), ["curves.h5", "m.model"]);
 }
 
@@ -1028,7 +1028,7 @@ fn changed_numbers_are_not_read_in_silence() {
         .unwrap();
     let predict = ["predict", "x.model", "--speed", "50km/h"];
     let error = crumple_fails(here, 1, &predict);
-    assert!(error.contains("x.model: the model is not the one that was written"), "{error}");
+    assert!(error.contains("x.model: the model does not match its fingerprint"), "{error}");
     crumple_ok(here, &[&predict[..], &["--accept-changed"]].concat());
     // A file without a fingerprint, of an earlier program: what its energies show.
     let (old, _) = text.split_once(",\"fingerprint\"").unwrap();

@@ -393,13 +393,13 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         "a.csv",
         csv("0,0\n2,2\n1,3\n3,4\n"),
         None,
-        &["line 4: the deflection must increase", "or a column of times"],
+        &["line 4: the deflection must increase", "or a time column"],
     );
     t(
         "a.csv",
         csv("0,0\n1,2\n2,-1\n3,4\n"),
         None,
-        &["line 4: the force is -1 N", "write pull as 0"],
+        &["line 4: the force is -1 N", "write tension as 0"],
     );
     t(
         "a.csv",
@@ -467,7 +467,7 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         "a.bin",
         [0u8, 159, 146, 150],
         None,
-        &["the format of this file follows neither from its content", "--from"],
+        &["the format of this file cannot be recognised by its content", "--from"],
     );
     for empty in ["a.csv", "a.json", "a.k", "a.txt", "a.mat", "a.cur", "a.mme"] {
         t(empty, "", None, &["expected a curve, found an empty file"]);
@@ -477,7 +477,7 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         "a.k",
         deck("x", card, &fields(1.0, 1.0)),
         None,
-        &["the file does not say its units", "\"$ units: mm-t-s\""],
+        &["the file does not state its units", "\"$ units: mm-t-s\""],
     );
     t(
         "a.k",
@@ -513,7 +513,7 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         &["expected a *DEFINE_CURVE, found none in this deck"],
     );
     let table = |head: &str| format!("#1\n{head}\n{}", rows(1.0, 1.0, " ", "."));
-    t("a.txt", table("double nose(5,2)"), None, &["does not say its units", "# d [m], F [N]"]);
+    t("a.txt", table("double nose(5,2)"), None, &["does not state its units", "# d [m], F [N]"]);
     t(
         "a.txt",
         table("double fd_load(9,2)"),
@@ -555,8 +555,8 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         &mat[..60],
         None,
         &[
-            "byte 0: matrix fd_load declares 5 rows of 2, but the file has 32 bytes behind its name",
-            "it may be cut",
+            "byte 0: matrix fd_load declares 5 rows of 2, but the file has 32 bytes after its name",
+            "it may be truncated",
         ],
     );
     t("a.mat", &mat[..10], None, &["byte 0: expected a matrix of a MAT file of version 4"]);
@@ -613,7 +613,7 @@ fn memory_is_bounded_by_the_number_of_curves_and_points() {
         let error = error.unwrap_err();
         assert!(error.contains(expected), "{name}: {error}");
     }
-    t("a.k", "*DEFINE_CURVE\n1\n", 20_000, "more than 10000 curves: take out the one");
+    t("a.k", "*DEFINE_CURVE\n1\n", 20_000, "more than 10000 curves: extract the one");
     t("a.cur", "CONTINUE\n", 20_000, "more than 10000 curves");
     t("a.rad", "/FUNCT/1\n", 20_000, "more than 10000 curves");
     t("a.mo", "package a\n", 20_000, "more than 10000 curves");
@@ -717,14 +717,14 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
     t(
         2,
         &["--speed", &v, "--mass", "24t"],
-        "nose.csv: the file does not say what its speed is measured against: give --kind wall",
+        "nose.csv: the file does not state what its speed is measured against: give --kind wall",
     );
     t(
         2,
         &["--speed", &v, "--kind", "wall"],
-        "nose.csv: the file does not say the mass of the body: give --mass",
+        "nose.csv: the file does not state the mass of the body: give --mass",
     );
-    t(2, &WALL, "nose.csv: the file does not say its speed: give --speed, such as --speed 36km/h");
+    t(2, &WALL, "nose.csv: the file does not state its speed: give --speed, such as --speed 36km/h");
     t(2, &["--speed", "36"], "speed \"36\" has no unit");
     let with = |more: &[&'static str]| -> Vec<String> {
         WALL.iter()
@@ -846,7 +846,7 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
         1,
         &adding(&["--speed", "10m/s", "--kind", "wall", "--mass", "24kg", "--case", "b"]),
     );
-    assert!(error.contains("such an impact cannot be"), "{error}");
+    assert!(error.contains("such an impact is impossible"), "{error}");
     assert!(error.contains("--accept-energy"), "{error}");
 }
 
@@ -950,7 +950,7 @@ fn predicted_curves_come_back_as_a_group_that_trains() {
             "--replace",
         ],
     );
-    assert!(error.contains("case \"36kmh\" of group \"lead-car-wall\" is of the study \"lead car to rigid wall\", which builds it"), "{error}");
+    assert!(error.contains("case \"36kmh\" of group \"lead-car-wall\" belongs to the study \"lead car to rigid wall\", which builds it"), "{error}");
 }
 
 /// What crumple export writes comes back: the loading branch without the points that other tools

@@ -274,7 +274,7 @@ fn every_value_says_where_it_is_from() {
         "# read: x_velocity of 900001 in the first state: -3333.33 mm/s\nspeed = \"12km/h\""
     ));
     assert!(
-        text.contains("# mass: computed: impulse of the force over the change of velocity, behind")
+        text.contains("# mass: computed: impulse of the force over the change of velocity, after")
     );
     assert!(text.lines().all(|line| line.chars().count() <= 110), "no line is too long");
     // The same as one document.
@@ -298,7 +298,7 @@ fn half_models_are_asked_for() {
     let output = crumple_in(&here, &["init"]);
     assert!(output.status.success());
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(said.contains("the folders' names say twice the recorded speeds"), "{said}");
+    assert!(said.contains("the folders' names state twice the recorded speeds"), "{said}");
     let ours = study(&here, "study.toml");
     assert_eq!(ours["study"]["kind"].as_str(), Some("wall"));
     assert_eq!(by_path(&ours)[0].1, 6.0, "12kmh");
@@ -481,7 +481,7 @@ fn a_pair_without_forces_is_guessed() {
         (Some("pair"), Some("guessed"))
     );
     let why = kind["from"].as_str().unwrap();
-    assert!(why.starts_with("two bodies move, and their velocities change against each other"));
+    assert!(why.starts_with("two bodies move, and their changes of momentum balance"));
     let deflection = &document["deflection"];
     assert_eq!(deflection["evidence"], "guessed");
     assert_eq!(deflection["value"]["node"], 6);
@@ -698,8 +698,8 @@ fn what_is_no_run_is_named_and_left_out() {
             "{text}"
         );
     };
-    said("again", "its files hold the same bytes as those of 48kmh");
-    said("converted", "its histories are those of 36kmh");
+    said("again", "its files are identical to those of 48kmh");
+    said("converted", "its histories are identical to those of 36kmh");
     said("died", "it died: nodout holds 3 whole states (line 33: the file ends");
     said(
         "aborted",
@@ -770,13 +770,13 @@ fn runs_of_another_recipe_are_reported_and_not_merged() {
     let said = |folder: &str| &out.iter().find(|(path, _)| path == folder).unwrap().1;
     assert_eq!(
         said("other_node"),
-        "it needs another recipe than the other runs: it has no moving node 900001; there 5001 \"COG of the rigid trailing mass\" would be taken"
+        "it needs a different recipe from the other runs: it has no moving node 900001; there 5001 \"COG of the rigid trailing mass\" would be taken"
     );
     assert_eq!(
         said("other_wall"),
-        "it needs another recipe than the other runs: rwforc 1 does not move its bodies, rwforc 2 does"
+        "it needs a different recipe from the other runs: rwforc 1 does not move its bodies, rwforc 2 does"
     );
-    assert!(said("pair").starts_with("it needs another recipe than the other runs: "));
+    assert!(said("pair").starts_with("it needs a different recipe from the other runs: "));
     assert_eq!(document["runs"].as_array().unwrap().len(), 4);
 }
 
@@ -838,7 +838,7 @@ fn nothing_is_overwritten() {
     let (_folder, here) = four_runs();
     fs::write(here.join("study.toml"), "mine").unwrap();
     let error = crumple_fails(&here, 1, &["init"]);
-    assert!(error.contains("study.toml is there already, and nothing is written over it: name another with -o, or remove it"), "{error}");
+    assert!(error.contains("study.toml exists already and is not overwritten: name another with -o, or remove it"), "{error}");
     assert_eq!(fs::read(here.join("study.toml")).unwrap(), b"mine");
     crumple_fails(&here, 1, &["init", "-o", "25kmh"]);
     let error = crumple_fails(&here, 2, &["init", "-o", "-", "--json"]);
@@ -936,7 +936,7 @@ fn of_several_files_with_one_history_one_is_chosen() {
         notes,
         ["nodout is read, crashT01 holds it too", "rwforc is read, crashT01 holds it too"]
     );
-    assert_eq!(left_out(&document), [("copy".into(), "its histories are those of 36kmh".into())]);
+    assert_eq!(left_out(&document), [("copy".into(), "its histories are identical to those of 36kmh".into())]);
     assert_eq!(document["runs"][0]["mass_kg"]["value"], 24_000.0);
 }
 
@@ -1085,7 +1085,7 @@ fn inspect_takes_folders() {
     );
     fs::create_dir(above.join("empty")).unwrap();
     let error = crumple_fails(above, 1, &["inspect", "empty"]);
-    assert!(error.contains("empty: no folder in it holds solver files"), "{error}");
+    assert!(error.contains("empty: none of its folders holds solver files"), "{error}");
 }
 
 #[test]

@@ -39,7 +39,7 @@ fn has(notes: &[String], part: &str) {
 fn titles_above_the_header_are_skipped() {
     let mm = |separator, decimal| rows(1e-3, 1e3, separator, decimal);
     let head = "Presse 4, Werk 2\nDatum: 12.03.2024\nSpecimen: 12\n\n";
-    let note = "titles: lines 1 to 3 are titles and no part of the table: \"Presse 4, Werk 2\", \"Datum: 12.03.2024\", \"Specimen: 12\"";
+    let note = "titles: lines 1 to 3 are titles, not part of the table: \"Presse 4, Werk 2\", \"Datum: 12.03.2024\", \"Specimen: 12\"";
     for table_text in [
         format!("Weg;Kraft\n[mm];[kN]\n{}", mm(";", ",")),
         format!("Weg;Kraft\n(mm);(kN)\n\n{}", mm(";", ".")),
@@ -81,7 +81,7 @@ fn titles_above_the_header_are_skipped() {
     wrong(
         "Weg;Kraft",
         "Hub;Last",
-        "line 5: expected a column deflection with its unit, such as d_m or d_mm, found \"Hub\"; or say which column it is with --deflection-column",
+        "line 5: expected a column deflection with its unit, such as d_m or d_mm, found \"Hub\"; or choose the column with --deflection-column",
     );
     wrong("\n[mm];[kN]", "", "line 5: the deflection has no unit (\"Weg\")");
 }
@@ -110,7 +110,7 @@ fn headers_of_instruments() {
         let text = format!("d [mm];Force [kN];{other}\n{rows}");
         let notes = table("a.csv", text.as_bytes(), &given(None));
         let is_said =
-            notes.iter().any(|n| n == &format!("columns: not taken: \"{other}\" (force)"));
+            notes.iter().any(|n| n == &format!("columns: not used: \"{other}\" (force)"));
         assert_eq!(is_said, ["Force, filtered [kN]", "Kraft"].contains(&other), "{notes:?}");
     }
 }
@@ -449,7 +449,7 @@ fn jumps_of_the_force_are_taken_and_said() {
     let ratio = case["work_over_energy"].as_f64().unwrap();
     assert!((ratio - 1.0).abs() < 1e-3, "{ratio}");
     let notes = case["notes"].to_string();
-    assert!(notes.contains("points: 1 that repeat the one before removed"), "{notes}");
+    assert!(notes.contains("points: 1 removed (repeats of the previous one)"), "{notes}");
     assert!(notes.contains("the force jumps from 0 to 1000000 N at 0 m (line 2), from 1000000 to 2000000 N at 0.4 m (line 4), from 2000000 to 1000000 N at 0.7 m (line 6): the points there are set apart by 0.0001 of the maximum deflection"), "{notes}");
     // Such a curve trains nothing by itself, but it runs and goes out.
     crumple_ok(here, &["export", "new.h5", "--to", "lsdyna", "-o", "a.k"]);
@@ -511,7 +511,7 @@ fn radioss_functions() {
     wrong(&two, &si, "choose one with --curve: 5 (\"nose 5\"), 6 (\"nose 6\")");
     let seven = ReadOptions { curve: Some("7".into()), ..si.clone() };
     wrong(&two, &seven, "the file has no curve \"7\": it has 5 (\"nose 5\")");
-    wrong(&one, &given(None), "the file does not say its units");
+    wrong(&one, &given(None), "the file does not state its units");
     wrong(
         &begin("x"),
         &si,
@@ -604,7 +604,7 @@ fn exported_decks_and_packages_come_back() {
         "model Spring\n  Real x;\nend Spring;\n",
         "expected a package that crumple export wrote (constant Real d[…], f[…]), found none: write other curves as a table text (#1, double name(n,2)), CSV or MAT file",
     );
-    wrong(&mo[..mo.find("constant Real f").unwrap() + 200], "it may be cut");
+    wrong(&mo[..mo.find("constant Real f").unwrap() + 200], "it may be truncated");
     wrong(&mo.replacen("0.00000000E+00", "zero", 1), "expected a number, found \"zero\"");
     wrong(&mo.replacen("constant Real d[", "constant Real d[1", 1), "constant d declares");
     wrong(
@@ -685,7 +685,7 @@ fn a_folder_of_several_tests_names_them() {
         [&["db", "add", "c.h5"][..], files, &["--group", "g", "--kind", "wall"]].concat()
     };
     let error = crumple_fails(here, 1, &add(&["tests"]));
-    assert!(error.contains("tests: the folder holds 7 ISO-MME tests: give those that are meant, each by itself: tests/12kmh tests/18kmh"), "{error}");
+    assert!(error.contains("tests: the folder holds 7 ISO-MME tests: give each one you need separately: tests/12kmh tests/18kmh"), "{error}");
     crumple_ok(here, &add(&["tests/36kmh", "tests/48kmh"]));
     // Several tests in one folder: each by its .mme file.
     fs::create_dir_all(here.join("flat/Channel")).unwrap();
@@ -719,7 +719,7 @@ fn an_impossible_import_speaks_of_the_file() {
         crumple_fails(folder.path(), 1, &[&arguments[..], &WALL, more].concat())
     };
     let error = refused(speed() * 0.577, &[]);
-    assert!(error.contains("takes up 3.0") && error.contains("look at units, speed and mass; at whether the curve ends at the maximum crush of this impact, neither before nor behind; and at whether its columns are deflection and force of the whole body. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"), "{error}");
+    assert!(error.contains("absorbs 3.0") && error.contains("check units, speed and mass; whether the curve ends at the maximum crush of this impact, neither before nor after it; and whether its columns are deflection and force of the whole body. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"), "{error}");
     let error = refused(speed() * 0.5_f64.sqrt(), &[]);
     assert!(error.contains("likely the mass, half a structure taken for a whole one"), "{error}");
     let error = refused(speed() * 0.5, &[]);
@@ -851,7 +851,7 @@ fn a_legacy_curve_is_exported_directly() {
     t(
         2,
         &["export", "nose.csv", "--to", "csv", "--kind", "wall"],
-        "nose.csv: the file does not say its speed: give --speed",
+        "nose.csv: the file does not state its speed: give --speed",
     );
     t(
         2,
@@ -867,7 +867,7 @@ fn a_legacy_curve_is_exported_directly() {
     t(
         2,
         &["export", "c.h5", "--to", "csv", "--kind", "wall"],
-        "are for the file of a measured or legacy curve",
+        "apply only to the file of a measured or legacy curve",
     );
     t(
         1,

@@ -206,5 +206,5 @@ fn what_is_not_as_it_should_be_is_said_with_what_to_do() {
     // What is left to fill in is counted where the next step is named.
     fs::remove_file(here.join("runs/36kmh/rwforc")).unwrap();
     let printed = crumple_ok(here, &["init", "runs", "-o", "mass.toml"]);
-    assert!(printed.ends_with("wrote mass.toml (1 run): not complete, 1 line to fill in or to give as an option: then crumple build\n"), "{printed}");
+    assert!(printed.ends_with("wrote mass.toml (1 run): incomplete, 1 line to fill in or to give as an option; then run crumple build\n"), "{printed}");
 }

@@ -353,7 +353,7 @@ fn a_restart_goes_on_where_the_run_ended() {
     assert_eq!(file.time.len(), 5);
     assert_eq!(
         file.problems[0].to_string(),
-        "T02, which goes on, holds other histories: it is not read, nor what follows"
+        "T02, the continuation, holds other histories: it and what follows are not read"
     );
 }
 
@@ -402,7 +402,7 @@ fn every_group_is_read() {
     let notes = section(&path, "rwforc").notes;
     assert_eq!(
         notes[1],
-        "no tangential impulses are recorded of 3: the forces there are the normal ones alone"
+        "no tangential impulses are recorded for 3: their forces are the normal ones alone"
     );
     // The variables of one object may stand in several groups: no force is then half of one.
     fs::write(&path, written(3040, &[(102, 3, 3), (102, 3, 6)], 5)).unwrap();
@@ -424,6 +424,6 @@ fn a_cut_record_says_that_its_last_force_will_change() {
     assert!(!said("rwforc"));
     assert!(
         section(&path, "rwforc").notes[0]
-            .ends_with("the last force changes where the record goes on")
+            .ends_with("the last force changes when the record continues")
     );
 }

@@ -251,7 +251,7 @@ fn every_command_takes_replicates() {
     let all = ["compare", "c.h5", "--group", "made", "--speed", "12m/s", "--nsdm-seeds", "0"];
     crumple_ok(here, &all);
     crumple_ok(here, &["report", "c.h5", "-o", "r.html"]);
-    assert!(std::fs::read_to_string(here.join("r.html")).unwrap().contains("Equal runs lie apart"));
+    assert!(std::fs::read_to_string(here.join("r.html")).unwrap().contains("Repeated runs differ"));
     // Another recipe is not a replicate.
     cases[4].provenance.recipe = r#"{"recipe": {"filter": "CFC60"}}"#.into();
     database_of(&here.join("d.h5"), &[("made", cases)]);

@@ -478,7 +478,7 @@ fn every_sample_is_read_or_refused() {
                 "ncforc" => "an LS-DYNA text file of a kind that is not read",
                 "d3plot" => {
                     assert!(path.is_dir());
-                    "no folder in it holds solver files"
+                    "none of its folders holds solver files"
                 }
                 _ => {
                     assert_eq!(output.status.code(), Some(0), "{shown}: {error}");

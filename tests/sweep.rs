@@ -738,9 +738,9 @@ fn an_interrupt_ends_behind_the_rows_that_are_done() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     let error = String::from_utf8(output.stderr).unwrap();
-    assert!(error.contains("of 200000 rows; the same command goes on there"), "{error}");
+    assert!(error.contains("of 200000 rows; the same command resumes there"), "{error}");
     let done: usize =
-        error.split("stopped behind ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        error.split("stopped after ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert_eq!(folder.text("out.csv.part").lines().count(), 8 + done);
     assert!(!folder.path().join("out.csv").exists());
 }
@@ -795,7 +795,7 @@ fn only_all_shards_of_one_sweep_are_merged() {
     assert!(error.contains("cut.csv: the row of item 5 is missing or damaged"), "{error}");
     folder.put("cut.csv", &format!("{text}8,more\n"));
     let error = folder.fails(1, "sweep merge -o all.csv p3.csv cut.csv p1.csv");
-    assert!(error.contains("there is something behind the last row"), "{error}");
+    assert!(error.contains("there is unexpected data after the last row"), "{error}");
 }
 
 #[test]

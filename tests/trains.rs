@@ -338,7 +338,7 @@ fn what_does_not_fit_in_a_train_is_said() {
     let swapped = compared(&swapped);
     assert!(swapped.contains("FE's record of A2 fits the run's A3"), "{swapped}");
     let late = compared(&text.replace("until =", "contact = \"8ms\"\nuntil ="));
-    assert!(late.contains("fits better by") && late.contains("when it is moved by +"), "{late}");
+    assert!(late.contains("fits better by") && late.contains("when it is shifted by +"), "{late}");
 }
 
 /// The mean deceleration of the summary is that of the histories: from the contact to where the
@@ -596,12 +596,12 @@ fn a_curve_of_another_impact_is_said() {
         (case, "48km/h"),
     ] {
         let shown = own.replace("km/h", " km/h");
-        let said = format!("it is of {shown}, and A1|wall meets at 36 km/h");
+        let said = format!("it is for {shown}, but A1|wall closes at 36 km/h");
         assert!(warnings(curve, "36km/h", "24t").contains(&said), "{curve}");
-        assert!(!warnings(curve, own, "24t").contains("it is of "), "{curve}");
+        assert!(!warnings(curve, own, "24t").contains("it is for "), "{curve}");
         if !curve.contains(".csv") {
             let heavy = warnings(curve, own, "30t");
-            assert!(heavy.contains("it is of 24.00 t, and A1|wall moves 30.00 t"), "{heavy}");
+            assert!(heavy.contains("it is for 24.00 t, but A1|wall moves 30.00 t"), "{heavy}");
         }
     }
 }

@@ -234,7 +234,7 @@ fn a_named_format_that_does_not_fit_is_an_error() {
         for command in ["histories", "inspect"] {
             let error = crumple_fails(here, 1, &[command, nodout, "--format", format]);
             let expected =
-                format!("this is not a {format}: it looks like a nodout, read it as that");
+                format!("this is not a {format}: it looks like a nodout: read it as such");
             assert!(error.contains(&expected), "{error}");
         }
     }
@@ -349,5 +349,5 @@ fn outputs_replace_no_other_kind_of_file() {
     fs::create_dir(elsewhere.path().join("crumple-demo")).unwrap();
     fs::write(elsewhere.path().join("crumple-demo/scenario.toml"), "# mine\n").unwrap();
     let error = crumple_fails(elsewhere.path(), 2, &["demo"]);
-    assert!(error.contains("scenario.toml exists and is not the demo's"), "{error}");
+    assert!(error.contains("scenario.toml exists and differs from what the demo writes"), "{error}");
 }

@@ -128,7 +128,7 @@ fn of_another_run(
     let mut warnings = Vec::new();
     if let Some(own) = spring.curve.speed_m_per_s.filter(|own| differs(*own, meeting_m_per_s)) {
         warnings.push(format!(
-            "curve \"{curve}\": it was recorded at {}, but {} closes at {}: forces depend on the impact speed; give the curve of this speed, or a model (crumple train)",
+            "curve \"{curve}\": it is for {}, but {} closes at {}: forces depend on the impact speed; give the curve of this speed, or a model (crumple train)",
             km_per_h(own),
             slot.name,
             km_per_h(meeting_m_per_s)
@@ -145,7 +145,7 @@ fn of_another_run(
     if let Some(own_kg) = own_kg.filter(|own_kg| differs(*own_kg, slot.mass_kg)) {
         let shown = Shown::mass(own_kg.max(slot.mass_kg));
         warnings.push(format!(
-            "curve \"{curve}\": it was recorded with {}, but {} moves {}: give the curve of this mass, or a model (crumple train)",
+            "curve \"{curve}\": it is for {}, but {} moves {}: give the curve of this mass, or a model (crumple train)",
             shown.text(own_kg),
             slot.name,
             shown.text(slot.mass_kg)

@@ -232,7 +232,7 @@ impl<'a> Motion<'a> {
         }
         let ratio = integral(&times, &force_n)[times.len() - 1] / lost_ns;
         let found = format!(
-            "mass: up to the maximum crush the impulse of the contact force is {ratio:.3} times the momentum that {} lose; it would fit {}",
+            "mass: up to the maximum crush the impulse of the contact force is {ratio:.3} times the momentum lost by {}; it would fit {}",
             Shown::one_mass(self.masses.body_kg),
             Shown::one_mass(ratio * self.masses.body_kg)
         );
