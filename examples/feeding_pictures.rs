@@ -3,7 +3,7 @@
 //!     cargo run --example feeding_pictures docs/feeding
 //!
 //! Two curves of the bundled lead car are drawn: the one predicted for 50 km/h, and that of the run at
-//! 48 km/h, whose first flank is steeper than its unloading. Points of targets are those of the files
+//! 48 km/h, whose first rise is steeper than its unloading. Points of targets are those of the files
 //! that `crumple export` writes.
 
 use std::error::Error;
@@ -99,7 +99,7 @@ fn lsdyna(recorded: &ExportInput) -> Anything<String> {
     Ok(svg(&[(0, "crumple"), (1, "MAT_121 and S06"), (2, "S08")], vec![left, right]))
 }
 
-/// K1 is at least the steepest rise, so the way back is steeper than ours where a flank is.
+/// K1 is at least the steepest rise, so the way back is steeper than ours where a rise is.
 fn radioss(recorded: &ExportInput) -> Anything<String> {
     let curve = ready(recorded, ForceKind::Body)?;
     let k1 = curve.stiffness_n_per_m().max(curve.loading.max_slope());

@@ -60,7 +60,7 @@ fn of<'e, T: Error + 'static>(error: &'e (dyn Error + 'static)) -> Option<&'e T>
     error.downcast_ref::<T>().or_else(|| Some(&**error.downcast_ref::<Box<T>>()?))
 }
 
-/// The codes of error types, those that stand in others after these.
+/// The codes of error types, those that are in others after these.
 fn own_code(error: &(dyn Error + 'static)) -> Option<ErrorCode> {
     let io = || of::<io::Error>(error).map(|_| ErrorCode::Io);
     of::<error::Error>(error).map(error::Error::code).or_else(io)

@@ -116,7 +116,7 @@ impl fmt::Display for TimeGap {
 /// An interval is a hole if it is this many times the interval around it: 3, and a little for
 /// the rounding of printed times.
 const GAP_RATIO: f64 = 3.01;
-/// Intervals that are looked at on each side of one.
+/// Intervals that are examined on each side of one.
 const GAP_SIDE: usize = 4;
 /// Intervals that must be known on both sides together to judge one.
 const GAP_KNOWN: usize = 3;

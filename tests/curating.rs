@@ -516,7 +516,7 @@ fn copies_go_to_groups_and_databases() {
     studied.build();
     let said = ok(here, "db copy curves.h5 --speed 20km/h..50km/h --to-group inner");
     assert!(said.contains("added 3 cases of group inner (of curves.h5)"), "{said}");
-    // A copy is nobody's: other masses make the study's cases anew, and leave it.
+    // A copy is nobody's: other masses make the study's cases again, and leave it.
     studied.change("\"24t\"", "\"24.5t\"");
     studied.build();
     let database = read(here, "curves.h5");
@@ -753,7 +753,7 @@ fn databases_of_version_2_are_read_and_go_on() {
     }
     assert!(ok(here, "db ls old.h5").contains("36kmh  36 km/h (wall)"));
     assert!(ok(here, "db check old.h5").contains("2 cases checked, 0 findings"));
-    // What an earlier extraction built is built anew, once; a build that changes nothing leaves the
+    // What an earlier extraction built is built again, once; a build that changes nothing leaves the
     // file as it is.
     for outcome in ["built", "unchanged"] {
         let report = ok_json(here, "build study.toml -o old.h5");

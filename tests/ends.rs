@@ -334,7 +334,7 @@ const ENDS: &str = "[[train]]\nname = \"A\"\nspeed = \"36km/h\"\ngap = \"32mm\"\
     { name = \"A1\", mass = \"20.24t\", ends = \"end\" },\n\
     { name = \"A2\", mass = \"20.24t\", ends = \"end\" },\n]\n[wall]\n[contact]\n";
 
-/// Ends alone are enough; plates and their speeds stand in the results, free ends do not.
+/// Ends alone are enough; plates and their speeds are in the results, free ends do not.
 #[test]
 fn ends_are_all_that_a_user_writes() {
     let run = simulate_text("ends.toml", &format!("{HEAD}{ENDS}"));

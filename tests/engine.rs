@@ -30,7 +30,7 @@ struct Kind {
     everywhere: bool,
 }
 
-/// Kinks everywhere, flanks of up to 1 GN/m, stretches without force.
+/// Kinks everywhere, rises of up to 1 GN/m, stretches without force.
 fn envelope(random: &mut Stream, from_above: bool) -> Envelope {
     let mut deflection = vec![0.0];
     let mut force = vec![if from_above { random.gen_range(0.1e6..2e6) } else { 0.0 }];

@@ -328,7 +328,7 @@ fn a_missing_band_is_said() {
             let bare = export_notes(here, "bare.json", &[&to, force].concat());
             assert!(bare.contains("written without a band: the model gives none here"), "{bare}");
         }
-        // The body force has no flank that is too steep.
+        // The body force has no rise that is too steep.
         let soft = [&to, &contact[..], &["--soften"]].concat();
         let soft = export_notes(here, "lead50.json", &soft);
         assert!(soft.contains("written without a band: it is not that of a softened"), "{soft}");
@@ -784,7 +784,7 @@ fn the_targets_rebound_is_said() {
         let numbers = note.split([' ', ',', '(']).filter_map(|w| w.parse::<f64>().ok());
         numbers.filter(|n| *n < 1.0 && *n > 0.0).collect()
     };
-    // S08 is bound to the steepest rise, which the contact force has at its first flank.
+    // S08 is bound to the steepest rise, which the contact force has at its first rise.
     let hard = notes(&["--force", "contact"]);
     let [theirs, ours] = restitutions(&hard[0])[..] else { panic!("{hard:?}") };
     assert!(theirs < 0.7 * ours, "{hard:?}");

@@ -240,8 +240,8 @@ fn stopped_mass(path: &Path) -> Option<[Vec<f64>; 4]> {
     Some([of("deflection_m")?, of("kg")?, of("rate_kg_per_m")?, of("residual_kg")?])
 }
 
-/// A group's stopped mass stands in its file, that of the model trained on it; it changes with the cases,
-/// whether the file is written anew or edited, and goes with those that tell it.
+/// A group's stopped mass is in its file, that of the model trained on it; it changes with the cases,
+/// whether the file is written again or edited, and goes with those that determine it.
 #[test]
 fn the_stopped_mass_stands_in_the_database() {
     let folder = tempfile::tempdir().unwrap();
@@ -266,7 +266,7 @@ fn the_stopped_mass_stands_in_the_database() {
     let said =
         format!("crush law: {:.0} kg of the crush zone come to rest within ", m[m.len() - 1]);
     assert_eq!(listed.matches(&said).count(), 1, "{listed}");
-    // Written anew, then edited because something of others is in it.
+    // Written again, then edited because something of others is in it.
     crumple_ok(here, &["db", "rm", "curves.h5", "--group", WALL, "--case", "72kmh"]);
     let without = stopped_mass(&path).unwrap();
     assert!(without != built && is_sound(here));
@@ -443,7 +443,7 @@ fn db_check_finds_wrong_lengths_order_and_holes() {
         },
         &[("time_order", "original/time_s[51] is ")],
     );
-    // States cut out of all columns, as of a run that was cleared of them: only the hole shows.
+    // States cut out of all columns, as for a run that was cleared of them: only the hole shows.
     t(
         &|file| {
             for name in ["original/time_s", "original/deflection_m", "original/force_N"] {
@@ -525,7 +525,7 @@ fn a_case_is_shown_without_reading_the_others() {
     assert!(crumple_ok(folder.path(), &both) == before);
 }
 
-/// Damage is not made good by writing it again; the study's own runs are read anew.
+/// Damage is not made good by writing it again; the study's own runs are read again.
 #[test]
 fn an_altered_case_stays_altered_until_it_is_built_anew() {
     let folder = tempfile::tempdir().unwrap();

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, entries};
 
-/// The curve of all these files: a flank, a fall, a plateau; in m and N.
+/// The curve of all these files: a rise, a fall, a plateau; in m and N.
 pub const POINTS: [(f64, f64); 5] =
     [(0.0, 0.0), (0.05, 3e6), (0.25, 1e6), (0.5, 1.5e6), (1.0, 2.0e6)];
 

@@ -511,7 +511,7 @@ fn a_pair_without_forces_is_guessed() {
     let cases = Database::read(&here.join("curves.h5")).unwrap();
     let case = &cases.cases("pair")[0];
     assert!(case.curves.sampled.force_n().iter().copied().fold(0.0, f64::max) > 1e5);
-    // What the caller says of the bodies stands above it.
+    // What the caller says of the bodies is above it.
     crumple_ok(&here, &["init", "--node", "8", "--minus-node", "6", "-o", "turned.toml"]);
     let turned = study(&here, "turned.toml");
     assert_eq!(turned["study"]["kind"].as_str(), Some("pair"));
@@ -587,7 +587,7 @@ fn masses_are_never_made_up() {
     );
 }
 
-/// A section stands for the force only where nothing else does, and tells no mass.
+/// A section is used for the force only if nothing else is, and gives no mass.
 #[test]
 fn a_section_is_the_last_choice() {
     let history = Crash::default().run();

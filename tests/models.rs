@@ -22,7 +22,7 @@ use serde_json::Value;
 
 const GROUPS: [&str; 3] = ["lead-car-pair", "lead-car-wall", "vehicle-pair"];
 
-/// A body of `mass_kg` against a wall, stopped by `force(d, ḋ)` and thrown back on a line of
+/// A body of `mass_kg` against a wall, stopped by `force(d, ḋ)` and rebounded on a line of
 /// 100 MN/m; 400 states each 0.75 ms.
 pub fn case(name: &str, v: f64, mass_kg: f64, force: &dyn Fn(f64, f64) -> f64) -> Case {
     let (mut d, mut speed, mut largest) = (0.0_f64, v, 0.0_f64);
@@ -821,7 +821,7 @@ fn jumps_of_the_collapse_are_warned_of() {
     assert!(codes(8.0).contains(&"out_of_range"));
 }
 
-/// Parameters stand in the manifest, the database, the model and the prediction.
+/// Parameters are in the manifest, the database, the model and the prediction.
 #[test]
 fn parameters_through_the_commands() {
     let folder = tempfile::tempdir().unwrap();

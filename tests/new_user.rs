@@ -95,7 +95,7 @@ fn the_page_leads_from_all_files_of_a_solver_to_a_report() {
     }
 }
 
-/// What `crumple` shows as the usual order of work can be typed as it stands there, also where
+/// What `crumple` shows as the usual order of work can be typed as it is there, also where
 /// folders have names with spaces and umlauts.
 #[test]
 fn the_usual_order_of_work_works() {

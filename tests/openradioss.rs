@@ -404,7 +404,7 @@ fn every_group_is_read() {
         notes[1],
         "no tangential impulses are recorded for 3: their forces are the normal ones alone"
     );
-    // The variables of one object may stand in several groups: no force is then half of one.
+    // The variables of one object may be in several groups: no force is then half of one.
     fs::write(&path, written(3040, &[(102, 3, 3), (102, 3, 6)], 5)).unwrap();
     assert_eq!(value("rwforc", 3, "x_force"), 6.0 * 1024.0);
 }

@@ -88,7 +88,7 @@ fn with_outputs(text: &str, here: &Path) -> String {
                 run(command, here);
             }
             (Some("console"), command) => {
-                // What stands there as output is replaced by what is printed.
+                // What is there as output is replaced by what is printed.
                 let Some(command) = command.strip_prefix("$ ") else { continue };
                 out += line;
                 out += &run(command, here);

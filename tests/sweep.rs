@@ -380,7 +380,7 @@ fn h5py_finds_in_hdf5_what_csv_holds() {
     assert!(compare_with_csv(&folder) > 20);
 }
 
-/// The same of a file that is not put together in memory, and of its shards.
+/// The same for a file that is not put together in memory, and of its shards.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]
 fn h5py_finds_in_large_hdf5_what_csv_holds() {

@@ -137,7 +137,7 @@ fn couplings_pull() {
     assert!(coupled["ledger"]["max_energy_error"].as_f64().unwrap() < 1e-3);
 }
 
-/// Stages stand in series on one stroke, with steps between them.
+/// Stages are in series on one stroke, with steps between them.
 #[test]
 fn stages_are_followed() {
     let text = scenario(
@@ -563,7 +563,7 @@ fn leaving_the_data_is_said() {
         assert_eq!(run["summary"]["limits"]["beyond_data"], serde_json::json!(["A1|wall"]));
         let printed = crumple_ok(here, &["simulate", "far.toml"]);
         assert!(
-            printed.contains("cannot be told: A1|wall left the data of the curve"),
+            printed.contains("unknown: A1|wall went beyond the data of its curve"),
             "{printed}"
         );
         let stops = text(&format!("{curve}, end = \"error\""), "200t");

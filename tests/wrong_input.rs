@@ -61,7 +61,7 @@ fn near_ids_come_first() {
     );
 }
 
-/// What inspect finds in a file that cannot be used stands in build's message.
+/// What inspect finds in a file that cannot be used is in build's message.
 #[test]
 fn a_run_that_fails_says_what_is_wrong_with_its_files() {
     let study = Study::new("lead-car-wall", "\"24t\"", "\"24t\"");

@@ -39,7 +39,7 @@ pub(crate) struct Comparison {
     pub reference_max_crush_m: f64,
     /// Wall-clock time of FE for this run, in s; null where its case file is missing.
     pub fe_time_s: Option<f64>,
-    /// The same of the runs that the curves were made from.
+    /// The same for the runs that the curves were made from.
     pub training_time_s: Option<f64>,
     /// One row per method.
     pub rows: Vec<Row>,
@@ -70,11 +70,11 @@ pub(crate) struct NsdmFit {
     pub seed: u64,
     /// Ratio of the errors of the velocity at the speed it was fitted at.
     pub own_velocity_l1: f64,
-    /// The same of the acceleration.
+    /// The same for the acceleration.
     pub own_acceleration_l1: f64,
     /// Ratio of the errors of the velocity at the speed that is left out.
     pub velocity_l1: f64,
-    /// The same of the acceleration.
+    /// The same for the acceleration.
     pub acceleration_l1: f64,
     /// Time the fit took, in s.
     pub fit_time_s: f64,

@@ -16,7 +16,7 @@ use crate::surrogate::predict::Prediction;
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query};
 use crate::unit::km_per_h;
 
-/// Fewest steps along FE's crush at which forces are compared.
+/// Minimum number of steps along FE's crush at which forces are compared.
 const STEPS: usize = 400;
 
 /// What to ask a model of this group's so that it predicts the case.
@@ -40,7 +40,7 @@ pub(crate) fn query_of(case: &Case, model: &Model) -> Query {
 pub(crate) struct LeftOutCase<'a> {
     /// As in the training set.
     pub own: &'a TrainingCase,
-    /// Its records: a run, or the mean of the runs that it stands for.
+    /// Its records: a run, or the mean of the runs that it represents.
     pub case: &'a Case,
     /// The training set without the cases of its speed.
     pub rest: TrainingSet,

@@ -15,10 +15,10 @@ pub struct HistoryOptions {
     pub filter_class: Option<u32>,
 }
 
-/// Most lines of a chart.
+/// Maximum number of lines of a chart.
 const MOST: usize = 24;
 
-/// Histories over time; quantities of different components stand in panels side by side.
+/// Histories over time; quantities of different components are in panels side by side.
 ///
 /// # Errors
 /// For none or more than 24 histories, or samples that the filter does not take.

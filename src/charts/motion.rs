@@ -243,7 +243,7 @@ fn time() -> Axis {
     Axis::new("time", "ms", 1e3)
 }
 
-/// Methods that are parts of another; they stand in the table, and more lines than looks would be
+/// Methods that are parts of another; they are in the table, and more lines than looks would be
 /// distinguished by nothing.
 const ON_THE_WAY: [&str; 2] = ["rate_only", "rate_live"];
 

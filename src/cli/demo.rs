@@ -261,7 +261,7 @@ impl Flow<'_> {
 }
 
 /// Writes the bundled files of a folder and all below it.
-/// Most bytes of a scenario that is compared with the bundled one.
+/// Maximum number of bytes of a scenario that is compared with the bundled one.
 const MAX_SCENARIO: u64 = 1 << 20;
 
 /// A scenario of an earlier demo in `folder` that is not as it was written.

@@ -318,7 +318,7 @@ fn export(
     export_curves(args, format, (input, &chosen), output)
 }
 
-/// The same of a format that is made of curves.
+/// The same for a format that is made of curves.
 fn export_curves(
     args: &Args,
     format: &Format,

@@ -100,14 +100,14 @@ pub(super) fn plain(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// What stands for a control character.
+/// Replacement of a control character.
 const REPLACED: &str = "\u{fffd}";
 
 /// Passes bytes on without control characters but line ends and tabs: those of ASCII, and
 /// those from U+0080 to U+009F, which UTF-8 writes as `0xc2` and a byte.
 struct ControlFilter<W, F> {
     out: W,
-    /// What stands for a control character of that code.
+    /// Replacement of a control character of that code.
     instead: F,
     /// Whether a `0xc2` waits for the byte after it.
     held: bool,
@@ -305,7 +305,7 @@ pub(super) fn width() -> Option<usize> {
     out.is_terminal().then(|| stated().or_else(|| size(&out)).unwrap_or(80).max(LEAST))
 }
 
-/// The same of standard error.
+/// The same for standard error.
 pub(super) fn error_width() -> Option<usize> {
     let err = io::stderr();
     err.is_terminal().then(|| stated().or_else(|| size(&err)).unwrap_or(80).max(LEAST))

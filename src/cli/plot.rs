@@ -128,7 +128,7 @@ fn scale(text: &str) -> Result<f64, String> {
     within(text, 0.5, 8.0)
 }
 
-/// Most bytes of a result that is drawn.
+/// Maximum number of bytes of a result that is drawn.
 const MOST_RESULT: u64 = 1 << 30;
 
 #[derive(Serialize)]

@@ -196,7 +196,7 @@ fn print_unloading(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()
     Ok(())
 }
 
-/// How far FE may lie from each force of the curve, and what of it lies between equal runs.
+/// How far FE may lie from each force of the curve, and what of it lies between repeated runs.
 fn print_bands(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
     for (force, band) in curve.provenance.bands() {
         writeln!(

@@ -15,7 +15,7 @@ use crate::rating::{self, Quantity, Rating, RatingSettings, Signal};
 use crate::solver::{self, Selection, WantedId};
 use crate::unit::TIME;
 
-/// Most bytes of a table that is rated: some million rows.
+/// Maximum number of bytes of a table that is rated: some million rows.
 const MAX_TABLE_BYTES: u64 = 256 << 20;
 
 /// Rate a prediction against a reference: ratios, peaks, ISO/TS 18571, CORA and others
@@ -56,7 +56,7 @@ pub(super) struct Args {
     quantity: Option<Quantity>,
 }
 
-/// Where the signal stands in both files.
+/// Where the signal is in both files.
 #[derive(clap::Args)]
 struct Both {
     /// Column of the CSV files
@@ -91,7 +91,7 @@ struct Address {
 impl Address {
     fn parse(text: &str) -> Result<Self, String> {
         let (mut rest, mut scale, mut unit) = (text, 1.0, None);
-        // A comma may stand in names as well.
+        // A comma may be in names as well.
         while let Some((before, last)) = rest.rsplit_once(',') {
             if let Some(value) = last.strip_prefix("scale=") {
                 scale = factor(value)?;

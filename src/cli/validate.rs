@@ -362,7 +362,7 @@ fn mean_scatter(scatter: &Scatter) -> Vec<String> {
     cells
 }
 
-/// How far equal runs lie from their mean.
+/// How far repeated runs lie from their mean.
 fn scatter_line(scatter: &Scatter) -> String {
     let at = |at: &SpeedScatter| {
         format!("{} at {}", counted(at.runs.len(), "run"), km_per_h(at.speed_m_per_s))

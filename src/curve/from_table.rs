@@ -78,7 +78,7 @@ pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves,
     }
 }
 
-/// Most states at the common interval: 15 s of 0.75 ms.
+/// Maximum number of states at the common interval: 15 s of 0.75 ms.
 const MOST_STATES: usize = 20_000;
 
 /// The motion that the table implies.
@@ -257,7 +257,7 @@ mod tests {
     }
 
     /// A mass on a linear spring: d = d_max sin ωt, stopped after a quarter of the period, and
-    /// thrown back with its own speed by the same stiffness.
+    /// rebounded with its own speed by the same stiffness.
     #[test]
     fn a_linear_spring_gives_a_sine() {
         let (m, v, k): (f64, f64, f64) = (24e3, 10.0, 40e6);

@@ -341,7 +341,7 @@ impl Case {
         UnitSystem::parse(recipe.get("units")?.as_str()?).ok()
     }
 
-    /// Whether its motion was made of its own force, as of an imported table without times: then
+    /// Whether its motion was made of its own force, as for an imported table without times: then
     /// that force is also the one that moves the body.
     pub(crate) fn moves_by_its_force(&self) -> bool {
         let recipe: Option<serde_json::Value> = serde_json::from_str(&self.provenance.recipe).ok();
@@ -375,7 +375,7 @@ impl Case {
     }
 }
 
-/// The same of a run's recipe, as JSON, and the hashes of its files.
+/// The same for a run's recipe, as JSON, and the hashes of its files.
 pub(crate) fn source_hash<'a>(
     recipe: &str,
     files: impl Iterator<Item = &'a str>,

@@ -32,7 +32,7 @@ pub struct Impact {
     pub masses: Masses,
     /// From the maximum deflection, in N/m, if it is known.
     pub unloading_stiffness_n_per_m: Option<f64>,
-    /// The same of the force that moves the body, where that is another.
+    /// The same for the force that moves the body, where that is another.
     pub body_unloading_stiffness_n_per_m: Option<f64>,
     /// Units in which the table's values were read, to find the cause of errors.
     pub units: UnitSystem,

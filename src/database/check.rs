@@ -138,7 +138,7 @@ impl Findings<'_> {
         self.list.iter().rev().take_while(own).any(|f| DAMAGE.contains(&f.code))
     }
 
-    /// Looks at every value.
+    /// Checks every value.
     fn datasets(&mut self, opened: &Opened<'_>, case: &Group) {
         let hashes = opened.hashes(case);
         let mut states = 0;

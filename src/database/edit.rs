@@ -77,7 +77,7 @@ impl From<Error> for EditError {
 }
 
 /// What of a file's cases is not in its place in the new database. What others have put into a case
-/// or group moves with it; a case without such is deleted and written anew.
+/// or group moves with it; a case without such is deleted and written again.
 struct Moves {
     /// Cases that are no longer there.
     gone: HashSet<CasePath>,

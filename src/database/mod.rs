@@ -97,7 +97,7 @@ impl Database {
     /// is.
     ///
     /// # Errors
-    /// As of [`Database::read`] and [`Database::group_or_only`], and if the
+    /// As for [`Database::read`] and [`Database::group_or_only`], and if the
     /// group has no such case.
     pub fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, Error> {
         let opened = layout::open(path)?;

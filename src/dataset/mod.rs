@@ -437,7 +437,7 @@ impl TrainingCase {
 
 /// Masses of a pair that differ by no more are those of equal bodies, as a share.
 const EVEN: f64 = 0.01;
-/// Fewest steps of a run's curve: short crushes need more than one each 2 mm.
+/// Minimum number of steps of a run's curve: short crushes need more than one every 2 mm.
 pub(crate) const STEPS: usize = 200;
 
 impl TrainingSet {

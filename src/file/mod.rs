@@ -115,7 +115,7 @@ pub(crate) fn out_of_memory(bytes: u64) -> io::Error {
 }
 
 /// The requested fact about a path, or `None` if nothing is there, or something else. A fault stays an error:
-/// who takes it for an absence starts a database anew, or reads half of a run.
+/// who takes it for an absence starts a database again, or reads half of a run.
 pub(crate) fn if_there<T>(asked: io::Result<T>) -> io::Result<Option<T>> {
     use io::ErrorKind::{InvalidFilename, NotADirectory, NotFound, PermissionDenied};
     match asked {
@@ -145,7 +145,7 @@ pub(crate) fn is_same(a: &Path, b: &Path) -> bool {
     matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b)
 }
 
-/// The folder that `path` stands in.
+/// The folder that `path` is in.
 pub(super) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,

@@ -189,7 +189,7 @@ impl<F: Float> Grower<'_, F> {
         }
     }
 
-    /// Moves the samples of every order that stand before `middle` in that of `feature` to
+    /// Moves the samples of every order that are before `middle` in that of `feature` to
     /// the front of `start..end`; both sides stay sorted.
     fn partition(&mut self, feature: usize, start: usize, middle: usize, end: usize) {
         let goes_left = &mut self.goes_left[..];

@@ -230,7 +230,7 @@ impl<F: Float> ForestParams<F> {
         self
     }
 
-    /// How many features are looked at for each split.
+    /// How many features are examined for each split.
     pub fn features_per_split(mut self, features: FeaturesPerSplit) -> Self {
         self.0.features_per_split = features;
         self

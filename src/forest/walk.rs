@@ -44,7 +44,7 @@ impl<'a, F: Float> Rows<'a, F> {
     }
 }
 
-/// A node in as few bytes as a walk needs. The right child stands after the left, and a leaf
+/// A node in as few bytes as a walk needs. The right child is after the left, and a leaf
 /// is its own right child: nothing is below NaN, so a walk that arrives stays, without a branch.
 #[derive(Clone, Copy)]
 struct Node<F> {

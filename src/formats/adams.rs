@@ -109,7 +109,7 @@ impl<'a> Spline<'a> {
         }
     }
 
-    /// The units stand in it, with names of their own.
+    /// The units are in it, with names of their own.
     fn property_file(&self) -> Result<Vec<u8>, Error> {
         let names = LENGTH.name_of(self.units.length_m).zip(FORCE.name_of(self.units.force()));
         let words = |(length, force): (&str, &str)| {

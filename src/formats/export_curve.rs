@@ -36,7 +36,7 @@ pub struct ExportCurve {
     /// How the target continues beyond the maximum crush.
     pub tail: Tail,
     follows_faster_runs: bool,
-    /// Largest force before and after, in N, where a steep flank was made less steep.
+    /// Largest force before and after, in N, where a steep rise was made less steep.
     pub softening: Option<(f64, f64)>,
     /// Ordinal among the curves of the same group and speed of one export, counted from 1.
     pub ordinal: usize,
@@ -47,7 +47,7 @@ pub struct ExportCurve {
 pub(crate) enum TargetUnloading {
     /// On a straight line of this stiffness in N/m.
     Line(f64),
-    /// Along the loading branch: everything comes back.
+    /// Along the loading branch: everything is returned.
     Elastic,
 }
 
@@ -227,7 +227,7 @@ impl ExportCurve {
         self.restitution_of(stored_j)
     }
 
-    /// Separation speed over impact speed, from the energy in J that comes back.
+    /// Separation speed over impact speed, from the energy in J that is returned.
     fn restitution_of(&self, stored_j: f64) -> f64 {
         (2.0 * stored_j / self.effective_mass_kg()).sqrt() / self.predicted.speed_m_per_s
     }
@@ -365,7 +365,7 @@ fn own_name(curve: &PredictedCurve) -> Option<&str> {
     curve.provenance.case.as_deref().filter(|name| *name != speed_name(curve))
 }
 
-/// Most characters of a line of a header.
+/// Maximum number of characters of a line of a header.
 const LINE: usize = 180;
 
 /// A warning as lines of a header, which some tools read up to a width only.
@@ -402,7 +402,7 @@ pub(super) fn plain(c: char) -> char {
 }
 
 impl Options {
-    /// The curves made ready for a target whose own tail is `usual`.
+    /// The curves prepared for a target whose own tail is `usual`.
     pub(super) fn ready(
         &self,
         inputs: &[ExportInput],

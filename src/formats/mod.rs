@@ -260,10 +260,10 @@ impl Exported {
     }
 }
 
-/// Most bytes of a file that holds a curve: a predicted one has some ten thousand.
+/// Maximum number of bytes of a file that holds a curve: a predicted one has some ten thousand.
 pub(crate) const MAX_CURVE_BYTES: u64 = 64 << 20;
 
-/// Fewest points that every target takes.
+/// Minimum number of points that every target takes.
 pub(crate) const MIN_POINTS: usize = 4;
 
 impl Format {

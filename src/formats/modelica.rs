@@ -13,7 +13,7 @@ use super::thin::thinned;
 use super::{ExportCurve, Exported, Options, Tail, TargetUnloading};
 
 const COMMENT_WIDTH: usize = 200;
-/// Most points of the package's table: a translator unrolls the search through them.
+/// Maximum number of points of the package's table: a translator unrolls the search through them.
 const MOST_POINTS: usize = 200;
 /// Words that no package can have for a name (Modelica 3.6, 2.3.3), as far as files are called so.
 const KEYWORDS: &str = "algorithm and block class connect connector constant discrete each else end equation \

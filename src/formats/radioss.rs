@@ -104,7 +104,7 @@ fn property(lines: &mut Lines, curve: &ExportCurve, units: InUnits, id: u32) {
     let one = nine_digits(1.0);
     // A spring needs a mass of its own: a millionth of the body's.
     let mass = 1e-6 * curve.predicted.mass_kg / units.0.mass_kg;
-    // With a softer K1 the solver would cut the flanks that are steeper, and their energy.
+    // With a softer K1 the solver would cut the rises that are steeper, and their energy.
     let stiffness = curve.stiffness_n_per_m().max(curve.loading.max_slope());
     let stiffness = units.stiffness(stiffness);
     lines.add(format_args!("/PROP/TYPE4/{id}"));

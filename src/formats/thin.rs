@@ -103,7 +103,7 @@ fn kept_points(d: &[f64], f: &[f64], most: usize, kept: usize) -> Vec<usize> {
     (0..n).filter(|&i| is_left[i]).collect()
 }
 
-/// Fewest points of a table that splines go through.
+/// Minimum number of points of a table that splines go through.
 const FEWEST: usize = 200;
 /// A kink is fenced by two points at this share of the intervals beside it.
 const FENCE: f64 = 0.05;
@@ -140,7 +140,7 @@ pub(crate) fn for_splines(curve: &Envelope) -> Result<Envelope, Error> {
     Envelope::new(deflection_m, force_n)
 }
 
-/// What came of making steep flanks less steep.
+/// What came of making steep rises less steep.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Softened {
     /// There is none that steep.
@@ -151,8 +151,8 @@ pub(crate) enum Softened {
 }
 
 /// The envelope with no rise steeper than `stiffness_n_per_m` and the same energy to its point
-/// `end`: a too steep flank begins earlier on its line, and the forces around it are raised for what
-/// the flank has lost, by a quarter at most and not in the last twentieth of the deflection.
+/// `end`: a too steep rise begins earlier on its line, and the forces around it are raised for what
+/// the rise has lost, by a quarter at most and not in the last twentieth of the deflection.
 pub(crate) fn softened(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Softened {
     if curve.max_slope() <= stiffness_n_per_m * (1.0 + 1e-9) {
         return Softened::Nothing;

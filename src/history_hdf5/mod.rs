@@ -21,7 +21,7 @@ use crate::solver::{self, Blocks, Selection, SolverFile, decks};
 use crate::unit::UnitSystem;
 use units::unit_of;
 
-/// What is known of a file's histories next to the file.
+/// What is known about a file's histories next to the file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Beside<'a> {
     /// Units of the values; the deck's if absent, and if that has none they stay unknown.

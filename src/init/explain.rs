@@ -77,7 +77,7 @@ pub(super) fn best_of(survey: &Survey, kind: Option<StudyKind>) -> Option<Explan
         let equal = of_kind().filter(|(force, _)| size(force) >= (1.0 - EQUAL) * most);
         equal.min_by_key(|(force, _)| rank(force)).map(|(_, e)| e.clone())
     };
-    // A section carries only what passes through it, and a rigid body may be the one that is stopped: neither stands for
+    // A section carries only what passes through it, and a rigid body may be the one that is stopped: neither represents
     // a contact that is there.
     let [contacts, bodies, sections] = [&["rwforc", "rcforc"][..], &["rbdout"], &["secforc"]];
     largest(contacts).or_else(|| largest(bodies)).or_else(|| largest(sections))

@@ -143,7 +143,7 @@ fn real(path: &Path) -> PathBuf {
     fs::canonicalize(path).unwrap_or_else(|_| path.into())
 }
 
-/// A name that can stand in a study: without control characters.
+/// A name that can be in a study: without control characters.
 fn clean(name: &str) -> String {
     name.chars().map(|c| if c.is_control() { '_' } else { c }).collect()
 }
@@ -257,7 +257,7 @@ pub(crate) enum Reason {
     #[error("it terminated early: {file} holds {states} complete {}{damage}", if *.states == 1 { "state" } else { "states" })]
     FewStates {
         file: String,
-        /// How many whole states it holds.
+        /// How many complete states it holds.
         states: usize,
         /// What is damaged, in brackets; empty if nothing is.
         damage: String,

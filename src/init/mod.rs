@@ -46,7 +46,7 @@ pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
     }
 }
 
-/// What the caller already knows: it stands above what is found.
+/// What the caller already knows; it overrides what is found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct UserHints {
     /// Units of the solver files.

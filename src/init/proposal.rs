@@ -25,7 +25,7 @@ pub struct Proposal {
     pub(crate) deflection: Proposed<DeflectionSource>,
     /// Title of the node, then of the other body's.
     pub(crate) node_titles: Vec<Option<String>>,
-    /// Nodes that could stand for the same bodies, a list for each.
+    /// Nodes that could represent the same bodies, a list for each.
     pub(crate) other_nodes: Vec<Vec<Alternative>>,
     pub(crate) force: Proposed<ForceSource>,
     /// Title of the wall or interface.
@@ -108,7 +108,7 @@ fn why<T>(proposed: &Proposed<T>) -> Option<&str> {
 pub(crate) enum Evidence {
     /// The caller gave it.
     UserHints(String),
-    /// It stands in a file.
+    /// Found in a file.
     Read(String),
     /// It follows from what was read.
     Computed(String),
@@ -117,7 +117,7 @@ pub(crate) enum Evidence {
 }
 
 impl Evidence {
-    /// `read`, `computed`, …: the word that stands for it in a proposal.
+    /// `read`, `computed`, …: its word in a proposal.
     pub(crate) fn word(&self) -> &'static str {
         match self {
             Self::UserHints(_) => "given",

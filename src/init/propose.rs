@@ -36,7 +36,7 @@ pub struct Request {
 
 /// Proposes a study for run folders.
 ///
-/// `progress` is called with the name of each run when it was looked at, from any thread.
+/// `progress` is called with the name of each run when it was examined, from any thread.
 ///
 /// # Errors
 /// If there is no run, none can be used, or they are several groups.
@@ -210,7 +210,7 @@ fn is_twin(a: &Record, b: &Record) -> bool {
         && is_alike(&force(a), &force(b))
 }
 
-/// Runs whose paths can stand in a study.
+/// Runs whose paths can be in a study.
 fn with_paths(
     recorded: Vec<Recorded>,
     seen: &dyn Fn(&PathBuf) -> Option<String>,

@@ -19,7 +19,7 @@ use crate::solver::{SolverFile, WantedId};
 /// Bodies that still close at more than this share of their first speed have not been stopped.
 pub(super) const STOPPED: f64 = 0.05;
 
-/// Fewest states of a record that can be judged.
+/// Minimum number of states of a record that can be judged.
 const FEWEST_STATES: usize = 8;
 /// First velocities that differ by less than this share of the largest belong to one body; a
 /// change smaller than this share is none.
@@ -50,7 +50,7 @@ pub(super) struct Body {
     pub first_velocity: f64,
     pub nodes: Vec<NodeCandidate>,
     /// Change of its smoothest node's velocity over time: how the body moves if no force shows
-    /// which node stands for it.
+    /// which node represents it.
     pub change: Vec<f64>,
 }
 

@@ -47,7 +47,7 @@ const AT_END_M: f64 = 1e-4;
 
 /// Runs the chain from the first contact (t = 0) for `duration_s`.
 ///
-/// x counts from where each body stands before gaps close; bodies move freely up to the
+/// x counts from where each body is before gaps close; bodies move freely up to the
 /// first contact.
 ///
 /// # Errors

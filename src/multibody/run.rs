@@ -132,7 +132,7 @@ pub struct InterfaceHistory {
     pub force_n: Vec<f64>,
     /// Maximum deflection so far, in m.
     pub largest_deflection_m: Vec<f64>,
-    /// Energy that would come back, in J.
+    /// Energy that is returned, in J.
     pub stored_j: Vec<f64>,
     /// Energy that is lost, in J.
     pub dissipated_j: Vec<f64>,

@@ -202,7 +202,7 @@ pub struct Fit {
     pub objective: f64,
     /// `Σ|p − r|/Σ|r|` of the velocity against the target.
     pub velocity_l1: f64,
-    /// The same of the acceleration, the law's own at each time, not filtered.
+    /// The same for the acceleration, the law's own at each time, not filtered.
     pub acceleration_l1: f64,
     /// Motions computed.
     pub evaluations: usize,

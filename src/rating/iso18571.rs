@@ -18,7 +18,7 @@ const WINDOW: usize = 10;
 /// Slopes are means over this many samples.
 const SMOOTHED: usize = 9;
 
-/// Fewest samples: what a shift leaves must hold a mean of nine.
+/// Minimum number of samples: what a shift leaves must hold a mean of nine.
 pub(crate) const LEAST_SAMPLES: usize = 12;
 /// Most samples: the warping takes a fifth of their square in bytes, here 80 MB, and the
 /// search for the shift as many steps.

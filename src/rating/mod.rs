@@ -162,7 +162,7 @@ pub struct Peak {
     pub time_s: f64,
     /// Value of the reference, in the unit of the signals.
     pub value: f64,
-    /// Prediction over reference, less 1; null if the prediction has no peak within a tenth of the
+    /// Prediction over reference, minus 1; null if the prediction has no peak within a tenth of the
     /// common times: it is missing.
     pub error: Option<f64>,
     /// By how much the prediction's peak is later, in s.

@@ -5,7 +5,7 @@ use crate::signal::{CfcError, cfc, interpolate};
 
 /// Interval of ISO/TS 18571: 10 kHz.
 pub(crate) const INTERVAL_S: f64 = 1e-4;
-/// Fewest samples of a signal: fewer are points, not a history.
+/// Minimum number of samples of a signal: fewer are points, not a history.
 const LEAST_SAMPLES: usize = 5;
 /// Most common samples: 500 s, far beyond any collision.
 const MOST_COMMON: f64 = 5e6;
@@ -48,7 +48,7 @@ fn too_much(error: &CfcError, length_s: f64) -> String {
 }
 
 impl Signal {
-    /// `name` stands in messages and results; `time_s` in s.
+    /// `name` appears in messages and results; `time_s` in s.
     ///
     /// # Errors
     /// With the number of the first wrong sample, counted from 1.

@@ -51,7 +51,7 @@ impl Figure {
     }
 }
 
-/// Axes and values of a panel; equal abscissas of several lines stand there once.
+/// Axes and values of a panel; equal abscissas of several lines are there once.
 fn panel_data(panel: &Panel, place: &PanelPlace) -> Value {
     let mut xs: Vec<Vec<Value>> = Vec::new();
     let mut abscissa = |values: Vec<Value>| {

@@ -141,7 +141,7 @@ impl Validated<'_> {
         settings: &ReportSettings,
     ) {
         let Self { group, cases, validation, .. } = self;
-        parts.push(Part::Heading("How far predictions lie from FE".into()));
+        parts.push(Part::Heading("Accuracy of predictions".into()));
         let chosen = validation.means.iter().find(|means| means.model == validation.chosen);
         if let Some(means) = chosen {
             let value = percent(means.velocity_l1);

@@ -147,7 +147,7 @@ fn limits(prepared: &Prepared, run: &Run) -> Option<String> {
     let beyond = run.beyond_data().map(|k| prepared.chain.interfaces()[k].name.as_str());
     let beyond: Vec<&str> = beyond.collect();
     let over = if !beyond.is_empty() {
-        format!("cannot be told, because {} left the data of the curve", beyond.join(", "))
+        format!("unknown, because {} went beyond the data of its curve", beyond.join(", "))
     } else if over.is_empty() {
         "no vehicle".into()
     } else {

@@ -84,7 +84,7 @@ impl CheckedScenario<'_> {
     }
 
     /// Checks `varied`, which differs from this scenario in numbers only and in which of its
-    /// curves stand where: what these cannot break is not looked at again.
+    /// curves stand where: what these cannot break is not examined again.
     pub(crate) fn vary<'v>(&self, varied: &'v Scenario) -> Result<CheckedScenario<'v>, Error> {
         check_values(varied)
     }
@@ -253,7 +253,7 @@ fn check_contact(scenario: &Scenario) -> Result<(), Error> {
     }
 }
 
-/// Longest name, in bytes: it stands in the columns of results and tables.
+/// Longest name, in bytes: it appears in the columns of results and tables.
 const MAX_NAME: usize = 200;
 
 fn check_length(name: &str) -> Result<(), Error> {
@@ -265,7 +265,7 @@ fn check_length(name: &str) -> Result<(), Error> {
     Err(error!(Scenario, "the name \"{begin}…\" has {found} bytes: expected at most {MAX_NAME}"))
 }
 
-/// Names stand in the columns of the result.
+/// Names appear in the columns of the result.
 fn check_name(name: &str) -> Result<(), Error> {
     check_length(name)?;
     let breaks = |c: char| c.is_control() || [',', '|', '[', ']', '"'].contains(&c);

@@ -300,7 +300,7 @@ impl CrushZone<'_> {
     }
 }
 
-/// A mass split off a vehicle: it stands in front of the interface's spring, the body behind.
+/// A mass split off a vehicle: it is in front of the interface's spring, the body behind.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CrushZoneTable {

@@ -36,7 +36,7 @@ pub(crate) fn bounded(a: &[Vec<f64>], b: &[f64], upper: &[f64]) -> Vec<f64> {
 }
 
 /// Moves the free unknowns to their solution, or towards it until the first of them meets a bound
-/// and stands there; whether one did.
+/// and is there; whether one did.
 fn step_to_bound(
     a: &[Vec<f64>],
     b: &[f64],

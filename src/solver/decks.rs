@@ -12,12 +12,12 @@ use crate::file;
 
 /// Endings of keyword decks.
 const ENDINGS: [&str; 5] = ["k", "key", "dyn", "dyna", "kwd"];
-/// Names of a folder that are looked at, and decks among them that are read.
+/// Names of a folder that are examined, and decks among them that are read.
 const MAX_NAMES: usize = 10_000;
 const MAX_DECKS: usize = 20;
 /// Bytes by which text that is not plain is known.
 const HEAD: usize = 16;
-/// Lines looked at for the first keyword.
+/// Lines examined for the first keyword.
 const HEAD_LINES: usize = 1_000;
 
 /// What a folder has of decks.

@@ -55,7 +55,7 @@ pub(super) fn named(name: &str) -> Result<&'static Format, Error> {
     })
 }
 
-/// Lines looked at before a file counts as unknown: more than the longest legend seen,
+/// Lines examined before a file counts as unknown: more than the longest legend seen,
 /// few enough that a large foreign file is refused at once.
 const DETECT_LINES: u64 = 100_000;
 
@@ -85,7 +85,7 @@ pub(super) fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format
 const NOT_RECOGNISED: &str = "no solver output is recognised in it";
 
 /// The format found in the content, and whether it has the header of LS-DYNA's text files. Where lines of several
-/// kinds stand in a file, those of the kind that it is `named` by count.
+/// kinds are in a file, those of the kind that it is `named` by count.
 fn look_at(
     path: &Path,
     source: &dyn Source,

@@ -13,7 +13,7 @@ pub(crate) fn family(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut parts = with_continuations(path)?;
     let name = name_of(path);
     if let Some(number) = restart_number(&name) {
-        // Only the first of them stands for all, so that each can still be looked at alone.
+        // Only the first of them includes all, so that each can still be read alone.
         let is_first = number == 1 || !is_file(&restart(path, number - 1))?;
         for next in (number + 1..=LAST_RESTART).map(|n| restart(path, n)) {
             if !is_first || !is_file(&next)? {
@@ -34,7 +34,7 @@ pub(crate) fn family(path: &Path) -> Result<Vec<PathBuf>, Error> {
         others.extend(other.map(|(_, number)| (number, entry.path())));
     }
     others.sort();
-    // Only the first of them stands for all, so that each can still be looked at alone.
+    // Only the first of them includes all, so that each can still be read alone.
     if others.first().is_some_and(|(first, _)| *first == number) {
         for (_, other) in others.iter().skip(1) {
             if is_file(other)? {
@@ -45,7 +45,7 @@ pub(crate) fn family(path: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(parts)
 }
 
-/// What stands before `binout0000`, a job id or nothing, and its digits.
+/// What is before `binout0000`, a job id or nothing, and its digits.
 fn process_number(name: &str) -> Option<(&str, u32)> {
     let (job, digits) = name.rsplit_once("binout")?;
     let is_job = job.is_empty() || job.ends_with('.');

@@ -170,7 +170,7 @@ fn open(
         ));
     }
     // Before the first is opened: its size is then fixed, and what a run wrote into a
-    // continuation that began later would stand after a hole.
+    // continuation that began later would are after a hole.
     let family = family(path)?;
     let first = source::open(path, selection.access).map_err(io)?;
     let format = match format {

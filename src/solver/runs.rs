@@ -15,13 +15,13 @@ use crate::file::is_file;
 const DEEPEST: usize = 12;
 /// Folders that are examined, so that a whole disk is not walked.
 const MOST_FOLDERS: usize = 20_000;
-/// Names of one folder that are looked at.
+/// Names of one folder that are examined.
 const MOST_NAMES: usize = 100_000;
 
-/// What stands below a folder.
+/// What is below a folder.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct RunFolders {
-    /// Folders with solver files, in order of their names; nothing below them is looked at.
+    /// Folders with solver files, in order of their names; nothing below them is examined.
     pub runs: Vec<PathBuf>,
     /// Folders that hold neither solver files nor folders, likewise.
     pub without_files: Vec<PathBuf>,

@@ -141,7 +141,7 @@ fn check_parameters(entry: &RunEntry) -> Result<(), Error> {
 /// Longest name, in bytes, as databases take it.
 const MAX_NAME: usize = 200;
 
-/// Names stand in files, tables and HDF5 paths.
+/// Names appear in files, tables and HDF5 paths.
 fn check_name(key: &str, name: &str, slash: bool) -> Result<(), Error> {
     let shown = name.escape_debug();
     if name.trim().is_empty() || name == "." || name == ".." {

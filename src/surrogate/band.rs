@@ -106,16 +106,16 @@ pub struct Band {
 /// square.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScatterWidths {
-    /// As of [`Band::pointwise_share`].
+    /// As for [`Band::pointwise_share`].
     pub pointwise_share: f64,
-    /// As of [`Band::simultaneous_share`].
+    /// As for [`Band::simultaneous_share`].
     pub simultaneous_share: f64,
 }
 
-/// Scatter of one force between equal runs, relative to its local level.
+/// Scatter of one force between repeated runs, relative to its local level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ForceScatter {
-    /// Runs at the speeds that have several, less one for the mean of each.
+    /// Runs at the speeds that have several, minus one for the mean of each.
     pub degrees_of_freedom: usize,
     /// Root mean square of the residuals.
     pub force_share: f64,
@@ -141,7 +141,7 @@ fn without(whole: f64, part: f64) -> f64 {
 /// Residuals of one left-out curve relative to the local level of the prediction.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Residuals {
-    /// Over which it was predicted, as of [`Band::span_m_per_s`].
+    /// Over which it was predicted, as for [`Band::span_m_per_s`].
     pub span_m_per_s: f64,
     pub ratios: Vec<f64>,
     /// How many runs the left-out curve is the mean of.

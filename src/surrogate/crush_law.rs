@@ -62,7 +62,7 @@ pub(crate) struct CrushCurve {
     pub stopped_kg: Envelope,
 }
 
-/// Fewest points of a law at one speed.
+/// Minimum number of points of a law at one speed.
 const POINTS: usize = 400;
 
 impl CrushLaw {

@@ -29,7 +29,7 @@ pub struct ModelEntry {
     pub follows_closing: bool,
     /// Whether it needs runs that determine a crush law with stopped mass.
     pub needs_crush_law: bool,
-    /// Fewest training curves that it answers from.
+    /// Minimum number of training curves that it answers from.
     pub least_curves: usize,
     /// The rule for the maximum crush of a model that was not validated, if speed alone differs.
     pub crush_rule: MaxCrushRule,

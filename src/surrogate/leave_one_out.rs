@@ -11,7 +11,7 @@ use crate::curve::ForceKind;
 
 /// Errors of one model at one speed that was left out.
 ///
-/// Ratios are `Σ|p − r|/Σ|r|`; other errors are prediction over FE, less 1.
+/// Ratios are `Σ|p − r|/Σ|r|`; other errors are prediction over FE, minus 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LeftOut {
     /// Name of the model.
@@ -80,9 +80,9 @@ pub struct Floor {
     pub inner: bool,
     /// Ratio of the errors of the velocity.
     pub velocity_l1: f64,
-    /// The same of accelerations filtered with CFC 60.
+    /// The same for accelerations filtered with CFC 60.
     pub acceleration_l1: f64,
-    /// The same of accelerations that are not filtered.
+    /// The same for accelerations that are not filtered.
     pub acceleration_unfiltered_l1: f64,
 }
 
@@ -119,13 +119,13 @@ pub struct Means {
 pub struct Scatter {
     /// Those that have several runs.
     pub speeds: Vec<SpeedScatter>,
-    /// Runs at these speeds, less one for the mean of each: weights of the means below.
+    /// Runs at these speeds, minus one for the mean of each: weights of the means below.
     pub degrees_of_freedom: usize,
-    /// Error of the declared force of a run against the mean, as the tables have it.
+    /// Error of the declared force of a run against the mean, as in the tables.
     pub force_l1: f64,
-    /// The same of the closing speed.
+    /// The same for the closing speed.
     pub velocity_l1: f64,
-    /// Root mean square of the declared force's residuals relative to its local level, as of bands.
+    /// Root mean square of the declared force's residuals relative to its local level, as for bands.
     pub force_share: f64,
     /// Root mean square over the runs of the largest of these residuals.
     pub largest_force_share: f64,
@@ -150,7 +150,7 @@ impl Scatter {
 /// The scatter of the body force.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BodyScatter {
-    /// Root mean square of its residuals relative to its local level, as of bands.
+    /// Root mean square of its residuals relative to its local level, as for bands.
     pub force_share: f64,
     /// Root mean square over the runs of the largest of these residuals.
     pub largest_force_share: f64,
@@ -163,15 +163,15 @@ pub struct SpeedScatter {
     pub speed_m_per_s: f64,
     /// Names of the runs.
     pub runs: Vec<String>,
-    /// As of all speeds.
+    /// As for all speeds.
     pub force_l1: f64,
-    /// As of all speeds.
+    /// As for all speeds.
     pub velocity_l1: f64,
-    /// As of all speeds.
+    /// As for all speeds.
     pub force_share: f64,
-    /// As of all speeds.
+    /// As for all speeds.
     pub largest_force_share: f64,
-    /// As of all speeds.
+    /// As for all speeds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body: Option<BodyScatter>,
 }
@@ -191,7 +191,7 @@ pub struct Validation {
     pub means: Vec<Means>,
     /// FE's own curves in the same runs.
     pub floors: Vec<Floor>,
-    /// How far equal runs lie apart; absent where no speed has several runs.
+    /// How far repeated runs lie apart; absent where no speed has several runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scatter: Option<Scatter>,
     /// Of the declared force between training speeds, from the chosen model's residuals at the

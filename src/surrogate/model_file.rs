@@ -25,7 +25,7 @@ use crate::unit::{Speed, SpeedKind, UnitSystem};
 const FORMAT: &str = "crumple model";
 /// Version of the model files that this program writes and reads.
 pub(super) const VERSION: u32 = 4;
-/// Most bytes of a model file: a forest of 500 trees has some ten million.
+/// Maximum number of bytes of a model file: a forest of 500 trees has some ten million.
 const MAX_BYTES: u64 = 1 << 30;
 
 /// What identifies a model file.
@@ -101,7 +101,7 @@ impl Model {
     /// Parses and checks the bytes of a model file; `path` is for messages.
     ///
     /// # Errors
-    /// As of [`read`](Self::read).
+    /// As for [`read`](Self::read).
     pub fn parse(path: &Path, text: &[u8]) -> Result<Self, Error> {
         let no_model = |line, column, detail| {
             error!(

@@ -43,7 +43,7 @@ pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, Error> {
 /// The curve of one force that drives an interface, with what lies beyond its maximum crush;
 /// `member` of its band's half width added, from −1 (lower edge) to 1.
 ///
-/// For the body's own force the declared one is not looked at: many interfaces of a train or a
+/// For the body's own force the declared one is not examined: many interfaces of a train or a
 /// sweep ask for the former alone.
 ///
 /// # Errors

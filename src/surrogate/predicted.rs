@@ -147,7 +147,7 @@ pub struct Provenance {
     /// The band around the declared force at this speed, and what it rests on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub band: Option<Band>,
-    /// The same of the body force, where it is another.
+    /// The same for the body force, where it is another.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_band: Option<Band>,
     /// Values of the model's further parameters.

@@ -255,7 +255,7 @@ pub(super) fn over_speed(
     over(model.cases.iter().filter_map(|c| Some((c.speed_m_per_s, value(c)?))), v)
 }
 
-/// The same of points in order of x.
+/// The same for points in order of x.
 fn over(points: impl Iterator<Item = (f64, f64)>, x: f64) -> Option<f64> {
     interpolate_held(&means(points), x)
 }

@@ -8,7 +8,7 @@ use crate::error::{Error, error};
 const SPIKE: f64 = 1.05;
 /// Most rounds of taking points back.
 const ROUNDS: usize = 100;
-/// Most places of a training curve that are looked at.
+/// Most places of a training curve that are examined.
 const PROBES: f64 = 4_000.0;
 
 /// Forces of a physical loading branch: 0 at 0, never negative, and no point that stands

@@ -200,7 +200,7 @@ impl Sweep {
         self.variables.iter().zip(self.design.spreads()).map(|(v, s)| v.summary(s)).collect()
     }
 
-    /// The varied values of an item, as they stand in its row.
+    /// The varied values of an item, as they are in its row.
     pub fn values(&self, item: u64) -> Vec<String> {
         let mut values = Vec::new();
         self.design.values(item, &mut values);

@@ -45,7 +45,7 @@ pub(crate) struct Row {
     pub message: String,
 }
 
-/// A value as it stands in a file: shortest digits that read back the same, a name, or nothing.
+/// A value as it is in a file: shortest digits that read back the same, a name, or nothing.
 pub(crate) fn text(value: f64, names: &[String]) -> String {
     let mut bytes = Vec::new();
     push(&mut bytes, value, names);
@@ -126,7 +126,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// What stands above the rows: which sweep and which part of it they are.
+/// What is above the rows: which sweep and which part of it they are.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ShardHeader {
     /// Version of the program that wrote it.
@@ -167,7 +167,7 @@ impl ShardHeader {
         name.starts_with("curve[") || column + 2 >= self.columns.len()
     }
 
-    /// The head as it stands above the rows.
+    /// The head as it is above the rows.
     pub(crate) fn text(&self) -> String {
         let Shard { index, count } = self.shard;
         let rows = self.rows();

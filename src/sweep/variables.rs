@@ -307,7 +307,7 @@ fn unknown<'a>(key: &str, what: &str, name: &str, known: impl Iterator<Item = &'
     error!(Sweep at key, "there is no {what} \"{name}\": the scenario has").names(name, known)
 }
 
-/// Names stand in the columns of the result.
+/// Names appear in the columns of the result.
 fn check_name(key: &str, name: &str) -> Result<(), Error> {
     let breaks = |c: char| c.is_control() || [',', '|', '[', ']', '"', '#'].contains(&c);
     if name.is_empty() || name.contains(breaks) {

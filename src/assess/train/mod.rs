@@ -94,7 +94,7 @@ pub struct VehicleErrors {
 pub struct InterfaceCrush {
     /// `A1|A2`.
     pub interface: String,
-    /// Maximum approach of the two vehicles less the gap, in m: both ends together.
+    /// Maximum approach of the two vehicles minus the gap, in m: both ends together.
     pub crush_m: f64,
     /// FE's, from the speeds of its nodes; null where the reference does not name both vehicles.
     pub fe_crush_m: Option<f64>,

@@ -31,7 +31,7 @@ pub struct Spring<'a> {
     pub description: &'a str,
     /// What it computes.
     pub law: &'a ForceLaw,
-    /// What is known of the curve, for documentation/ and extra/.
+    /// What is known about the curve, for documentation/ and extra/.
     pub facts: &'a [(&'static str, String)],
 }
 

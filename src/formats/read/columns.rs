@@ -11,10 +11,10 @@ use super::curve::{Place, shown};
 use crate::curve::{Envelope, ForceCurve};
 use crate::unit::UnitSystem;
 
-/// Most points of a curve: guards memory. Test records have some ten thousand.
+/// Maximum number of points of a curve: guards memory. Test records have some ten thousand.
 pub(super) const MAX_POINTS: usize = 1_000_000;
 
-/// Most curves of a file: guards memory, which a curve takes even without points.
+/// Maximum number of curves of a file: guards memory, which a curve takes even without points.
 pub(super) const MAX_CURVES: usize = 10_000;
 
 /// Refuses one curve more than a file may have.
@@ -281,7 +281,7 @@ impl Points {
         }
     }
 
-    /// Refuses pull, and forces beyond zero deflection.
+    /// Refuses tension, and forces beyond zero deflection.
     fn check_sides(&mut self) -> Result<(), Error> {
         let (most_d, most_f) = self.most;
         for point in &mut self.list {

@@ -115,7 +115,7 @@ pub struct Metadata {
     pub speed_kind: Option<SpeedKind>,
     /// From the maximum deflection, in N/m.
     pub unloading_stiffness_n_per_m: Option<f64>,
-    /// The same of the force that moves the body, where that is another.
+    /// The same for the force that moves the body, where that is another.
     pub body_unloading_stiffness_n_per_m: Option<f64>,
     /// Mass of the body in kg.
     pub mass_kg: Option<f64>,
@@ -233,7 +233,7 @@ pub(super) fn content(path: &Path) -> impl Fn(Error) -> Error {
     }
 }
 
-/// Where something stands in a file; everything is counted from 1 but bytes, from 0.
+/// Where something is in a file; everything is counted from 1 but bytes, from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A whole line.

@@ -75,7 +75,7 @@ pub(super) struct Fields<'a> {
     is_free: bool,
 }
 
-/// Fields of a line that are looked at: card 1 has eight.
+/// Fields of a line that are examined: card 1 has eight.
 const FIELDS: usize = 8;
 
 impl<'a> Fields<'a> {

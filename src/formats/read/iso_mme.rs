@@ -18,7 +18,7 @@ use crate::error::{Error, error};
 use crate::file;
 use crate::signal::interpolate;
 
-/// Files of a folder that are looked at: a test has some hundred channels.
+/// Files of a folder that are examined: a test has some hundred channels.
 const MOST_FILES: usize = 1_000;
 
 /// The tests that a folder holds: its `.mme` files, else the folders in it that have one.
@@ -172,7 +172,7 @@ fn has_extension(path: &Path, wanted: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted))
 }
 
-/// What stands in a folder, in order.
+/// What is in a folder, in order.
 fn names(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder)?.filter_map(Result::ok).take(MOST_FILES);
     let mut names: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();

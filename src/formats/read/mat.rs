@@ -91,7 +91,7 @@ impl Matrix<'_> {
     }
 }
 
-/// Most lines and columns of a text that is read.
+/// Maximum number of lines and columns of a text that is read.
 const MOST_TEXT: usize = 1_000;
 
 impl Matrix<'_> {

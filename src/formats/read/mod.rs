@@ -208,7 +208,7 @@ const ZIP: &[u8] = b"PK\x03\x04";
 const BEGINNING: usize = 64 << 10;
 
 impl Input<'_> {
-    /// What is looked at to recognise a format.
+    /// What is examined to recognise a format.
     fn beginning(&self) -> &str {
         let fits = |end: &usize| self.text.is_char_boundary(*end);
         let end = (0..=self.text.len().min(BEGINNING)).rev().find(fits);
@@ -310,7 +310,7 @@ pub(crate) enum DrivingFile {
 /// stands; of a record over time the loading branch drives.
 ///
 /// # Errors
-/// As of [`read`], and if the curve cannot drive an interface.
+/// As for [`read`], and if the curve cannot drive an interface.
 pub(crate) fn driving(path: &Path, options: &ReadOptions) -> Result<DrivingFile, Error> {
     let (found, reader) = parse(path, options)?;
     if reader.name == JSON {

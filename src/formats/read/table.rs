@@ -21,11 +21,11 @@ const MOST_TITLES: usize = 100;
 const MOST_COLUMNS: usize = 1_000;
 /// Maximum characters of a unit, to distinguish a row of units from a header.
 const UNIT: usize = 6;
-/// Lines in front of a curve of two columns: more are another kind of file.
+/// Lines before a curve of two columns: more are another kind of file.
 const HEADS: usize = 20;
-/// Characters of such a line that are looked at.
+/// Characters of such a line that are examined.
 const LABEL: usize = 300;
-/// Words between two quantities of a title, the first of which stands in the second column.
+/// Words between two quantities of a title, the first of which is in the second column.
 const VERSUS: [&str; 6] = ["vs", "vs.", "versus", "over", "against", "über"];
 /// Titles that a note repeats.
 const TITLES: usize = 3;
@@ -162,7 +162,7 @@ pub(super) struct Table<'a> {
     declared: Option<(u64, String)>,
     pub columns: usize,
     separator: Separator,
-    /// From the first row on, and how many lines stand before that.
+    /// From the first row on, and how many lines are before that.
     rest: &'a str,
     before: u64,
 }
@@ -181,7 +181,7 @@ impl<'a> Row<'a> {
         self.fields.get(field).copied().unwrap_or_default()
     }
 
-    /// The finite number in a field, or the text that stands there.
+    /// The finite number in a field, or the text that is there.
     pub(super) fn number(&self, field: usize) -> Result<f64, &'a str> {
         let found = self.field(field);
         self.separator.any_number(found).filter(|value| value.is_finite()).ok_or(found)
@@ -441,7 +441,7 @@ fn fit(
     let row = behind.get(usize::from(units)).filter(|(_, line)| separator.is_row(line));
     match row.and_then(|(_, row)| separator.names(first, row)) {
         Some(names) if is_header(&names) => Some((Fit::Header, names)),
-        // A title of two words stands above two columns as well as a header does.
+        // A title of two words is above two columns as well as a header does.
         Some(names) if separator == Separator::Blanks && !names.iter().any(|n| is_name(n)) => None,
         Some(names) => Some((Fit::Above, names)),
         None => {

@@ -11,11 +11,11 @@ use super::text::lines;
 use crate::error::{Error, error};
 use crate::guess;
 
-/// Lines in front of the points of a curve of two columns, when a file is recognised.
+/// Lines before the points of a curve of two columns, when a file is recognised.
 const HEADS: usize = 20;
 
 /// Whether the extension says so, as that of no other tool's files does, or a header that names a
-/// deflection and a force stands above rows of numbers, or the first line is such a header or row. Two
+/// deflection and a force is above rows of numbers, or the first line is such a header or row. Two
 /// plain columns with blanks between are those of another reader.
 pub(super) fn recognise(input: &Input<'_>) -> bool {
     let has = |wanted| input.path.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted));
@@ -31,7 +31,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     fits && !table.is_plain_pair()
 }
 
-/// Whether two numbers stand below at most so many lines.
+/// Whether two numbers are below at most so many lines.
 pub(super) fn recognise_pairs(input: &Input<'_>) -> bool {
     let is_data = |line: &str| !line.trim().is_empty() && !line.starts_with(['$', '#']);
     let mut data = lines(input.beginning()).filter(|(_, line)| is_data(line)).take(HEADS);
@@ -74,12 +74,12 @@ fn chosen(tables: &[Table<'_>], asked: Option<&str>) -> Result<usize, Error> {
     choose((1..).zip(tables).map(|(k, t)| (k.to_string(), t.name.clone())), asked)
 }
 
-/// The last comment in front of a table.
+/// The last comment before a table.
 fn last_comment<'a>(input: &Input<'a>, table: &Table<'_>) -> Option<(u64, &'a str)> {
     comments(input.text, table.begin()).last().map(|(line, _, comment)| (line, comment))
 }
 
-/// The comments in front of a line: their lines, marks and texts.
+/// The comments before a line: their lines, marks and texts.
 fn comments(text: &str, before: u64) -> impl Iterator<Item = (u64, &str, &str)> {
     lines(text).take_while(move |(line, _)| *line < before).filter_map(|(at, line)| {
         let line = line.trim();
@@ -145,7 +145,7 @@ pub(crate) struct History {
     pub values: Vec<f64>,
 }
 
-/// Reads the values called `wanted`; without a name, the only ones. Their times stand in the last column of times before
+/// Reads the values called `wanted`; without a name, the only ones. Their times are in the last column of times before
 /// them, else in the first column.
 pub(crate) fn history(bytes: &[u8], wanted: Option<&str>) -> Result<History, Error> {
     let text = decoded(bytes).text;

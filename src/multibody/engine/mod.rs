@@ -7,8 +7,8 @@
 //!
 //! Every interface is kept on one straight piece of its law (`bank`), so that a step is a few passes of multiply-adds
 //! over arrays, as wide as the machine's vectors (`multiversion`; no fused operations, so the bits are the same for any
-//! width). The chain is laid out in stretches, one per lane (`rows`): neighbours stand in the same lane of the next row,
-//! and no load waits for two stores. Only an interface that leaves its piece is looked at (`events`): its piece is found
+//! width). The chain is laid out in stretches, one per lane (`rows`): neighbours are in the same lane of the next row,
+//! and no load waits for two stores. Only an interface that leaves its piece is examined (`events`): its piece is found
 //! next to the old one, extremes and phases are noted, and the impulse of the step and its moment are corrected.
 //!
 //! The correction: along a step the mean force is the work over the change of deflection, and the tables know the work

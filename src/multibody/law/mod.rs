@@ -48,7 +48,7 @@ pub enum EnvelopeEnd {
 /// Invariant: with memory, the dissipated energy never falls while the deflection grows, so
 /// that no deflection creates energy. One stiffness `k` for all deflections keeps to this
 /// only if it is at least the envelope's steepest rise `k_s`: FE curves begin with a spike
-/// whose flank is far steeper than the line on which the vehicle rebounds at the end, and
+/// whose rise is far steeper than the line on which the vehicle rebounds at the end, and
 /// one stiff line for both would lose most of the rebound. Therefore the branch from δ stores
 ///
 /// `stored = max(work − dissipated, storable(k_s))`, with

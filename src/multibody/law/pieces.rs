@@ -118,7 +118,7 @@ impl ForceLaw {
         OnEnvelope { piece: i, deflection_m, force_n, work_j }
     }
 
-    /// Energy that would come back from a point of the envelope: all of it without memory.
+    /// Energy that is returned from a point of the envelope: all of it without memory.
     #[inline]
     pub(in super::super) fn stored_j(&self, top: &OnEnvelope) -> f64 {
         self.memory.as_ref().map_or(top.work_j, |memory| memory.stored_j(top))

@@ -56,7 +56,7 @@ impl Memory {
         self.steepest_n_per_m
     }
 
-    /// Energy that comes back from a maximum deflection.
+    /// Energy that is returned from a maximum deflection.
     #[inline]
     pub(super) fn stored_j(&self, top: &OnEnvelope) -> f64 {
         // Within a piece work − storable is monotone for either bound, so its ends and the top

@@ -29,7 +29,7 @@ use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
 
 /// What one kind of file adds to the frame: the meaning of its lines.
 pub(crate) trait Body {
-    /// Whether a line that is not the format's signature can only stand below the header.
+    /// Whether a line that is not the format's signature can only be below the header.
     fn is_signature(&self, _line: &[u8]) -> bool {
         false
     }
@@ -138,7 +138,7 @@ pub(crate) fn read_default<B: Body + Default>(
 
 struct Attempt {
     file: SolverFile,
-    /// Whether more states disagree with the first whole state than agree.
+    /// Whether more states disagree with the first complete state than agree.
     disputed: bool,
 }
 

@@ -45,7 +45,7 @@ fn signature(line: &[u8]) -> bool {
     [STRESS, STRAIN, BEAM].iter().any(|heading| line.starts_with(heading))
 }
 
-/// Whether a line can only stand in an `eloutdet`.
+/// Whether a line can only be in an `eloutdet`.
 fn signature_of_details(line: &[u8]) -> bool {
     line.starts_with(NODAL_STRESS) || line.starts_with(NODAL_STRAIN)
 }
@@ -203,7 +203,7 @@ impl Elout {
                 () => &["effsg", "yield"],
             };
         }
-        // The strains of shells stand below the heading of their stresses.
+        // The strains of shells are below the heading of their stresses.
         let is_new = match self.quantity {
             Some(Quantity::Stress) if has(b"eps-xx") => Some(Quantity::Strain),
             Some(Quantity::Strain) if has(b"sig-xx") => Some(Quantity::Stress),

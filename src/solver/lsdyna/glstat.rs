@@ -70,7 +70,7 @@ impl Body for Glstat {
             states.damage(line, Some(columns), message);
             return;
         }
-        // Only a wall's number may stand after the value.
+        // Only a wall's number may be after the value.
         let rest = line.text.get(columns[1]..).unwrap_or_default().trim_ascii();
         let wall = wall_number(rest);
         if !rest.is_empty() && wall.is_none() {
@@ -103,7 +103,7 @@ impl Body for Glstat {
 }
 
 impl Glstat {
-    /// Whether what stands after a label is a number with nothing cut from it.
+    /// Whether what is after a label is a number with nothing cut from it.
     fn is_value(
         &mut self,
         label: &str,
@@ -146,7 +146,7 @@ fn wall_number(rest: &[u8]) -> Option<i64> {
 /// has no label.
 fn component(text: &[u8]) -> Option<(String, usize)> {
     let (label, end) = split(text, LABEL)?;
-    // Dots stand in other text as well; there, no number follows them.
+    // Dots are in other text as well; there, no number follows them.
     let value = text.get(end..value_end(text, end).min(text.len())).unwrap_or_default();
     let is_value = end == LABEL || is_whole_real(value.trim_ascii());
     let known = NAMES.iter().find(|(l, _)| *l == label);

@@ -71,7 +71,7 @@ impl Widths {
 }
 
 /// First and last column of every component's number; `None` for labels that the line does
-/// not have. `None` for the row if something else than one number stands after a label.
+/// not have. `None` for the row if something else than one number is after a label.
 pub(crate) fn fields(
     line: &Line<'_>,
     labels: &[Labelled],
@@ -119,7 +119,7 @@ pub(crate) fn fields(
             return None;
         }
     }
-    // Stars outside a number: lines were overwritten, and what stands after is of another.
+    // Stars outside a number: lines were overwritten, and what is after is of another.
     let in_number =
         |at: usize| fields.iter().flatten().any(|&(from, to)| (from..=to).contains(&(at + 1)));
     let stars = memchr::memchr_iter(b'*', text).any(|at| !in_number(at));

@@ -219,7 +219,7 @@ impl Column {
         self.component.ends_with("moment")
     }
 
-    /// Whether the label stands in its place and the number after it is all there.
+    /// Whether the label is in its place and the number after it is all there.
     fn fits(&self, text: &[u8], at: usize) -> bool {
         let number = at + self.offset;
         text.get(number - self.label.len()..number) == Some(self.label)

@@ -14,7 +14,7 @@ const ID: (usize, usize) = (1, 10);
 /// Energies of both sides and of friction. Old files have no third column, and for
 /// single-surface contacts no second one.
 const FIELDS: [(usize, usize); 3] = [(11, 23), (24, 36), (65, 77)];
-/// Sums: the value stands after the label.
+/// Sums: the value is after the label.
 const SUMS: [(&[u8], &str); 6] = [
     (b"total slave side=", "total_slave"),
     (b"total surfa side=", "total_slave"),

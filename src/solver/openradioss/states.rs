@@ -220,7 +220,7 @@ impl StateReader {
     }
 
     /// Names the last state above if more values next to each other are zero, though not in the
-    /// states around it, than a node that stands on a wall has: T01 has no check sums.
+    /// states around it, than a node that stands on a wall has: T01 has no checksums.
     fn look_for_zeros(
         &mut self,
         header: &Header,

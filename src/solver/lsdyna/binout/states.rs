@@ -9,7 +9,7 @@ use super::records::{Component, DataRecord, LISTS, Section};
 use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::solver::restart;
 
-/// The whole states of a section.
+/// The complete states of a section.
 pub(super) struct StateReader {
     /// Indices of the states, in order of their numbers.
     pub whole: Vec<usize>,
@@ -22,7 +22,7 @@ pub(super) struct StateReader {
 pub(super) type Ids = Arc<[i64]>;
 
 impl StateReader {
-    /// A state is whole if it has a time and no damage; the last one must also have what the
+    /// A state is complete if it has a time and no damage; the last one must also have what the
     /// one before has. Of states that a restart wrote again the last ones are kept.
     pub(crate) fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<(Self, Diagnostics)> {
         let mut problems = Diagnostics::default();

@@ -16,7 +16,7 @@ pub(crate) const DENSE_READ: usize = 1 << 18;
 /// Bytes below which two wanted rows are read together rather than apart.
 const PAGE: usize = 4096;
 
-/// Rows of equal width, and what stands above them.
+/// Rows of equal width, and what is above them.
 pub(crate) struct Block {
     pub table: TableId,
     /// Bytes above the rows, and where in them the state line is.

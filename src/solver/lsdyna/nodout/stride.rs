@@ -42,7 +42,7 @@ pub(crate) struct Stride {
     wanted: Vec<Wanted>,
 }
 
-/// The blocks of the state between `from` and `to`, and what stands below the last; `None` if
+/// The blocks of the state between `from` and `to`, and what is below the last; `None` if
 /// the rows of a block differ in width.
 fn blocks(
     source: &dyn Source,
@@ -196,7 +196,7 @@ impl Stride {
                 Wanted { start: 0, row_step: columns.len(), column_step: 1, rows, columns }
             })
             .collect();
-        // The values stand in order of the tables, which need not be that of the blocks.
+        // The values are in order of the tables, which need not be that of the blocks.
         let mut order: Vec<usize> = (0..wanted.len()).collect();
         order.sort_by_key(|&k| self.blocks[k].table);
         let mut start = 0;
