@@ -157,8 +157,11 @@ fn a_noisy_state_before_the_impact_does_not_move_the_contact() {
                 "{speed}, {early} early"
             );
             assert_eq!(crush(&found), crush(&expected));
-            let said =
-                found.quality.warnings.iter().any(|w| w.starts_with("contact: ignored the force of"));
+            let said = found
+                .quality
+                .warnings
+                .iter()
+                .any(|w| w.starts_with("contact: ignored the force of"));
             assert!(said, "{:?}", found.quality.warnings);
         }
     }
@@ -210,7 +213,8 @@ fn body_forces_find_the_contact_by_the_contact_force_or_say_that_they_cannot() {
         let told = run.extract_with(&with_contact, Stated::default()).unwrap();
         assert_eq!(told.curves.contact_time_s, contact.curves.contact_time_s);
         let alone = run.extract_with(body, Stated::default()).unwrap();
-        let said = alone.quality.warnings.iter().any(|w| w.contains("where the body starts to slow down"));
+        let said =
+            alone.quality.warnings.iter().any(|w| w.contains("where the body starts to slow down"));
         assert!(said, "{:?}", alone.quality.warnings);
     }
 }
@@ -308,7 +312,9 @@ fn a_run_states_contact_gap_offset_end_and_sign() {
     );
     let error = fails("gap = \"3m\"");
     assert!(
-        error.contains("gap = 3000 mm is never closed: the bodies approach each other by at most 56"),
+        error.contains(
+            "gap = 3000 mm is never closed: the bodies approach each other by at most 56"
+        ),
         "{error}"
     );
     let error = fails("offset = \"-3m\"");

@@ -726,11 +726,7 @@ fn groups_and_several_speeds_are_exported_at_once() {
         &["export", "curves.h5", "--group", "lead-car-wall", "--speed", "37km/h", "--to", "csv"],
         "has no case at 37 km/h: it has 12 km/h",
     );
-    t(
-        2,
-        &["export", "lead50.json", "--to", "csv", "--speed", "50km/h"],
-        "has one speed and mass",
-    );
+    t(2, &["export", "lead50.json", "--to", "csv", "--speed", "50km/h"], "has one speed and mass");
     t(1, &["export", "lead50.json", "--to", "mat", "--units", UNITS], "mat is always in SI");
     t(
         1,

@@ -724,7 +724,11 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
         &["--speed", &v, "--kind", "wall"],
         "nose.csv: the file does not state the mass of the body: give --mass",
     );
-    t(2, &WALL, "nose.csv: the file does not state its speed: give --speed, such as --speed 36km/h");
+    t(
+        2,
+        &WALL,
+        "nose.csv: the file does not state its speed: give --speed, such as --speed 36km/h",
+    );
     t(2, &["--speed", "36"], "speed \"36\" has no unit");
     let with = |more: &[&'static str]| -> Vec<String> {
         WALL.iter()

@@ -838,7 +838,12 @@ fn nothing_is_overwritten() {
     let (_folder, here) = four_runs();
     fs::write(here.join("study.toml"), "mine").unwrap();
     let error = crumple_fails(&here, 1, &["init"]);
-    assert!(error.contains("study.toml exists already and is not overwritten: name another with -o, or remove it"), "{error}");
+    assert!(
+        error.contains(
+            "study.toml exists already and is not overwritten: name another with -o, or remove it"
+        ),
+        "{error}"
+    );
     assert_eq!(fs::read(here.join("study.toml")).unwrap(), b"mine");
     crumple_fails(&here, 1, &["init", "-o", "25kmh"]);
     let error = crumple_fails(&here, 2, &["init", "-o", "-", "--json"]);
@@ -936,7 +941,10 @@ fn of_several_files_with_one_history_one_is_chosen() {
         notes,
         ["nodout is read, crashT01 holds it too", "rwforc is read, crashT01 holds it too"]
     );
-    assert_eq!(left_out(&document), [("copy".into(), "its histories are identical to those of 36kmh".into())]);
+    assert_eq!(
+        left_out(&document),
+        [("copy".into(), "its histories are identical to those of 36kmh".into())]
+    );
     assert_eq!(document["runs"][0]["mass_kg"]["value"], 24_000.0);
 }
 

@@ -109,8 +109,7 @@ fn headers_of_instruments() {
             rows(1e-3, 1e3, ";", ".").lines().map(|line| format!("{line};7\n")).collect();
         let text = format!("d [mm];Force [kN];{other}\n{rows}");
         let notes = table("a.csv", text.as_bytes(), &given(None));
-        let is_said =
-            notes.iter().any(|n| n == &format!("columns: not used: \"{other}\" (force)"));
+        let is_said = notes.iter().any(|n| n == &format!("columns: not used: \"{other}\" (force)"));
         assert_eq!(is_said, ["Force, filtered [kN]", "Kraft"].contains(&other), "{notes:?}");
     }
 }

@@ -913,7 +913,10 @@ fn the_choice_for_trains_counts_the_ends() {
         "no.model",
     ];
     let error = crumple_fails(demo.path(), 1, &arguments);
-    assert!(error.contains("model crush-law takes the mass stopped in the crush zone from momentum"), "{error}");
+    assert!(
+        error.contains("model crush-law takes the mass stopped in the crush zone from momentum"),
+        "{error}"
+    );
     assert!(!demo.path().join("no.model").exists());
     // That a group is not for one of the models is reported, but is nothing to be warned of.
     let validated = ["validate", "curves.h5", "--group", "lead-car-pair", "--strict", "-v"];

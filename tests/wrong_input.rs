@@ -349,5 +349,8 @@ fn outputs_replace_no_other_kind_of_file() {
     fs::create_dir(elsewhere.path().join("crumple-demo")).unwrap();
     fs::write(elsewhere.path().join("crumple-demo/scenario.toml"), "# mine\n").unwrap();
     let error = crumple_fails(elsewhere.path(), 2, &["demo"]);
-    assert!(error.contains("scenario.toml exists and differs from what the demo writes"), "{error}");
+    assert!(
+        error.contains("scenario.toml exists and differs from what the demo writes"),
+        "{error}"
+    );
 }
