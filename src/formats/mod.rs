@@ -142,7 +142,7 @@ pub const FORMATS: &[Format] = &[
     Format::new(
         "fmi2",
         &["fmu"],
-        "FMU of FMI 2.0, model exchange and co-simulation, whole law with memory, SI",
+        "FMU of FMI 2.0, model exchange and co-simulation, complete law with memory, SI",
         Tail::Bottom,
         Writer::Each(fmu_export::write_fmi2),
     ),
