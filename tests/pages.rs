@@ -45,8 +45,9 @@ fn describe(page: &mut String, command: &[String]) {
 
 #[test]
 fn the_command_line_is_described() {
-    let mut page =
-        String::from("# Command line\n\nThe output of `crumple COMMAND --help` for every command.\n");
+    let mut page = String::from(
+        "# Command line\n\nThe output of `crumple COMMAND --help` for every command.\n",
+    );
     describe(&mut page, &[]);
     assert!(
         page.matches("\n### crumple ").count() >= 18 && page.contains("\n#### crumple db copy\n")

@@ -236,7 +236,7 @@ fn wrong_trains_are_explained() {
     let no_unloading = nose.replace(", unloading = \"100MN/m\"", "");
     t(&no_unloading, one, "it has stages, which do not say how they unload");
     let flat = nose.replace("stroke = \"300mm\"", "stroke = \"0.1mm\"");
-    t(&flat, one, "stage 2 has a stroke of 0.0001 m: expected over 0.2 mm");
+    t(&flat, one, "stage 2 has a stroke of 0.1 mm: expected more than 0.2 mm");
     let tension = nose.replace("unloading", "tension = \"pull\", unloading");
     t(&tension, one, "its tension curve \"pull\" is not in [curves]");
     let damper =

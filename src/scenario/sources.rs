@@ -176,7 +176,8 @@ fn staged(stages: &[StageTable]) -> Result<Envelope, Error> {
             let stage = stage.name.clone().unwrap_or_else(|| format!("{}", i + 1));
             return Err(error!(
                 Scenario,
-                "stage {stage} has a stroke of {stroke_m} m: expected over 0.2 mm"
+                "stage {stage} has a stroke of {} mm: expected more than 0.2 mm",
+                stroke_m * 1e3
             )
             .at(KeyPath::of("stages").item(i).key("stroke")));
         }
