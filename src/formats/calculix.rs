@@ -9,7 +9,7 @@ use super::{ExportCurve, Exported, NUMBER_OF_STATES, Options, TargetUnloading, r
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
-/// Rows that CalculiX takes; one of them is that of tension.
+/// Rows that CalculiX accepts, one of them for tension.
 const MOST_ROWS: usize = 200;
 /// Time steps of the deck per state.
 const STEPS: f64 = 10.0;
@@ -76,7 +76,7 @@ fn nodes(lines: &mut Lines, curve: &ExportCurve, units: InUnits, id: u32) {
     let mass = |kg: f64| nine_digits(kg / units.0.mass_kg);
     lines.add(format_args!("*NODE, NSET=NALL"));
     lines.add(format_args!("1, 0.0, 0.0, 0.0"));
-    // Longer than any crush: CalculiX turns the spring round otherwise.
+    // Longer than any crush: otherwise CalculiX reverses the spring.
     lines.add(format_args!("2, {}, 0.0, 0.0", units.length(1.2 * curve.loading.end_m())));
     lines.add(format_args!("*ELEMENT, TYPE=SPRINGA, ELSET=IF{id}"));
     lines.add(format_args!("1, 1, 2"));

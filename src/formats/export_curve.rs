@@ -11,7 +11,7 @@ use crate::surrogate::PredictedCurve;
 use crate::surrogate::predict::Beyond;
 use crate::unit::{Shown, km_per_h};
 
-/// What an export is made of: a predicted curve or a recorded one, and where faster runs continue.
+/// Input of an export: a predicted or recorded curve, and the continuation along faster runs.
 #[derive(Clone, Debug)]
 pub struct ExportInput {
     /// With both forces, where it has both.
@@ -42,12 +42,12 @@ pub struct ExportCurve {
     pub ordinal: usize,
 }
 
-/// How a target lets go of the energy that it has stored at the maximum crush.
+/// How a target releases the energy stored at the maximum crush.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum TargetUnloading {
     /// On a straight line of this stiffness in N/m.
     Line(f64),
-    /// Along the loading branch: everything is returned.
+    /// Along the loading branch: all energy is returned.
     Elastic,
 }
 
@@ -56,7 +56,7 @@ impl ExportCurve {
     ///
     /// # Errors
     /// If the curve does not have that force or is damaged,
-    /// If its tail makes no curve.
+    /// If the tail does not form a valid curve.
     pub fn new(
         input: &ExportInput,
         force: ForceKind,
@@ -130,7 +130,7 @@ impl ExportCurve {
     /// thousandth of the maximum crush, with the same energy.
     ///
     /// # Errors
-    /// If that makes no curve.
+    /// If the result is not a valid curve.
     pub fn begun_at_origin(&self) -> Result<Self, Error> {
         Ok(match from_origin(&self.loading, self.end)? {
             Some((loading, end)) => self.clone().through(loading, end),
@@ -150,7 +150,7 @@ impl ExportCurve {
         ))
     }
 
-    /// Why there is no band, in one line; nothing of a recorded curve, which needs none.
+    /// Why there is no band, in one line; nothing for a recorded curve, which needs none.
     pub fn no_band_note(&self) -> Option<String> {
         Some(format!("{}: written without a band: {}", self.headline(), self.no_band?))
     }
@@ -262,7 +262,7 @@ impl ExportCurve {
         notes
     }
 
-    /// What the curve is, in one line, for headers and titles.
+    /// Description of the curve in one line, for headers and titles.
     pub fn headline(&self) -> String {
         let group = self.predicted.provenance.group.replace(char::is_control, " ");
         let run = own_name(&self.predicted).map_or(String::new(), |name| format!(", {name}"));
@@ -284,7 +284,7 @@ impl ExportCurve {
         identifier(&self.file_stem())
     }
 
-    /// What a curve is and what it may drive, as keys and values of a file's header; SI.
+    /// Description of a curve and its use, as keys and values of a file's header; SI.
     pub fn facts(&self) -> Vec<(&'static str, String)> {
         let curve = &self.predicted;
         let kind = curve.provenance.force_kind;
@@ -318,7 +318,7 @@ impl ExportCurve {
         facts
     }
 
-    /// What the unloading stiffness gives.
+    /// Effect of the unloading stiffness.
     fn unloading(&self, steepest_n_per_m: f64) -> &'static str {
         let softer = self.stiffness_n_per_m() < steepest_n_per_m * (1.0 - 1e-9);
         match (self.predicted.rebound.is_some(), softer) {
@@ -360,7 +360,7 @@ fn speed_name(curve: &PredictedCurve) -> String {
     km_per_h(curve.speed_m_per_s).replace([' ', '/'], "")
 }
 
-/// The name of a recorded case, where it says more than the speed: one of several runs.
+/// The name of a recorded case if it distinguishes one of several runs at a speed.
 fn own_name(curve: &PredictedCurve) -> Option<&str> {
     curve.provenance.case.as_deref().filter(|name| *name != speed_name(curve))
 }
@@ -368,7 +368,7 @@ fn own_name(curve: &PredictedCurve) -> Option<&str> {
 /// Maximum number of characters of a line of a header.
 const LINE: usize = 180;
 
-/// A warning as lines of a header, which some tools read up to a width only.
+/// A warning as lines of a header, which some tools read only up to a certain width.
 pub(super) fn in_lines(warning: &str) -> Vec<(&'static str, String)> {
     let mut lines = vec![String::new()];
     for word in warning.split(|c: char| c.is_control() || c == ' ').filter(|w| !w.is_empty()) {
@@ -396,7 +396,7 @@ fn numbered(name: String, ordinal: usize) -> String {
     if ordinal > 1 { format!("{name}-{ordinal}") } else { name }
 }
 
-/// A character that every file system takes in a name.
+/// A character that every file system accepts in a name.
 pub(super) fn plain(c: char) -> char {
     if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }
 }

@@ -54,7 +54,7 @@ fn columns(rows: &[(f64, f64)]) -> Vec<Vec<f64>> {
     vec![rows.iter().map(|r| r.0).collect(), rows.iter().map(|r| r.1).collect()]
 }
 
-/// What is before the values: `kind` is 0 for numbers and 1 for text.
+/// Header of a matrix: `kind` is 0 for numbers and 1 for text.
 fn head(bytes: &mut Vec<u8>, kind: i32, name: &str, rows: usize, columns: usize) {
     let name = [name.as_bytes(), &[0]].concat();
     for field in [kind, rows as i32, columns as i32, 0, name.len() as i32] {

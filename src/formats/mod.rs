@@ -39,7 +39,7 @@ pub(crate) use read::history;
 pub use read::{ColumnNames, READERS, ReadCurve, ReadOptions, Reader, read};
 pub use tail::Tail;
 
-/// One target: its name, its file extensions, what it can hold, how it is written.
+/// One target: its name, file extensions, capabilities and writer.
 pub struct Format {
     /// As `--to` takes it.
     pub name: &'static str,
@@ -47,7 +47,7 @@ pub struct Format {
     pub extensions: &'static [&'static str],
     /// One line for `export --list`.
     pub description: &'static str,
-    /// What its curves do beyond the maximum crush if nothing else is requested; `Tail::None` of
+    /// Default continuation of its curves beyond the maximum crush; `Tail::None` for
     /// files whose curves cannot continue.
     pub tail: Tail,
     /// Whether it can be a complete input of one mass on the spring (`--deck`).
@@ -63,7 +63,7 @@ pub struct Format {
     writer: Writer,
 }
 
-/// What a target is made of.
+/// The input of a target.
 enum Writer {
     /// Curves, each with a file of its own.
     Each(fn(&ExportCurve, &Options) -> Result<Exported, Error>),
@@ -76,7 +76,7 @@ enum Writer {
     Case(fn(&Case, &Options) -> Result<Exported, Error>),
 }
 
-/// Every format we write. To add one: write its module, add its line here with what it can hold.
+/// Every format we write. To add one: write its module, add its line here with its capabilities.
 pub const FORMATS: &[Format] = &[
     Format::new(
         "json",
@@ -196,7 +196,7 @@ pub const FORMATS: &[Format] = &[
     ),
 ];
 
-/// Choices that some targets take.
+/// Options of some targets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Units of the file; the target's usual ones if absent.
@@ -205,7 +205,7 @@ pub struct Options {
     pub id: u32,
     /// Which force.
     pub force: ForceKind,
-    /// What curves do beyond the maximum crush; the target's usual way if absent.
+    /// Continuation beyond the maximum crush; the target's default if absent.
     pub tail: Option<Tail>,
     /// Reduce rises steeper than the unloading stiffness, at equal energy.
     pub soften: bool,
@@ -241,13 +241,13 @@ impl Default for Options {
     }
 }
 
-/// What an export gives: one file, or several in a folder.
+/// The result of an export: one file, or several in a folder.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Exported {
     /// Name and bytes of each file. A single file takes the name that the user gives; several
     /// take theirs within the folder that the user names. Names may hold `/`.
     pub files: Vec<(String, Vec<u8>)>,
-    /// What the user should know of what the target makes of the curves.
+    /// Notes on the curves in the target.
     pub notes: Vec<String>,
     /// Warnings of the curves that were made for it.
     pub warnings: Vec<String>,
@@ -263,7 +263,7 @@ impl Exported {
 /// Maximum number of bytes of a file that holds a curve: a predicted one has some ten thousand.
 pub(crate) const MAX_CURVE_BYTES: u64 = 64 << 20;
 
-/// Minimum number of points that every target takes.
+/// Minimum number of points that every target accepts.
 pub(crate) const MIN_POINTS: usize = 4;
 
 impl Format {
@@ -289,12 +289,12 @@ impl Format {
         }
     }
 
-    /// Whether it is made of a whole model, not of its curves.
+    /// Whether it takes a whole model, not its curves.
     pub fn takes_model(&self) -> bool {
         matches!(self.writer, Writer::Model(_))
     }
 
-    /// Whether it is made of recorded cases, not of curves.
+    /// Whether it takes recorded cases, not curves.
     pub fn takes_case(&self) -> bool {
         matches!(self.writer, Writer::Case(_))
     }
@@ -382,7 +382,7 @@ impl Format {
         Ok(exported)
     }
 
-    /// What has been done to the curves, and what is not written, after the target's own notes.
+    /// Changes to the curves, and omissions, after the target's own notes.
     fn with_notes(&self, mut exported: Exported, curves: &[ExportCurve]) -> Exported {
         exported.notes.extend(curves.iter().filter_map(ExportCurve::softening_note));
         if self.band {
@@ -399,7 +399,7 @@ impl Format {
 /// States that a deck's histories shall have, as in the reference data.
 const NUMBER_OF_STATES: f64 = 400.0;
 
-/// Time in s until a body on this curve has rebounded: a force that is even takes 2 d/v to stop it.
+/// Time in s until a body on this curve has rebounded: a constant force takes 2 d/v to stop it.
 fn run_time_s(curve: &ExportCurve) -> f64 {
     4.0 * curve.max_crush_m() / curve.predicted.speed_m_per_s
 }
@@ -432,7 +432,7 @@ fn with_names_of_their_own(mut exported: Exported) -> Exported {
 /// The format of that name.
 ///
 /// # Errors
-/// It lists the names there are.
+/// It lists the existing names.
 pub fn by_name(name: &str) -> Result<&'static Format, Error> {
     // "--to spr" names one of the kinds of file of a format.
     let by_kind = || FORMATS.iter().find(|f| f.extensions.contains(&name));

@@ -15,7 +15,7 @@ use super::{ExportCurve, Exported, Options, Tail, TargetUnloading};
 const COMMENT_WIDTH: usize = 200;
 /// Maximum number of points of the package's table: a translator unrolls the search through them.
 const MOST_POINTS: usize = 200;
-/// Words that no package can have for a name (Modelica 3.6, 2.3.3), as far as files are called so.
+/// Reserved words that cannot be package names (Modelica 3.6, 2.3.3), as far as they are likely file names.
 const KEYWORDS: &str = "algorithm and block class connect connector constant discrete each else end equation \
     extends external false final flow for function if import initial inner input model \
     operator outer output package record true type";

@@ -102,7 +102,7 @@ fn function(lines: &mut Lines, curve: &ExportCurve, units: InUnits, id: u32) {
 fn property(lines: &mut Lines, curve: &ExportCurve, units: InUnits, id: u32) {
     let zero = nine_digits(0.0);
     let one = nine_digits(1.0);
-    // A spring needs a mass of its own: a millionth of the body's.
+    // A spring needs its own mass: a millionth of the body's.
     let mass = 1e-6 * curve.predicted.mass_kg / units.0.mass_kg;
     // With a softer K1 the solver would cut the rises that are steeper, and their energy.
     let stiffness = curve.stiffness_n_per_m().max(curve.loading.max_slope());

@@ -31,7 +31,7 @@ struct Table {
     force_n: Vec<f64>,
     /// Lower and upper edge of the band, likewise; NaN at a speed without one.
     band: Option<[Vec<f64>; 2]>,
-    /// What the band is, in words.
+    /// Description of the band.
     band_meaning: Option<String>,
     max_deflection_m: Vec<f64>,
     unloading_stiffness_n_per_m: Vec<f64>,
@@ -210,7 +210,7 @@ fn no_band_note(curves: &[ExportCurve]) -> Option<String> {
 }
 
 impl Table {
-    /// What the table is, as keys and values.
+    /// Description of the table, as keys and values.
     fn facts(&self, model: &Model, force: ForceKind) -> Vec<(&'static str, String)> {
         let mut facts = facts(model, force);
         facts.extend(self.band_meaning.clone().map(|meaning| ("band", meaning)));

@@ -140,10 +140,10 @@ pub(crate) fn for_splines(curve: &Envelope) -> Result<Envelope, Error> {
     Envelope::new(deflection_m, force_n)
 }
 
-/// What came of making steep rises less steep.
+/// Result of softening.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Softened {
-    /// There is none that steep.
+    /// No rise is that steep.
     Nothing,
     Curve(Envelope),
     /// The energy could only be kept by changing the curve's end, or forces by more than a quarter.

@@ -48,7 +48,7 @@ pub(crate) struct Settings {
     pub parameters: BTreeMap<String, Parameter>,
     /// Replace cases of these names that were added before.
     pub replace: bool,
-    /// Take curves whose energy cannot be the impact's.
+    /// Accept curves whose energy is impossible for the impact.
     pub accept_energy: bool,
 }
 
@@ -92,7 +92,7 @@ pub(crate) fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Ve
     Ok(cases)
 }
 
-/// The case that the curve of one file makes, without a database.
+/// The case of the curve of one file, without a database.
 pub(crate) fn case_of_file(item: &Item, settings: &Settings) -> Result<Case, Error> {
     case::of(item, settings, None)
 }
@@ -123,7 +123,7 @@ fn check_place(database: &Database, item: &Item, case: &Case, replace: bool) -> 
         }
         _ => {}
     }
-    // A case that is replaced binds nobody.
+    // A case that is replaced imposes no restriction.
     match database.cases(&case.id.group).iter().find(|c| c.id.name != case.id.name) {
         Some(other) => check_kinds(item, case, other),
         None => Ok(()),

@@ -20,7 +20,7 @@ const HEAD: usize = 16;
 /// Lines examined for the first keyword.
 const HEAD_LINES: usize = 1_000;
 
-/// What a folder has of decks.
+/// The decks of a folder.
 pub(crate) enum Search {
     None,
     /// The only deck, or the one that includes the others.

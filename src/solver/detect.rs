@@ -10,7 +10,7 @@ use super::{SolverFile, lsdyna, openradioss, unknown_format};
 use crate::error::{Error, error};
 use crate::guess;
 
-/// Every file we read, in the order in which their signatures are tried. To add one: write its
+/// All files we read, in the order in which their signatures are tried. To add one: write its
 /// module with its `FORMAT`, and add that here.
 pub const FORMATS: &[Format] = &[
     lsdyna::nodout::FORMAT,
@@ -36,7 +36,7 @@ pub const FORMATS: &[Format] = &[
     openradioss::FORMAT,
 ];
 
-/// What an id of this format or section counts, for messages.
+/// Kind of entity of this format or section, for messages.
 pub(crate) fn entity_word(section: &str) -> &'static str {
     let name = section.strip_suffix("/forces").unwrap_or(section);
     FORMATS.iter().find(|format| format.name == name).map_or("entity", |format| format.entity)
@@ -144,7 +144,7 @@ fn look_at(
     Ok((first, is_lsdyna))
 }
 
-/// Holds a named format against what the file looks like, if nothing was read by it.
+/// Compares a named format with the content of the file, if nothing was read by it.
 pub(super) fn check_format(
     path: &Path,
     format: &Format,

@@ -10,7 +10,7 @@ use super::{Entity, NoDataReason, Selection, SolverFile};
 use crate::error::{Error, KeyPath, error};
 use crate::guess;
 
-/// Holds every selected id and component against what the file has.
+/// Checks every selected id and component against the file.
 pub(super) fn check_selection(
     path: &Path,
     file: &SolverFile,

@@ -45,7 +45,7 @@ pub(crate) fn family(path: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(parts)
 }
 
-/// What is before `binout0000`, a job id or nothing, and its digits.
+/// The text before `binout0000`, a job id or nothing, and its digits.
 fn process_number(name: &str) -> Option<(&str, u32)> {
     let (job, digits) = name.rsplit_once("binout")?;
     let is_job = job.is_empty() || job.ends_with('.');
@@ -118,7 +118,7 @@ pub(crate) fn missing_continuation(path: &Path) -> Result<Option<String>, Error>
     Ok(None)
 }
 
-/// What is not read because the first of these files is missing, if another is there.
+/// The files not read because the first of them is missing.
 fn unread_behind(mut files: impl Iterator<Item = PathBuf>) -> Result<Option<String>, Error> {
     let Some(missing) = files.next() else { return Ok(None) };
     if is_file(&missing)? {

@@ -9,7 +9,7 @@ use super::{Selection, SolverFile, problem};
 pub struct Format {
     /// Named as the solver names the file.
     pub name: &'static str,
-    /// What an id in it counts, for messages.
+    /// Kind of its entities, for messages.
     pub(super) entity: &'static str,
     reader: Reader,
 }

@@ -11,7 +11,7 @@ use crate::error::Error;
 /// Forces beyond this are damage, not measurement.
 const LARGEST_N: f64 = 1e15;
 
-/// What a model keeps of a training case: its curves over even deflections, no coarser than
+/// Data of a training case in a model: its curves over even deflections, no coarser than
 /// 2 mm, and its ends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModelCase {
@@ -72,7 +72,7 @@ impl ModelCase {
         }
     }
 
-    /// What a fit guarantees of a case.
+    /// Invariants of a case in a fit.
     pub(super) fn check(&self) -> Result<(), String> {
         let positive = |value: Option<f64>| value.is_none_or(|v| v > 0.0 && v.is_finite());
         if !positive(self.unloading_stiffness_n_per_m) || !positive(self.rebound_speed_m_per_s) {

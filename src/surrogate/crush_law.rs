@@ -24,12 +24,12 @@ use crate::dataset::grid;
 /// no crush zones as heavy.
 const LEAST_FREE: f64 = 0.5;
 
-/// What a body of one mass feels for each newton of crush force: `M / (M − m_s)`.
+/// Force on a body of one mass for each newton of crush force: `M / (M − m_s)`.
 pub(crate) fn per_crush_force(stopped_kg: f64, mass_kg: f64) -> f64 {
     mass_kg / (mass_kg - stopped_kg).max(LEAST_FREE * mass_kg)
 }
 
-/// What a group's runs say of the mass that is stopped, and of the force behind it.
+/// Stopped mass and crush force of the runs of a group.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrushLaw {
     /// β in (s/m)^½, over the closing speed of the model's kind.
@@ -84,7 +84,7 @@ impl CrushLaw {
         Self::of(self.stopped.without_any(), contact)
     }
 
-    /// What a fit guarantees and a file might not.
+    /// Invariants of a fit that a file might break.
     pub(super) fn check(&self) -> Result<(), String> {
         Rate::of(self.sensitivity, None).check_sensitivity()?;
         Rate::of(self.of_impact, None).check_sensitivity()?;

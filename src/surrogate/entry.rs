@@ -12,7 +12,7 @@ use crate::curve::ForceKind;
 use crate::dataset::TrainingSet;
 use crate::error::{Error, error};
 
-/// One model: what it is called, what it needs, how it is fitted and read again.
+/// One model: its name, its requirements, how it is fitted and read.
 #[derive(Clone, Copy, Debug)]
 pub struct ModelEntry {
     /// As the command line and model files name it.
@@ -46,7 +46,7 @@ pub(super) type Fit = fn(&FitInput<'_>) -> Result<Arc<dyn Surrogate>, Error>;
 /// Makes a model of its parameters in a model file.
 pub(super) type Load = fn(Option<&RawValue>) -> Result<Arc<dyn Surrogate>, serde_json::Error>;
 
-/// What a model is fitted to.
+/// Input of a fit.
 pub(super) struct FitInput<'a> {
     pub set: &'a TrainingSet,
     /// The curves of `force`, in order of speed.

@@ -111,7 +111,7 @@ pub struct Means {
     pub acceleration_unfiltered_l1: f64,
 }
 
-/// How far runs of one speed lie from their mean: no model can remove this part of an error.
+/// Deviation of runs of one speed from their mean: no model can remove this part of an error.
 ///
 /// Errors of runs that the mean is made of are multiplied by √(n/(n − 1)): they are those of a run
 /// that it does not know.
@@ -191,7 +191,7 @@ pub struct Validation {
     pub means: Vec<Means>,
     /// FE's own curves in the same runs.
     pub floors: Vec<Floor>,
-    /// How far repeated runs lie apart; absent where no speed has several runs.
+    /// Scatter of repeated runs; absent if no speed has several runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scatter: Option<Scatter>,
     /// Of the declared force between training speeds, from the chosen model's residuals at the

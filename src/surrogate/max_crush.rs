@@ -12,7 +12,7 @@ use super::Model;
 use crate::curve::Envelope;
 use crate::error::{Error, error};
 
-/// How the maximum crush is found.
+/// Rule for the maximum crush.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]

@@ -10,7 +10,7 @@ enum Role {
     /// With the variables that it follows from: always those of initialization; the parameter is
     /// none of the others, since it is set at events only.
     Output(&'static [u32]),
-    /// Changes its sign where a straight piece of the law ends.
+    /// Changes sign where a linear segment of the law ends.
     EventIndicator,
 }
 

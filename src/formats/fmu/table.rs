@@ -142,7 +142,7 @@ impl Table {
         let mut found = memchr::memmem::find_iter(binary, MARK);
         let (Some(at), None) = (found.next(), found.next()) else { return Err(no_place) };
         let block = self.bytes();
-        // The version and the room for points are what the blank block says.
+        // The version and the capacity are those of the blank block.
         let layout = 24..36;
         let is_fit = binary.get(at + layout.start..at + layout.end) == block.get(layout)
             && binary.len() >= at + block.len();

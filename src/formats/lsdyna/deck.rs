@@ -83,7 +83,7 @@ fn masses(lines: &mut Lines, curve: &ExportCurve, units: InUnits) {
     }
 }
 
-/// Speed of the moving body, and what holds both to their line.
+/// Speed of the moving body, and the constraints that guide both.
 fn supports(lines: &mut Lines, curve: &ExportCurve, units: InUnits) {
     let speed = curve.predicted.speed_m_per_s / units.0.speed();
     lines.add(format_args!("*INITIAL_VELOCITY_NODE"));

@@ -107,7 +107,7 @@ fn note(curve: &ExportCurve, material: Material) -> Vec<String> {
     }
 }
 
-/// What is lost of an uneven curve, which LS-DYNA resamples evenly.
+/// Loss by resampling an unevenly spaced curve in LS-DYNA.
 fn resampling_note(curve: &ExportCurve) -> Option<String> {
     let points = points(curve);
     (resampling(&points) == MOST_RESAMPLED).then(|| {
@@ -162,7 +162,7 @@ fn discrete_beam(lines: &mut Lines, curve: &ExportCurve, units: InUnits, ids: Id
     lines.add(format_args!(
         "{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
         ids.material,
-        // A discrete beam needs a mass of its own: with VOL 1, a millionth of the body's.
+        // A discrete beam needs its own mass: with VOL 1, a millionth of the body's.
         ten_columns(1e-6 * curve.predicted.mass_kg / units.0.mass_kg),
         ten_columns(units.stiffness(curve.stiffness_n_per_m())),
         "2.0",
@@ -193,8 +193,8 @@ fn general(lines: &mut Lines, curve: &ExportCurve, units: InUnits, ids: Ids) {
     ));
 }
 
-/// Deflection in m and force in N of each point. They begin at the origin, else LS-DYNA carries the
-/// first slope on into tension.
+/// Deflection in m and force in N of each point. They begin at the origin, otherwise LS-DYNA extrapolates the
+/// first slope into tension.
 fn points(curve: &ExportCurve) -> Vec<(f64, f64)> {
     let force = std::iter::once(0.0).chain(curve.force_n().iter().copied().skip(1));
     curve.deflection_m().iter().copied().zip(force).collect()

@@ -83,7 +83,7 @@ const ZERO_SHARE: f64 = 1e-9;
 /// Distances of two guard points that agree this well are one.
 const SAME_DISTANCE: f64 = 1e-6;
 
-/// Points of one deflection are set apart by this share of the largest: next to nothing in energy, and less steep than
+/// Points of one deflection are set apart by this share of the largest: negligible in energy, and less steep than
 /// would ask runs for tiny steps.
 const STEP_WIDTH_SHARE: f64 = 1e-4;
 /// Jumps of the force that a note names.
@@ -95,7 +95,7 @@ pub(super) struct Columns {
     pub deflection_m: Vec<f64>,
     pub force_n: Vec<f64>,
     pub time_s: Option<Vec<f64>>,
-    /// Where each point stands, for messages.
+    /// Place of each point, for messages.
     pub places: Places,
     pub facts: Metadata,
     pub title: Option<String>,
@@ -105,7 +105,7 @@ pub(super) struct Columns {
     pub files: Vec<ReadFile>,
 }
 
-/// Where the points of a curve stand.
+/// Places of the points of a curve.
 #[derive(Clone, Debug)]
 pub(super) enum Places {
     Lines(Vec<u64>),
@@ -231,7 +231,7 @@ impl Points {
     }
 
     /// The loading branch from (0, 0), then the unloading branch if there is one.
-    /// `crush_m`: the maximum crush, if the file says it.
+    /// `crush_m`: the maximum crush, if the file states it.
     fn loading_then_unloading(
         &mut self,
         crush_m: Option<f64>,
@@ -310,7 +310,7 @@ impl Points {
         Ok(())
     }
 
-    /// A table that falls from its maximum deflection is a loading branch from behind.
+    /// A table that falls from its maximum deflection is a reversed loading branch.
     fn put_in_order(&mut self, notes: &mut Vec<String>) {
         if self.list.windows(2).all(|w| w[1].d <= w[0].d) {
             self.list.reverse();
@@ -320,7 +320,7 @@ impl Points {
         }
     }
 
-    /// Removes what tools that extrapolate are given: points below zero deflection, and the last
+    /// Removes the guard points for tools that extrapolate: points below zero deflection, and the last
     /// force once more, as far beyond the end as the first lies before the start.
     fn remove_guards(&mut self, notes: &mut Vec<String>) {
         let before = self.list.len();
@@ -375,7 +375,7 @@ impl Points {
         }
     }
 
-    /// Sets points of one deflection a hair apart: forces that jump there stay, and the deflection still continues.
+    /// Sets points of one deflection slightly apart: forces that jump there are kept, and the deflection still increases.
     /// Up to the maximum deflection the later ones go forward; where the force has its peak at the maximum
     /// deflection, those after the peak are unloading and go back, as all after it do.
     fn set_steps_apart(&mut self, notes: &mut Vec<String>) {
@@ -455,7 +455,7 @@ fn peak(points: &[Point]) -> usize {
     (1..points.len()).fold(0, |best, k| if points[k].f > points[best].f { k } else { best })
 }
 
-/// What was done where the deflection stands still: the first steps, and how many more.
+/// Changes where the deflection is constant: the first jumps, and how many more.
 fn steps_note(steps: &[(f64, Point, f64)]) -> Option<String> {
     let shown = steps.iter().take(STEPS).map(|(d, first, to_n)| {
         let shown_m = (d * 1e6).round() / 1e6;

@@ -23,13 +23,13 @@ pub struct ReadCurve {
     /// In N, one per deflection: the force that moves the body, where the file has it beside the
     /// one that the obstacle feels.
     pub body_force_n: Option<Vec<f64>>,
-    /// What the file says of the curve.
+    /// Metadata of the curve in the file.
     pub facts: Metadata,
     /// Title of the curve in the file.
     pub title: Option<String>,
     /// Units of the file, if they are one system.
     pub units: Option<UnitSystem>,
-    /// What was taken how.
+    /// How it was read.
     pub notes: Vec<String>,
     /// The files that were read.
     pub files: Vec<ReadFile>,
@@ -104,7 +104,7 @@ impl ReadFile {
     }
 }
 
-/// What a file says of its curve.
+/// Metadata of a curve in its file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Metadata {
     /// Which force it is.
@@ -126,7 +126,7 @@ pub struct Metadata {
 }
 
 impl Metadata {
-    /// Takes what a comment `key: value` says; other comments say nothing. `mark` is the
+    /// Takes the metadata of a comment `key: value`; other comments are ignored. `mark` is the
     /// comment's, for messages.
     pub(super) fn take(&mut self, mark: &str, comment: &str, place: Place) -> Result<(), Error> {
         let Some((key, value)) = comment.split_once(':') else { return Ok(()) };
@@ -162,7 +162,7 @@ impl Metadata {
         Ok(())
     }
 
-    /// A loading branch with what drives need to know of it.
+    /// A loading branch with the data needed to drive an interface.
     pub(super) fn driving(&self, loading: Envelope) -> ForceCurve {
         ForceCurve {
             unloading: CurveUnloading::of(self.unloading_stiffness_n_per_m),
@@ -233,7 +233,7 @@ pub(super) fn content(path: &Path) -> impl Fn(Error) -> Error {
     }
 }
 
-/// Where something is in a file; everything is counted from 1 but bytes, from 0.
+/// A place in a file, counted from 1; bytes from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A whole line.
@@ -272,7 +272,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// What should stand at a place, and what does.
+/// Expected and actual content of a place.
 pub(super) fn expected(place: Place, what: impl fmt::Display, found: &str) -> Error {
     let found = shown(found);
     error!(CurveFile, "{place}: expected {what}, found \"{found}\"")
@@ -283,7 +283,7 @@ pub(super) fn value(place: Place, text: &str) -> Result<f64, Error> {
     number(text).ok_or_else(|| expected(place, "a number", text))
 }
 
-/// What to do with a file that is shorter than it says.
+/// Remedy for a file that is shorter than it declares.
 pub(super) const CUT: &str = "write the file again: it may be truncated";
 
 /// Another number of values than the file declares.

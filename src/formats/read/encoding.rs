@@ -11,7 +11,7 @@ pub(super) struct Decoded<'a> {
 /// Bytes by which UTF-16 without a mark is recognised.
 const BEGINNING: usize = 64;
 
-/// The text that the bytes are; bytes of no text become one, too.
+/// The bytes as text; invalid bytes are replaced.
 pub(super) fn decoded(bytes: &[u8]) -> Decoded<'_> {
     let of_pairs = |rest: &[u8], pair: fn([u8; 2]) -> u16, note| {
         let mut units: Vec<u16> = rest.chunks_exact(2).map(|two| pair([two[0], two[1]])).collect();

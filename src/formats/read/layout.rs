@@ -9,7 +9,7 @@ use super::table::{Purpose, Row, Table, names_all, unit_of};
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
-/// A column that is taken, or could be.
+/// A chosen or candidate column.
 #[derive(Clone, Debug)]
 pub(super) struct Column {
     /// Counted from 0.
@@ -196,7 +196,7 @@ pub(super) fn layout(
     Ok((columns, are_used))
 }
 
-/// Whether a title says that the table has this quantity, as `Force vs displacement` does.
+/// Whether a title names this quantity, as `Force vs displacement` does.
 fn says(table: &Table<'_>, quantity: Quantity) -> bool {
     let says = |(_, title): &(u64, String)| Quantity::all_within(title).contains(&quantity);
     quantity != Quantity::Time && table.titles.iter().any(says)

@@ -34,10 +34,10 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
 /// Factors and offsets of card 1: of abscissas, then of ordinates.
 type Scale = [(f64, f64); 2];
 
-/// What the next line of a curve is.
+/// Kind of the next line of a curve.
 #[derive(Clone, Copy, PartialEq)]
 enum Next {
-    /// Nothing of a curve.
+    /// Not part of a curve.
     Other,
     Title,
     Card,

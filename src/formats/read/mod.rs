@@ -55,7 +55,7 @@ pub struct Reader {
     read: Read,
 }
 
-/// What a reader gives.
+/// Result of a reader.
 #[derive(Debug)]
 enum Read {
     /// Columns of a binary file, of which the curve is made.
@@ -208,7 +208,7 @@ const ZIP: &[u8] = b"PK\x03\x04";
 const BEGINNING: usize = 64 << 10;
 
 impl Input<'_> {
-    /// What is examined to recognise a format.
+    /// The part of a file used to recognise its format.
     fn beginning(&self) -> &str {
         let fits = |end: &usize| self.text.is_char_boundary(*end);
         let end = (0..=self.text.len().min(BEGINNING)).rev().find(fits);
@@ -302,7 +302,7 @@ fn parse(path: &Path, options: &ReadOptions) -> Result<(Parsed, &'static Reader)
 /// A curve that can drive an interface, as in its file.
 pub(crate) enum DrivingFile {
     Predicted(Box<PredictedCurve>),
-    /// With what was changed to make it drive.
+    /// With the changes needed to drive an interface.
     Curve(Box<ForceCurve>, Vec<String>),
 }
 

@@ -67,7 +67,7 @@ struct Function {
     curve: DeckCurve,
 }
 
-/// What `/MOVE_FUNCT/id` makes of a function: scaled first, then shifted.
+/// Effect of `/MOVE_FUNCT/id` on a function: scaled first, then shifted.
 struct Move {
     id: String,
     line: u64,
@@ -77,10 +77,10 @@ struct Move {
 
 const FUNCTION: &str = "FUNCT";
 
-/// What the next line is.
+/// Kind of the next line.
 #[derive(Clone, Copy, PartialEq)]
 enum Next {
-    /// Nothing of a function.
+    /// Not part of a function.
     Other,
     Title,
     Point,

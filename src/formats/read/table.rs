@@ -21,7 +21,7 @@ const MOST_TITLES: usize = 100;
 const MOST_COLUMNS: usize = 1_000;
 /// Maximum characters of a unit, to distinguish a row of units from a header.
 const UNIT: usize = 6;
-/// Lines before a curve of two columns: more are another kind of file.
+/// Lines before a curve of two columns; more mean another kind of file.
 const HEADS: usize = 20;
 /// Characters of such a line that are examined.
 const LABEL: usize = 300;
@@ -125,7 +125,7 @@ impl Separator {
     }
 }
 
-/// What a table is read for.
+/// Purpose of reading a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Purpose {
     /// Force over deflection.
@@ -134,10 +134,10 @@ pub(super) enum Purpose {
     History,
 }
 
-/// How well a line fits as the header, best first.
+/// How well a line matches as the header, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Fit {
-    /// It names what is looked for, and numbers follow.
+    /// It names the required quantities, and numbers follow.
     Header,
     Named,
     /// Numbers follow.
@@ -200,7 +200,7 @@ impl<'a> Table<'a> {
                 let (fit, names) = fit(&first[k..], separator, &is_header)?;
                 Some((fit, k, separator, names))
             });
-        // A header above numbers wins wherever it stands; else the first line that fits at all.
+        // A header above numbers takes precedence; otherwise the first line that matches at all.
         let best = candidates.min_by_key(|(fit, k, ..)| (*fit != Fit::Header, *k, *fit));
         let (fit, k, separator, names) = best.unwrap_or_else(|| {
             // Nothing fits: report what is wrong with the first line.
@@ -331,7 +331,7 @@ impl<'a> Table<'a> {
         self.names = names.into_iter().flatten().map(|name| (line, name)).collect();
     }
 
-    /// What was skipped, in one line; `None` if nothing was.
+    /// Skipped lines in one note; `None` if there are none.
     pub(super) fn note(&self) -> Option<String> {
         let ((first, _), (last, _)) = (self.titles.first()?, self.titles.last()?);
         let lines = if first == last {

@@ -7,7 +7,7 @@ use super::bytes::Bytes;
 use super::records::{LISTS, Section};
 use crate::history::{EntityId, Side};
 
-/// What a section says of itself.
+/// Metadata of a section.
 pub(crate) struct Metadata {
     pub title: Option<String>,
     pub version: Option<String>,

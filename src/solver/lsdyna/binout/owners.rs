@@ -19,7 +19,7 @@ pub(super) const MAX_ROWS: usize = 20;
 const HAVE_ONE_ROW: [&str; 6] =
     ["nodout", "matsum", "rwforc/forces", "secforc", "rbdout", "abstat"];
 
-/// Whom the values of a component belong to.
+/// Owners of the values of a component.
 #[derive(Clone)]
 pub(super) enum Entities {
     Global,
@@ -29,7 +29,7 @@ pub(super) enum Entities {
     OfState(Arc<[EntityId]>),
 }
 
-/// What is found of a component's owners.
+/// Result of the search for a component's owners.
 pub(super) enum Found {
     /// Owners, and values of each of them: one, or one for each integration point.
     Entities(Entities, usize),

@@ -4,7 +4,7 @@ use super::parameters::Value;
 use crate::solver::problem::Problem;
 use crate::unit::UnitSystem;
 
-/// What a deck and its includes say about a run. Numbers are in the deck's own units.
+/// Metadata of a run in a deck and its includes, in the deck's own units.
 ///
 /// Each list ends at 100,000 entries; a problem says when there were more.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,11 +67,11 @@ pub(crate) struct InitialVelocity {
     pub velocity: Option<[f64; 3]>,
     /// Whether a rotation is given or not known as well.
     pub rotates: bool,
-    /// What it holds for.
+    /// Its scope.
     pub scope: Scope,
 }
 
-/// What an initial velocity holds for.
+/// Scope of an initial velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Scope {
     /// Every node of the model.
