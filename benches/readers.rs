@@ -1,4 +1,4 @@
-//! CPU time of reading a file into memory, for `benches/readers.py`, which holds it against
+//! CPU time of reading a file into memory, for `benches/readers.py`, which compares it with
 //! other readers in one run.
 //!
 //!     cargo bench --bench readers -- FILE [SECTION]

@@ -3,7 +3,7 @@
 //!     cargo run --example feeding_pictures docs/feeding
 //!
 //! Two curves of the bundled lead car are drawn: the one predicted for 50 km/h, and that of the run at
-//! 48 km/h, whose first flank is steeper than its unloading. Points of targets are those of the files
+//! 48 km/h, whose first rise is steeper than its unloading. Points of targets are those of the files
 //! that `crumple export` writes.
 
 use std::error::Error;
@@ -66,7 +66,7 @@ fn overview(predicted: &PredictedCurve, recorded: &PredictedCurve) -> Anything<S
     let mut left = Sheet::whole("predicted for 50 km/h");
     left.line(0, points(&contact.loading));
     left.line(1, points(&body.loading));
-    left.mark("maximal crush", body.max_crush_m());
+    left.mark("maximum crush", body.max_crush_m());
     let mut right = Sheet::around_end(&one, "run at 48 km/h: ways back");
     right.line(2, on_line(&one, one.stiffness_n_per_m()));
     right.line(3, on_line(&one, one.loading.max_slope()));
@@ -87,7 +87,7 @@ fn lsdyna(recorded: &PredictedCurve) -> Anything<String> {
     let own = on_line(&curve, curve.stiffness_n_per_m());
     let steepest = on_line(&curve, curve.loading.max_slope().max(curve.stiffness_n_per_m()));
     let mut left = Sheet::whole("run at 48 km/h, body force");
-    let mut right = Sheet::around_end(&curve, "at the maximal crush");
+    let mut right = Sheet::around_end(&curve, "at the maximum crush");
     for panel in [&mut left, &mut right] {
         panel.line(0, both_ways(&curve));
         panel.line(1, own.clone());
@@ -97,7 +97,7 @@ fn lsdyna(recorded: &PredictedCurve) -> Anything<String> {
     Ok(svg(&[(0, "crumple"), (1, "MAT_121 and S06"), (2, "S08")], vec![left, right]))
 }
 
-/// K1 is at least the steepest rise, so the way back is steeper than ours where a flank is.
+/// K1 is at least the steepest rise, so the way back is steeper than ours where a rise is.
 fn radioss(recorded: &PredictedCurve) -> Anything<String> {
     let curve = ready(recorded, ForceKind::Body)?;
     let k1 = curve.stiffness_n_per_m().max(curve.loading.max_slope());
@@ -124,7 +124,7 @@ fn adams(predicted: &PredictedCurve) -> Anything<String> {
     elastic(predicted, "Adams, MotionView", rows)
 }
 
-/// A target that goes back on the loading branch, with its points at the maximal crush.
+/// A target that goes back on the loading branch, with its points at the maximum crush.
 fn elastic(input: &PredictedCurve, name: &str, rows: Points) -> Anything<String> {
     let curve = ready(input, ForceKind::Body)?;
     let mut left = Sheet::whole("predicted for 50 km/h, body force");
@@ -185,7 +185,7 @@ fn modelica(predicted: &PredictedCurve) -> Anything<String> {
     let mut left = Sheet::whole("predicted for 50 km/h, body force");
     left.line(0, points(&curve.loading));
     left.line(2, combi.clone());
-    let mut right = Sheet::around_end(&curve, "at the maximal crush");
+    let mut right = Sheet::around_end(&curve, "at the maximum crush");
     right.line(0, both_ways(&curve));
     right.line(1, spring);
     right.line(2, combi);
@@ -200,7 +200,7 @@ fn matlab(predicted: &PredictedCurve) -> Anything<String> {
     let mut left = Sheet::whole("predicted for 50 km/h, body force");
     left.line(0, both_ways(&curve));
     left.line(1, points(&curve.loading));
-    let mut right = Sheet::around_end(&curve, "at the maximal crush");
+    let mut right = Sheet::around_end(&curve, "at the maximum crush");
     right.line(0, both_ways(&curve));
     right.line(1, points(&curve.loading));
     right.line(2, unloading.clone());
@@ -234,7 +234,7 @@ fn two_variables(model: &Model) -> Anything<String> {
         ..Options::default()
     };
     let table = text(by_name("table")?.export_model(model, &options)?)?;
-    let mut panel = Sheet::wide("body force; behind the maximal crush, which is marked, the tail");
+    let mut panel = Sheet::wide("body force; behind the maximum crush, which is marked, the tail");
     let mut legend = Vec::new();
     let names = speeds.map(|kmh| format!("{kmh} km/h"));
     for (k, kmh) in speeds.iter().enumerate() {
@@ -283,23 +283,23 @@ fn points(curve: &Envelope) -> Points {
     curve.deflection_m().iter().copied().zip(curve.force_n().iter().copied()).collect()
 }
 
-/// To the maximal crush.
+/// To the maximum crush.
 fn loading(curve: &ExportCurve) -> Points {
     points(&curve.loading)[..=curve.end].to_vec()
 }
 
-/// From a largest deflection until there is no force.
+/// From a maximum deflection until there is no force.
 fn back(law: &ForceLaw, largest_m: f64) -> Points {
     let way = (0..=200).map(|i| largest_m - 0.1 * f64::from(i) / 200.0);
     way.map(|d| (d, law.force_n(d, largest_m))).collect()
 }
 
-/// Loading to the maximal crush and unloading from it, in crumple's own runs.
+/// Loading to the maximum crush and unloading from it, in crumple's own runs.
 fn both_ways(curve: &ExportCurve) -> Points {
     [loading(curve), back(&curve.law(), curve.max_crush_m())].concat()
 }
 
-/// From the maximal crush along a straight line.
+/// From the maximum crush along a straight line.
 fn on_line(curve: &ExportCurve, n_per_m: f64) -> Points {
     let (end_m, end_n) = (curve.max_crush_m(), curve.end_n());
     vec![(end_m, end_n), (end_m - end_n / n_per_m, 0.0)]
@@ -309,7 +309,7 @@ fn largest(points: &Points) -> f64 {
     points.iter().map(|p| p.0).fold(0.0, f64::max)
 }
 
-/// The file that `crumple export` writes of the body's force.
+/// The file that `crumple export` writes of the body force.
 fn exported(input: &PredictedCurve, format: &str, extension: &str) -> Anything<String> {
     let options = Options { extension: Some(extension.into()), ..Options::default() };
     text(by_name(format)?.export(std::slice::from_ref(input), &options)?)

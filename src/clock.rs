@@ -1,8 +1,8 @@
-//! The time by the clock, for what says when it was made.
+//! The current date, for files that record when they were made.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Now, in UTC as ISO 8601 has it: `2026-05-04T13:37:00Z`. If the environment's
+/// Now, in UTC (ISO 8601): `2026-05-04T13:37:00Z`. If the environment's
 /// `SOURCE_DATE_EPOCH` holds seconds since 1970 it is that time, so that the same inputs give the
 /// same bytes (reproducible-builds.org/specs/source-date-epoch).
 pub(crate) fn now_utc() -> String {

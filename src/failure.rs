@@ -21,7 +21,7 @@ pub const DONE_WITH_WARNINGS: u8 = 3;
 pub const EXIT_CODES: [(u8, &str); 4] = [
     (DONE, "done"),
     (FAILED, "failed: nothing was done, or only part of it; standard error says which"),
-    (USAGE, "the arguments make no sense, or do not fit together or with the file"),
+    (USAGE, "the arguments are invalid, or fit neither together nor the file"),
     (DONE_WITH_WARNINGS, "done, but with damage or warnings, and `--strict` was given"),
 ];
 
@@ -37,7 +37,7 @@ pub struct ErrorDocument {
 pub struct ErrorReport {
     /// Its kind; a code never changes its meaning.
     pub code: ErrorCode,
-    /// What standard error would have said, without the excerpt.
+    /// What standard error would have shown, without the excerpt.
     pub message: String,
     /// Causes that the message does not contain itself, the nearest first.
     pub causes: Vec<String>,
@@ -60,7 +60,7 @@ fn of<'e, T: Error + 'static>(error: &'e (dyn Error + 'static)) -> Option<&'e T>
     error.downcast_ref::<T>().or_else(|| Some(&**error.downcast_ref::<Box<T>>()?))
 }
 
-/// The codes of error types, those that stand in others behind these.
+/// The codes of error types, those that are in others after these.
 fn own_code(error: &(dyn Error + 'static)) -> Option<ErrorCode> {
     let io = || of::<io::Error>(error).map(|_| ErrorCode::Io);
     of::<error::Error>(error).map(error::Error::code).or_else(io)

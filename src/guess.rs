@@ -1,4 +1,4 @@
-//! One best guess for a name that is not known: the nearest of those that are.
+//! One best guess for an unknown name: the most similar known one.
 
 /// Least Jaro–Winkler similarity of a guess; below it a guess would mislead.
 const LEAST: f64 = 0.8;
@@ -17,8 +17,8 @@ pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) 
     best.map(|(_, candidate)| candidate)
 }
 
-/// What a message says behind the list of known names: `; did you mean "x"?`, or nothing.
-/// `known` is the list as the message has it: names with commas between, in quotes or not.
+/// What a message says after the list of known names: `; did you mean "x"?`, or nothing.
+/// `known` is the list as in the message: names with commas between, in quotes or not.
 pub(crate) fn hint(name: &str, known: &str) -> String {
     let names = known.split(", ").map(|name| name.trim_matches(['"', '`']));
     match nearest(name, names) {

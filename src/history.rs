@@ -1,4 +1,4 @@
-//! Histories: what a solver wrote down over time, in the solver's own units.
+//! Histories: values that a solver wrote over time, in the solver's own units.
 
 use std::fmt;
 use std::sync::Arc;
@@ -40,7 +40,7 @@ impl Side {
 /// Name of an entity: a node, a wall, one side of an interface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 pub struct EntityId {
-    /// As the file has it.
+    /// As in the file.
     pub id: i64,
     /// Side of an interface; `None` for what has no sides.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -90,11 +90,11 @@ impl History {
 /// A hole in time: an interval without a state, far longer than those around it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TimeGap {
-    /// Index of the state behind it.
+    /// Index of the state after it.
     pub state: usize,
-    /// Times of the states before and behind it.
+    /// Times of the states before and after it.
     pub from: f64,
-    /// Time of the state behind the gap.
+    /// Time of the state after the gap.
     pub to: f64,
     /// Interval of the states around it.
     pub interval: f64,
@@ -116,7 +116,7 @@ impl fmt::Display for TimeGap {
 /// An interval is a hole if it is this many times the interval around it: 3, and a little for
 /// the rounding of printed times.
 const GAP_RATIO: f64 = 3.01;
-/// Intervals that are looked at on each side of one.
+/// Intervals that are examined on each side of one.
 const GAP_SIDE: usize = 4;
 /// Intervals that must be known on both sides together to judge one.
 const GAP_KNOWN: usize = 3;

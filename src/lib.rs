@@ -1,6 +1,6 @@
 //! Force–deflection curves for multi-body crash models, from the histories of FE runs.
 //!
-//! The whole pipeline; each step takes the previous one's output and never reaches back:
+//! The whole pipeline; each step only uses the output of the previous one:
 //!
 //! ```
 //! use crumple::build::build;
@@ -24,8 +24,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The modules below stand in the order worth reading. Inside is SI; units enter at the
-//! edges ([`unit`](mod@unit)). A speed always says what it is measured against.
+//! The modules below are in the recommended reading order. All values are in SI; units enter at the
+//! edges ([`unit`](mod@unit)). A speed always states what it is measured against.
 
 #![deny(missing_docs)]
 #![warn(unreachable_pub)]

@@ -1,7 +1,7 @@
 //! Piecewise linear functions: which segment holds a value, and the straight line over it.
 //!
-//! Curves, dampers, springs and warps are tables over rising nodes. What holds beyond the ends
-//! differs between them, so each says that itself; the search and the line are here.
+//! Curves, dampers, springs and warps are tables over increasing nodes. The continuation beyond the ends
+//! differs, so each defines its own; the search and the line are here.
 
 /// Index of the segment that holds `at`: `nodes[i] <= at < nodes[i + 1]`, the first or last one
 /// beyond the ends. `nodes`: rising, at least two.

@@ -1,7 +1,7 @@
 //! Units: where numbers with units enter the program and become SI.
 //!
-//! Everything inside is SI. A number typed by a user carries its unit
-//! (`36km/h`, `24t`, `0.75ms`); a solver's file carries none, so a
+//! All internal values are in SI. A number typed by a user carries its unit
+//! (`36km/h`, `24t`, `0.75ms`); a solver file has none, so a
 //! [`UnitSystem`] is declared once in the study manifest.
 //!
 //! ```
@@ -104,6 +104,31 @@ impl Shown {
 
     pub(crate) fn text(self, value: f64) -> String {
         format!("{:.*} {}", self.decimals, value / self.size, self.unit)
+    }
+
+    /// One force in the unit that fits it.
+    pub(crate) fn one_force(force_n: f64) -> String {
+        Self::force(force_n).text(force_n)
+    }
+
+    /// One mass in the unit that fits it.
+    pub(crate) fn one_mass(mass_kg: f64) -> String {
+        Self::mass(mass_kg).text(mass_kg)
+    }
+
+    /// One energy in the unit that fits it.
+    pub(crate) fn one_energy(energy_j: f64) -> String {
+        Self::energy(energy_j).text(energy_j)
+    }
+
+    /// One stiffness in the unit that fits it.
+    pub(crate) fn one_stiffness(stiffness_n_per_m: f64) -> String {
+        Self::stiffness(stiffness_n_per_m).text(stiffness_n_per_m)
+    }
+
+    /// One impulse in the unit that fits it.
+    pub(crate) fn one_impulse(impulse_ns: f64) -> String {
+        Self::fitting(impulse_ns, 0.1, &[(1e3, "kN·s", 3), (1.0, "N·s", 2)]).text(impulse_ns)
     }
 }
 
@@ -262,7 +287,7 @@ fn continues_number(text: &str, i: usize, c: char) -> bool {
     }
 }
 
-/// The units in which a solver's files are written; factors turn a file's value into SI.
+/// The units in which a solver files are written; factors turn a file's value into SI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UnitSystem {
     /// The files' unit of length, in m: 0.001 for mm.

@@ -188,7 +188,7 @@ fn a_family_is_one_tree() {
     assert_eq!(&section(&path, "nodout").time[..], [1.0, 2.0, 3.0, 5.0, 6.0, 7.0]);
 }
 
-/// A record without sense: the walk goes on at the next directory, one state is lost.
+/// A record without sense: the walk continues at the next directory, one state is lost.
 #[test]
 fn damage_in_the_middle_costs_one_state() {
     let folder = tempfile::tempdir().unwrap();
@@ -208,7 +208,7 @@ fn damage_in_the_middle_costs_one_state() {
     assert_eq!(file.time[..], kept);
     let messages: Vec<String> = file.problems.iter().map(ToString::to_string).collect();
     assert!(messages[0].contains("damaged record"), "{messages:?}");
-    assert!(messages[0].contains("reading goes on at byte"), "{messages:?}");
+    assert!(messages[0].contains("reading continues at byte"), "{messages:?}");
     assert!(
         messages[1].contains("state d200 is left out: a record of it is damaged"),
         "{messages:?}"
@@ -266,7 +266,7 @@ fn equal_ids_are_named_and_take_no_square_of_time() {
         let start = std::time::Instant::now();
         let arguments = ["histories", path.to_str().unwrap(), "-o", output.to_str().unwrap()];
         let error = String::from_utf8(crumple_in(folder.path(), &arguments).stderr).unwrap();
-        let expected = "nodout: 1 ids, the first 7, are there more than once in one state; rows beyond the first 20 are left out";
+        let expected = "nodout: 1 ids, the first 7, occur more than once in one state; rows beyond the first 20 are left out";
         assert!(error.contains(expected), "{error}");
         start.elapsed()
     };
@@ -291,7 +291,7 @@ fn a_list_of_ids_is_bounded() {
     let file = section(&path, "nodout");
     assert_eq!(file.histories.len(), 0);
     let said = file.problems[0].to_string();
-    assert!(said.contains("has 4000001 values a state and no ids of that number"), "{said}");
+    assert!(said.contains("has 4000001 values per state but a different number of ids"), "{said}");
 }
 
 /// Elements that erode, with two integration points each.
@@ -558,7 +558,7 @@ fn any_section_with_states_is_read() {
     assert_eq!(names, ["gceout", "icvout", "odd/values"]);
     assert_eq!(
         sections[2].problems[0].to_string(),
-        "odd/values: 1 record not read: they do not stand in states (d000001, d000002, …) with times"
+        "odd/values: 1 record not read: they are not in states (d000001, d000002, …) with times"
     );
 }
 

@@ -125,7 +125,7 @@ fn h5py_reads_what_db_show_prints() {
     );
 }
 
-/// The Python of schemas/curve_database.md runs as it stands there; its crush force is the contact force
+/// The Python of schemas/curve_database.md runs as it is there; its crush force is the contact force
 /// less what stops mass, which is most at the tip.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]
@@ -343,7 +343,7 @@ fn onnx_runtime_predicts_the_same() {
     }
 }
 
-/// Every number of `theirs` must stand in `ours`.
+/// Every number of `theirs` must be in `ours`.
 fn assert_agrees(name: &str, ours: &Value, theirs: &Value) {
     for (key, theirs) in theirs.as_object().unwrap() {
         let (place, ours) = (format!("{name}: {key}"), &ours[key]);
@@ -531,7 +531,7 @@ fn exudyn_moves_eight_cars_against_eight_alike() {
             assert_eq!(run.time_s.len(), theirs.len());
             for seen in &run.interfaces {
                 let (now, most) = (&seen.deflection_m, &seen.largest_deflection_m);
-                // Until it is touched an interface's largest deflection is 0.
+                // Until it is touched an interface's maximum deflection is 0.
                 assert!(now.iter().zip(most).all(|(now, most)| now.max(0.0) == *most), "loads");
             }
             let touched = run.interfaces.iter().filter(|i| i.max_deflection_m > 1e-3).count();

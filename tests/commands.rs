@@ -199,7 +199,10 @@ fn energy_audits_of_all_groups() {
     let check = crumple_ok(folder.path(), &["db", "check", "curves.h5"]);
     // At 3 km/h a step is a good part of the crush.
     let findings: Vec<&str> = check.lines().collect();
-    assert!(findings[0].starts_with("vehicle-pair/3kmh: contact: it lies in a step of 0.63 mm"));
+    assert!(
+        findings[0]
+            .starts_with("vehicle-pair/3kmh: contact: it lies between two states 0.63 mm apart")
+    );
     assert_eq!(findings[1..], ["20 cases checked, 1 finding"], "{check}");
 }
 
@@ -563,7 +566,7 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
         assert!(close(point[..20].trim().parse::<f64>().unwrap() * 1e-3, *d));
         assert!(close(point[20..].trim().parse().unwrap(), *f));
     }
-    // Behind the maximal crush, the tail: no text, and the same in both files.
+    // Behind the maximum crush, the tail: no text, and the same in both files.
     assert!(csv.len() > d.len());
     assert_eq!(keyword[3 + csv.len()], "*MAT_SPRING_INELASTIC_TITLE");
 }
@@ -894,7 +897,7 @@ fn scenarios_choose_the_force() {
         let result = json(&crumple_ok(here, &["simulate", "s.toml", "--json"]));
         result["summary"]["interfaces"][0]["max_deflection_m"].as_f64().unwrap()
     };
-    // FE's largest crush is 0.8749 m; a contact force stops the body short of it.
+    // FE's maximum crush is 0.8749 m; a contact force stops the body short of it.
     for source in [
         "model = \"a.model\"",
         "file = \"a.json\"",
@@ -931,7 +934,7 @@ fn scenarios_choose_the_force() {
     let bare: Vec<&str> = text.lines().filter(|l| !l.starts_with('#')).collect();
     std::fs::write(here.join("bare.csv"), bare.join("\n")).unwrap();
     let warned = run("file = \"bare.csv\"")["warnings"].to_string();
-    assert!(warned.contains("its file does not say which force it holds"), "{warned}");
+    assert!(warned.contains("its file does not state which force it holds"), "{warned}");
     assert!(warned.contains("it has no unloading stiffness: it unloads with its steepest rise"));
     scenario("file = \"bare.csv\"");
     assert!(crumple_ok(here, &["simulate", "s.toml"]).contains("unknown"));
@@ -956,14 +959,14 @@ fn scenarios_choose_the_force() {
     let export = ["export", "old.json", "--to", "csv", "--force", "body"];
     assert!(crumple_fails(here, 1, &export).contains("no body force"));
     let error = crumple_fails(here, 2, &["export", "old.json", "--to", "csv"]);
-    assert!(error.contains("say --force contact"), "{error}");
+    assert!(error.contains("use --force contact"), "{error}");
     let error = crumple_fails(here, 1, &["export", "a.json", "--to", "json", "--units", "mm-t-s"]);
     assert!(error.contains("json is always in SI"), "{error}");
     let error = crumple_fails(here, 1, &["export", "a.json", "--to", "csv", "--units", "in-kg-s"]);
     assert!(error.contains("lengths in mm, cm, m, forces in N, kN, MN"), "{error}");
 }
 
-/// With -q a result is not printed: only errors, and what was asked for on standard output.
+/// With -q a result is not printed: only errors, and what was requested on standard output.
 #[test]
 fn quiet_commands_print_nothing() {
     let folder = tempfile::tempdir().unwrap();

@@ -132,20 +132,20 @@ fn what_cannot_be_chosen_is_said_with_what_is_there() {
     for command in ["rm", "copy --to-group x", "tag --add x", "note --add x"] {
         let (name, options) = command.split_once(' ').unwrap_or((command, ""));
         let line = format!("db {name} curves.h5 {options}");
-        misused(here, line.trim(), "say which cases are");
+        misused(here, line.trim(), "choose the cases to be");
     }
     misused(
         here,
         "db rm curves.h5 --speed 40..50",
         "speed \"40\" has no unit: write for example \"40km/h\"",
     );
-    misused(here, "db rm curves.h5 --speed 50km/h..40km/h", "ends below its beginning");
+    misused(here, "db rm curves.h5 --speed 50km/h..40km/h", "ends below its start");
     misused(
         here,
         "db tag curves.h5 --group lead-car-wall",
-        "say what is changed: with --add, --remove or --clear",
+        "nothing to do: give --add, --remove or --clear",
     );
-    misused(here, "db copy curves.h5 --group lead-car-wall", "say where the cases are copied");
+    misused(here, "db copy curves.h5 --group lead-car-wall", "name the destination with");
     misused(here, "db rename curves.h5 --to x", "--group");
     fails(here, "db rm none.h5 --case x", "none.h5: No such file or directory");
     assert!(fs::read(here.join("curves.h5")).unwrap() == before);
@@ -213,9 +213,9 @@ fn cases_and_groups_get_other_names() {
     fails(
         here,
         "db rename curves.h5 --group nose --case 12kmh --to a/b",
-        "\"a/b\" is not a name of a case: it may not contain \"/\"",
+        "\"a/b\" is not a valid name for a case: it may not contain \"/\"",
     );
-    fails(here, "db rename curves.h5 --group nose --to .", "\".\" is not a name of a group");
+    fails(here, "db rename curves.h5 --group nose --to .", "\".\" is not a valid name for a group");
     fails(
         here,
         "db rename curves.h5 --group nase --to x",
@@ -452,7 +452,7 @@ fn equal_curves_are_joined_once_and_different_ones_are_refused() {
     fails(
         here,
         "db merge a.h5 b.h5 -o all.h5",
-        "all.h5 is there already: name it among the databases that are joined",
+        "all.h5 exists already: name it among the databases to be joined",
     );
     // Other curves under the same names.
     let study = study_in(here, WALL);
@@ -474,7 +474,7 @@ fn equal_curves_are_joined_once_and_different_ones_are_refused() {
     // Again: all of it is there.
     assert!(
         ok(here, "db merge all.h5 heavy.h5 -o all.h5")
-            .contains("0 cases added, 0 replaced, 7 there already")
+            .contains("0 cases added, 0 replaced, 7 already present")
     );
     ok(here, "db merge heavy.h5 a.h5 -o heavy.h5 --replace");
     let replaced = read(here, "heavy.h5");
@@ -482,7 +482,7 @@ fn equal_curves_are_joined_once_and_different_ones_are_refused() {
         replaced.all().all(|case| case.conditions.masses.body_kg == 24e3)
             && replaced.all().count() == 7
     );
-    // Masses that are none, copies, and nothing else: equal speeds of other masses are told apart.
+    // Masses that are none, copies, and nothing else: equal speeds of other masses are distinguished.
     let found = ok_json(here, "db check all.h5");
     for finding in found["findings"].as_array().unwrap() {
         let expected = ["extraction", "energy_mismatch", "copy"];
@@ -516,7 +516,7 @@ fn copies_go_to_groups_and_databases() {
     studied.build();
     let said = ok(here, "db copy curves.h5 --speed 20km/h..50km/h --to-group inner");
     assert!(said.contains("added 3 cases of group inner (of curves.h5)"), "{said}");
-    // A copy is nobody's: other masses make the study's cases anew, and leave it.
+    // A copy is nobody's: other masses make the study's cases again, and leave it.
     studied.change("\"24t\"", "\"24.5t\"");
     studied.build();
     let database = read(here, "curves.h5");
@@ -540,7 +540,7 @@ fn copies_go_to_groups_and_databases() {
     fails(
         here,
         "db copy curves.h5 --case inner/36kmh --to c.h5 --to-group a/b",
-        "\"a/b\" is not a name of a group",
+        "\"a/b\" is not a valid name for a group",
     );
     assert!(!here.join("c.h5").exists());
 }
@@ -556,7 +556,7 @@ fn tags_and_notes_stay_when_a_case_is_made_again() {
         &["db", "note", "curves.h5", "--case", "72kmh", "--add", "rides up, from 80 ms on"],
     );
     let before = studied.bytes();
-    // What is there already changes nothing.
+    // What exists already changes nothing.
     ok(here, "db tag curves.h5 --group lead-car-wall --add a");
     assert!(studied.bytes() == before);
     studied.change("\"24t\"", "\"24.5t\"");
@@ -753,7 +753,7 @@ fn databases_of_version_2_are_read_and_go_on() {
     }
     assert!(ok(here, "db ls old.h5").contains("36kmh  36 km/h (wall)"));
     assert!(ok(here, "db check old.h5").contains("2 cases checked, 0 findings"));
-    // What an earlier extraction built is built anew, once; a build that changes nothing leaves the
+    // What an earlier extraction built is built again, once; a build that changes nothing leaves the
     // file as it is.
     for outcome in ["built", "unchanged"] {
         let report = ok_json(here, "build study.toml -o old.h5");
@@ -850,7 +850,7 @@ fn what_others_put_into_a_case_moves_with_it() {
         );
     }
     // It is not lost, and not taken along to where it does not belong.
-    let would_lose = "would lose by writing it again: attribute nose/reference/reviewed_by, dataset nose/reference/photo";
+    let would_lose = "would lose by rewriting the file: attribute nose/reference/reviewed_by, dataset nose/reference/photo";
     fails(here, "db rm curves.h5 --group nose --case reference", would_lose);
     let output = crumple_in(
         here,
@@ -858,7 +858,7 @@ fn what_others_put_into_a_case_moves_with_it() {
     );
     assert_eq!(output.status.code(), Some(3));
     let warning = String::from_utf8(output.stderr).unwrap();
-    assert!(warning.contains("curves.h5 holds what crumple has not written and does not take along: attribute /project"), "{warning}");
+    assert!(warning.contains("curves.h5 holds objects that crumple did not write and does not copy: attribute /project"), "{warning}");
     ok(here, "db rm curves.h5 --group nose --case 12kmh");
     there("nose", "reference");
 }

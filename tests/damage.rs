@@ -1,4 +1,4 @@
-//! Cut and damaged files: whole states are returned, what is missing is named, nothing panics.
+//! Cut and damaged files: complete states are returned, what is missing is named, nothing panics.
 
 use crate::common::{fixture, is_thorough, samples, samples_by_kind};
 use crumple::solver::{FORMATS, ProblemCode, Selection, SolverFile, read_from};
@@ -25,7 +25,7 @@ fn state_starts(text: &[u8]) -> Vec<usize> {
     starts
 }
 
-/// End of the last line of each state's rows: from there on the state is whole.
+/// End of the last line of each state's rows: from there on the state is complete.
 fn state_ends(text: &[u8], starts: &[usize]) -> Vec<usize> {
     let next = starts.iter().skip(1).copied().chain([text.len()]);
     let last_row = next.map(|end| text[..end].trim_ascii_end().len());

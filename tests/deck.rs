@@ -118,6 +118,6 @@ fn a_deck_that_is_no_plain_text_says_so() {
     for bytes in [[&[0xff, 0xfe], &wide[..]].concat(), wide.clone()] {
         fs::write(&path, bytes).unwrap();
         let error = crumple::solver::read_deck(&path).unwrap_err().to_string();
-        assert!(error.contains("main.k: this is UTF-16 text, which iconv"), "{error}");
+        assert!(error.contains("main.k: this is UTF-16 text (convert it with iconv"), "{error}");
     }
 }

@@ -51,7 +51,7 @@ fn a_body_stops_by_a_rate_as_on_paper() {
         let found = run.interfaces[0].max_deflection_m;
         assert!((found / crush_m - 1.0).abs() < 2e-6, "{method:?}: {found} m, {crush_m} m");
     }
-    // The stop shows in the time of the largest deflection; Verlet sees it between outputs.
+    // The stop shows in the time of the maximum deflection; Verlet sees it between outputs.
     let at_s = run(&chain, 0.2, Method::Verlet).interfaces[0].max_deflection_time_s;
     assert!((at_s / stop_s - 1.0).abs() < 1e-3, "{at_s} s, {stop_s} s");
 }
@@ -199,7 +199,7 @@ const HEAD: &str = "[run]\nduration = \"150ms\"\n[curves]\nnose = { model = \"le
     end = { model = \"vehicle-pair.model\" }\nnoses = { model = \"lead-car-pair.model\" }\n";
 
 /// FE's contact force at a training speed, driven by the crush law, gives FE's velocity within 0.8 %
-/// from contact to 30 ms after the largest crush, from 7.2 km/h against the wall on; at 4.5 and 6 km/h
+/// from contact to 30 ms after the maximum crush, from 7.2 km/h against the wall on; at 4.5 and 6 km/h
 /// within 1.2 %; in the mean of a group's inner speeds within 1 %.
 #[test]
 fn fes_contact_force_gives_fes_velocity() {
@@ -334,7 +334,7 @@ const ENDS: &str = "[[train]]\nname = \"A\"\nspeed = \"36km/h\"\ngap = \"32mm\"\
     { name = \"A1\", mass = \"20.24t\", ends = \"end\" },\n\
     { name = \"A2\", mass = \"20.24t\", ends = \"end\" },\n]\n[wall]\n[contact]\n";
 
-/// Ends alone are enough; plates and their speeds stand in the results, free ends do not.
+/// Ends alone are enough; plates and their speeds are in the results, free ends do not.
 #[test]
 fn ends_are_all_that_a_user_writes() {
     let run = simulate_text("ends.toml", &format!("{HEAD}{ENDS}"));
@@ -380,7 +380,7 @@ fn a_sweep_of_ends_does_not_depend_on_threads() {
     assert_eq!(one, rows("2"));
 }
 
-/// What is wrong is said with its place.
+/// What is wrong is reported with its place.
 #[test]
 fn wrong_ends_are_refused() {
     let fails = |from: &str, to: &str, expected: &str| {
@@ -404,11 +404,11 @@ fn wrong_ends_are_refused() {
         "front of vehicle \"A2\" comes from a model",
     );
     fails("ends = \"end\"", "ends = \"edn\"", "there is no curve \"edn\" in [curves]");
-    fails("[contact]", "[contact]\ncurve = \"nose\"", "stands between ends that come from models");
+    fails("[contact]", "[contact]\ncurve = \"nose\"", "lies between ends that come from models");
     fails(
         "ends = \"end\"",
         "behind = \"nose\", ends = \"end\"",
-        "stands between ends that come from models",
+        "lies between ends that come from models",
     );
     let file = "end = { file = \"lead50.csv\" }";
     fails("end = { model = \"vehicle-pair.model\" }", file, "ends of vehicle \"A1\" needs mass");

@@ -30,7 +30,7 @@ struct Kind {
     everywhere: bool,
 }
 
-/// Kinks everywhere, flanks of up to 1 GN/m, stretches without force.
+/// Kinks everywhere, rises of up to 1 GN/m, stretches without force.
 fn envelope(random: &mut Stream, from_above: bool) -> Envelope {
     let mut deflection = vec![0.0];
     let mut force = vec![if from_above { random.gen_range(0.1e6..2e6) } else { 0.0 }];
@@ -430,7 +430,7 @@ fn the_fourth_order_refuses_what_depends_on_speeds() {
     let damped = against_wall(Interface::new("nose|wall", linear(MEGA), 0.0).with_damping(damping));
     assert_eq!(
         simulate(&damped, &fourth).unwrap_err().to_string(),
-        "the damper of interface nose|wall depends on the speed, which the fourth-order method does not take: use method = \"verlet\""
+        "the damper of interface nose|wall depends on the speed, which the fourth-order method does not support: use method = \"verlet\""
     );
     let resistance = Resistance { linear_per_s: 0.01, ..Resistance::default() };
     let body = Body { resistance, ..Body::new("car", 20.0 * TONNES, 15.0) };
@@ -600,7 +600,7 @@ fn points(shape: &[(f64, f64)]) -> UnloadingShape {
     UnloadingShape::of_branch(&deflection, &force).unwrap()
 }
 
-/// The branch gives back the energy of the line, `F²/2k_u`, whatever its shape: the rebound of
+/// The branch returns the energy of the line, `F²/2k_u`, whatever its shape: the rebound of
 /// case 4 in another way.
 #[test]
 fn a_shaped_branch_gives_back_what_is_stored() {

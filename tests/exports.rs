@@ -74,7 +74,7 @@ fn spike(points: u32) -> Vec<(f64, f64)> {
 }
 
 /// Force at 200 deflections within the digits of the format, or within 0.2 % of the largest force where a format
-/// takes few points; energy to the maximal crush within 0.1 % as the tool interpolates, also of a sharp spike.
+/// takes few points; energy to the maximum crush within 0.1 % as the tool interpolates, also of a sharp spike.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]
 fn other_tools_read_the_exported_points() {
@@ -105,7 +105,7 @@ fn other_tools_read_the_exported_points() {
             let bound = if is_thinned { 2e-3 } else { 2e-8 };
             assert!(of("force") < bound, "{curve} {name}: force off by {}", of("force"));
             assert!(of("linear").abs() < 1e-3, "{curve} {name}: energy, {seen}");
-            assert!(of("beyond") > 1.5, "{curve} {name} ends at the maximal crush: {seen}");
+            assert!(of("beyond") > 1.5, "{curve} {name} ends at the maximum crush: {seen}");
             // Tools that interpolate by splines.
             if ["a.cmd", "a.adm", "a.spr"].iter().any(|f| name.starts_with(f)) {
                 assert!(of("akima").abs() < 1e-3, "{curve} {name}: energy, {seen}");
@@ -228,7 +228,7 @@ fn bands_stand_beside_their_curves() {
         serde_json::from_str(&fs::read_to_string(here.join("lead50.json")).unwrap()).unwrap();
     let column = |key: &str| -> Vec<f64> { serde_json::from_value(curve[key].clone()).unwrap() };
     assert_ne!(column("force_low_N"), column("body_force_low_N"));
-    // The body force is what is written unless another is asked for.
+    // The body force is what is written unless another is requested.
     for (force, prefix) in [(&["--force", "contact"][..], ""), (&[], "body_")] {
         let keys = ["force_low_N", "force_high_N"].map(|edge| format!("{prefix}{edge}"));
         let [low, high] = keys.each_ref().map(|key| column(key));
@@ -318,7 +318,7 @@ fn a_missing_band_is_said() {
     for to in ["csv", "mat"] {
         let to = ["--to", to, "-o", "x"];
         let older = export_notes(here, "older.json", &to);
-        let of_body = "written without a band: only that of the contact force is known (--force contact), until the model is trained anew";
+        let of_body = "written without a band: only that of the contact force is known (--force contact), until the model is trained again";
         assert!(older.contains(of_body), "{older}");
         let of_contact = export_notes(here, "older.json", &[&to[..], &contact].concat());
         assert!(!of_contact.contains("band"), "{of_contact}");
@@ -329,7 +329,7 @@ fn a_missing_band_is_said() {
             let bare = export_notes(here, "bare.json", &[&to, force].concat());
             assert!(bare.contains("written without a band: the model gives none here"), "{bare}");
         }
-        // The body force has no flank that is too steep.
+        // The body force has no rise that is too steep.
         let soft = [&to, &contact[..], &["--soften"]].concat();
         let soft = export_notes(here, "lead50.json", &soft);
         assert!(soft.contains("written without a band: it is not that of a softened"), "{soft}");
@@ -363,7 +363,7 @@ fn packages_have_the_names_of_their_files() {
     assert_eq!(package("several/lead_car_wall_50kmh.mo"), "lead_car_wall_50kmh");
 }
 
-/// LS-DYNA resamples evenly: that it cannot keep an uneven curve is said.
+/// LS-DYNA resamples evenly: that it cannot keep an uneven curve is reported.
 #[test]
 fn uneven_curves_for_lsdyna_are_noted() {
     let folder = demo_folder();
@@ -375,7 +375,7 @@ fn uneven_curves_for_lsdyna_are_noted() {
     };
     let record = notes(&["curves.h5", "--group", "lead-car-wall", "--case", "48kmh"]);
     assert!(
-        record.contains("its points are uneven, so LCINT is 20000, the most that is asked for"),
+        record.contains("its points are unevenly spaced, so LCINT is 20000, the largest used"),
         "{record}"
     );
     assert!(fs::read_to_string(here.join("x.k")).unwrap().contains("         0     20000\n"));
@@ -461,7 +461,7 @@ fn h5py_reads_the_table_of_a_model() {
         assert!(off < 2e-3, "at {d} m: {off}");
     }
     let worst = found["worst_energy"].as_f64().unwrap();
-    assert!(worst < 1e-3, "energy of a speed's row to its maximal crush is off by {worst}");
+    assert!(worst < 1e-3, "energy of a speed's row to its maximum crush is off by {worst}");
     assert!(found["speeds"].as_u64().unwrap() >= 25);
     assert_eq!(found["shape"], json!([found["speeds"], found["deflections"]]));
     assert_eq!(found["compared_bands"], 8, "four speeds, two forces: {found}");
@@ -727,11 +727,7 @@ fn groups_and_several_speeds_are_exported_at_once() {
         &["export", "curves.h5", "--group", "lead-car-wall", "--speed", "37km/h", "--to", "csv"],
         "has no case at 37 km/h: it has 12 km/h",
     );
-    t(
-        2,
-        &["export", "lead50.json", "--to", "csv", "--speed", "50km/h"],
-        "is of one speed and mass",
-    );
+    t(2, &["export", "lead50.json", "--to", "csv", "--speed", "50km/h"], "has one speed and mass");
     t(1, &["export", "lead50.json", "--to", "mat", "--units", UNITS], "mat is always in SI");
     t(
         1,
@@ -757,7 +753,7 @@ fn groups_and_several_speeds_are_exported_at_once() {
         &["export", "lead.model", "--to", "onnx", "--speed", "50km/h"],
         "holds a whole model: remove --speed",
     );
-    t(2, &["export", "lead.model", "--to", "table", "--group", "x"], "a model is of one group");
+    t(2, &["export", "lead.model", "--to", "table", "--group", "x"], "a model has only one group");
     t(
         2,
         &["export", "curves.h5", "--group", "lead-car-wall", "-o", "all.spr"],
@@ -785,7 +781,7 @@ fn the_targets_rebound_is_said() {
         let numbers = note.split([' ', ',', '(']).filter_map(|w| w.parse::<f64>().ok());
         numbers.filter(|n| *n < 1.0 && *n > 0.0).collect()
     };
-    // S08 is bound to the steepest rise, which the contact force has at its first flank.
+    // S08 is bound to the steepest rise, which the contact force has at its first rise.
     let hard = notes(&["--force", "contact"]);
     let [theirs, ours] = restitutions(&hard[0])[..] else { panic!("{hard:?}") };
     assert!(theirs < 0.7 * ours, "{hard:?}");
@@ -796,7 +792,7 @@ fn the_targets_rebound_is_said() {
     let own = notes(&["--force", "contact", "--material", "mat121"]);
     let [theirs, ours] = restitutions(&own[0])[..] else { panic!("{own:?}") };
     assert_eq!(theirs, ours);
-    assert!(soft.iter().any(|note| note.contains("the largest force goes from")), "{soft:?}");
+    assert!(soft.iter().any(|note| note.contains("the peak force changes from")), "{soft:?}");
     // A change that would be too large is refused.
     let arguments =
         ["export", "curves.h5", "--group", "vehicle-pair", "--speed", "3km/h", "--to", "lsdyna"];

@@ -108,7 +108,7 @@ const CAUSES: [&str; 6] = [
     "No space left on device",
     "Cannot allocate memory",
     "No locks available",
-    // Of a folder that could not be looked at and so was to be made, and a database that was to be read.
+    // Of a folder that could not be examined and so was to be made, and a database that was to be read.
     "File exists",
     "No such file or directory",
 ];
@@ -346,7 +346,7 @@ fn models_and_exports_survive_every_fault() {
     hold(here, "export curves.h5 --case 36kmh --to iso-mme -o p.mme");
 }
 
-/// A file that cannot be looked at is not replaced as if it were not there, and a link not in its target's place.
+/// A file that cannot be examined is not replaced as if it were not there, and a link not in its target's place.
 #[test]
 fn faults_hide_neither_files_nor_links() {
     let folder = tempfile::tempdir().unwrap();

@@ -93,7 +93,7 @@ fn devices_pipes_and_folders_are_refused() {
     ];
     for (path, expected) in kinds {
         for command in READING {
-            // A solver's file may come through a pipe, and is asked first.
+            // A solver file may come through a pipe, and is asked first.
             if command.starts_with("rate") && path == "pipe" {
                 continue;
             }
@@ -115,7 +115,7 @@ fn devices_pipes_and_folders_are_refused() {
             soon_fails(here, &["simulate", "t.toml"], expected);
         }
     }
-    // A predicted curve is told by its ending.
+    // A predicted curve is recognised by its ending.
     fs::rename(here.join("pipe"), here.join("pipe.json")).unwrap();
     fs::write(here.join("t.toml"), format!("{SCENARIO}{{ file = \"pipe.json\" }}\n")).unwrap();
     soon_fails(here, &["simulate", "t.toml"], "pipe.json: this is a pipe");
@@ -240,8 +240,8 @@ fn stopped_mass(path: &Path) -> Option<[Vec<f64>; 4]> {
     Some([of("deflection_m")?, of("kg")?, of("rate_kg_per_m")?, of("residual_kg")?])
 }
 
-/// A group's stopped mass stands in its file, that of the model trained on it; it changes with the cases,
-/// whether the file is written anew or edited, and goes with those that tell it.
+/// A group's stopped mass is in its file, that of the model trained on it; it changes with the cases,
+/// whether the file is written again or edited, and goes with those that determine it.
 #[test]
 fn the_stopped_mass_stands_in_the_database() {
     let folder = tempfile::tempdir().unwrap();
@@ -266,7 +266,7 @@ fn the_stopped_mass_stands_in_the_database() {
     let said =
         format!("crush law: {:.0} kg of the crush zone come to rest within ", m[m.len() - 1]);
     assert_eq!(listed.matches(&said).count(), 1, "{listed}");
-    // Written anew, then edited because something of others is in it.
+    // Written again, then edited because something of others is in it.
     crumple_ok(here, &["db", "rm", "curves.h5", "--group", WALL, "--case", "72kmh"]);
     let without = stopped_mass(&path).unwrap();
     assert!(without != built && is_sound(here));
@@ -443,7 +443,7 @@ fn db_check_finds_wrong_lengths_order_and_holes() {
         },
         &[("time_order", "original/time_s[51] is ")],
     );
-    // States cut out of all columns, as of a run that was cleared of them: only the hole shows.
+    // States cut out of all columns, as for a run that was cleared of them: only the hole shows.
     t(
         &|file| {
             for name in ["original/time_s", "original/deflection_m", "original/force_N"] {
@@ -465,7 +465,7 @@ fn db_check_finds_wrong_lengths_order_and_holes() {
     );
     t(
         &|file| file.group(WALL).unwrap().delete("48kmh").unwrap(),
-        &[("case_list", "is listed in the group's cases, but is not there")],
+        &[("case_list", "is listed in the group's cases, but is missing")],
     );
 }
 
@@ -488,7 +488,7 @@ fn other_layouts_are_refused() {
         });
         let error = crumple_fails(folder.path(), 1, &["db", "ls", "curves.h5"]);
         let expected = format!(
-            "curves.h5: its layout has version {version}, this program reads versions 2 to 3: build the database anew"
+            "curves.h5: its layout has version {version}, this program reads versions 2 to 3: build the database again"
         );
         assert!(error.contains(&expected), "{error}");
     }
@@ -525,7 +525,7 @@ fn a_case_is_shown_without_reading_the_others() {
     assert!(crumple_ok(folder.path(), &both) == before);
 }
 
-/// Damage is not made good by writing it again; the study's own runs are read anew.
+/// Damage is not made good by writing it again; the study's own runs are read again.
 #[test]
 fn an_altered_case_stays_altered_until_it_is_built_anew() {
     let folder = tempfile::tempdir().unwrap();
@@ -638,7 +638,7 @@ fn build_keeps_what_others_put_into_the_database() {
     let before = fs::read(&path).unwrap();
     let error = crumple_fails(here, 1, &["build", study.to_str().unwrap(), "-o", "curves.h5"]);
     assert!(
-        error.contains("curves.h5 holds what crumple has not written and would lose by writing it again: attribute lead-car-wall/36kmh/force_N/units, attribute lead-car-wall/36kmh/reviewed_by, dataset lead-car-wall/36kmh/photo"),
+        error.contains("curves.h5 holds objects that crumple did not write and would lose by rewriting the file: attribute lead-car-wall/36kmh/force_N/units, attribute lead-car-wall/36kmh/reviewed_by, dataset lead-car-wall/36kmh/photo"),
         "{error}"
     );
     assert!(fs::read(&path).unwrap() == before);
@@ -836,7 +836,7 @@ fn writers_of_one_file_do_not_mix() {
         let error = crumple_fails(here, 1, &["histories", input, "-o", "out.csv"]);
         assert_eq!(
             error,
-            "error: cannot write out.csv: another process is writing it: try again when it has finished; what was there before is unchanged\n"
+            "error: cannot write out.csv: another process is writing it: try again when it has finished; the previous content is unchanged\n"
         );
         Ok(None::<()>)
     })
@@ -879,7 +879,7 @@ fn a_file_beyond_the_limit_of_the_session_is_said() {
         assert_eq!(
             error,
             format!(
-                "error: cannot write {path}: the file would be larger than the limit of this session (ulimit -f) or of the disk; what was there before is unchanged\n"
+                "error: cannot write {path}: the file would be larger than the limit of this session (ulimit -f) or the disk allows; the previous content is unchanged\n"
             )
         );
     }
@@ -936,10 +936,10 @@ fn a_folder_that_is_not_there_is_named() {
             assert!(!error.contains("unchanged"), "nothing was there: {error}");
         }
     };
-    t("nodir/x.csv", "the folder nodir does not exist: make it, or name another");
-    t("no/dir/x.csv", "the folder no/dir does not exist: make it, or name another");
-    t("m.model/x.csv", "m.model is a file and no folder: name another");
-    t("m.model/in/x.csv", "m.model is a file and no folder: name another");
+    t("nodir/x.csv", "the folder nodir does not exist: create it, or name another");
+    t("no/dir/x.csv", "the folder no/dir does not exist: create it, or name another");
+    t("m.model/x.csv", "m.model is a file, not a folder: name another");
+    t("m.model/in/x.csv", "m.model is a file, not a folder: name another");
     assert_eq!(entries(here), ["curves.h5", "m.model"]);
 }
 
@@ -978,7 +978,7 @@ fn the_only_group_needs_no_name() {
 }
 
 /// Changed numbers of a database stop every command that reads them, with the case named;
-/// `--accept-changed` goes on, and what changes or removes the case is let through.
+/// `--accept-changed` continues, and what changes or removes the case is let through.
 #[test]
 fn changed_numbers_are_not_read_in_silence() {
     let folder = demo_folder();
@@ -1028,7 +1028,7 @@ fn changed_numbers_are_not_read_in_silence() {
         .unwrap();
     let predict = ["predict", "x.model", "--speed", "50km/h"];
     let error = crumple_fails(here, 1, &predict);
-    assert!(error.contains("x.model: the model is not the one that was written"), "{error}");
+    assert!(error.contains("x.model: the model does not match its fingerprint"), "{error}");
     crumple_ok(here, &[&predict[..], &["--accept-changed"]].concat());
     // A file without a fingerprint, of an earlier program: what its energies show.
     let (old, _) = text.split_once(",\"fingerprint\"").unwrap();

@@ -177,7 +177,7 @@ fn odd_names_make_sound_archives() {
     }
 }
 
-/// 10 000 pairs of deflection and largest deflection for each law: the same bits.
+/// 10 000 pairs of deflection and maximum deflection for each law: the same bits.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]
 fn the_c_law_is_ours_bit_by_bit() {
@@ -225,7 +225,7 @@ fn the_c_law_is_ours_bit_by_bit() {
 }
 
 /// Wrong order, unknown variables, numbers that are none: errors with a message, and nothing changes.
-/// States go on bit by bit; instances do not meet.
+/// States continue bit by bit; instances do not meet.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]
 fn wrong_calls_are_refused_and_states_go_on() {

@@ -97,7 +97,7 @@ fn trees_are_those_of_the_definition() {
     }
 }
 
-/// Larger than what is numbered anew: every sample is still found where it belongs.
+/// Larger than what is numbered again: every sample is still found where it belongs.
 #[test]
 fn large_trees_repeat_their_data() {
     let x = Array2::from_shape_fn((20_000, 3), |(i, k)| {

@@ -197,7 +197,7 @@ fn layers_name_only_what_is_below() {
     for path in files(&root().join("src"), "rs") {
         let this = module(&path);
         let text = fs::read_to_string(&path).unwrap();
-        // The command line stands above all rooms.
+        // The command line is above all rooms.
         if ["lib", "main", "cli"].contains(&this.as_str()) {
             continue;
         }
@@ -240,7 +240,7 @@ fn only_one_room_names_the_hdf5_library() {
 fn the_library_never_prints_and_holds_one_unsafe_block() {
     for path in files(&root().join("src"), "rs") {
         let text = fs::read_to_string(&path).unwrap();
-        // The memory map, which a user asks for: its reason stands there.
+        // The memory map, which a user asks for: its reason is there.
         let allowed = usize::from(path.ends_with("src/solver/source.rs"));
         assert_eq!(text.matches("unsafe {").count(), allowed, "{}", path.display());
         if module(&path) != "cli" {

@@ -11,7 +11,7 @@ use serde_json::Value;
 
 use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, entries};
 
-/// The curve of all these files: a flank, a fall, a plateau; in m and N.
+/// The curve of all these files: a rise, a fall, a plateau; in m and N.
 pub const POINTS: [(f64, f64); 5] =
     [(0.0, 0.0), (0.05, 3e6), (0.25, 1e6), (0.5, 1.5e6), (1.0, 2.0e6)];
 
@@ -265,7 +265,7 @@ fn mat_files_of_both_byte_orders() {
         is_points(&read_bytes("b.mat", &other, &given(Some("SI"))).unwrap().0, "other");
         let error = read_bytes("b.mat", &other, &given(None)).unwrap_err();
         assert!(
-            error.contains("b.mat: the file does not say its units: give them with --units"),
+            error.contains("b.mat: the file does not state its units: give them with --units"),
             "{error}"
         );
     }
@@ -393,13 +393,13 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         "a.csv",
         csv("0,0\n2,2\n1,3\n3,4\n"),
         None,
-        &["line 4: the deflection must increase", "or a column of times"],
+        &["line 4: the deflection must increase", "or a time column"],
     );
     t(
         "a.csv",
         csv("0,0\n1,2\n2,-1\n3,4\n"),
         None,
-        &["line 4: the force is -1 N", "write pull as 0"],
+        &["line 4: the force is -1 N", "write tension as 0"],
     );
     t(
         "a.csv",
@@ -467,7 +467,7 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         "a.bin",
         [0u8, 159, 146, 150],
         None,
-        &["the format of this file follows neither from its content", "--from"],
+        &["the format of this file cannot be recognised by its content", "--from"],
     );
     for empty in ["a.csv", "a.json", "a.k", "a.txt", "a.mat", "a.cur", "a.mme"] {
         t(empty, "", None, &["expected a curve, found an empty file"]);
@@ -477,7 +477,7 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         "a.k",
         deck("x", card, &fields(1.0, 1.0)),
         None,
-        &["the file does not say its units", "\"$ units: mm-t-s\""],
+        &["the file does not state its units", "\"$ units: mm-t-s\""],
     );
     t(
         "a.k",
@@ -513,7 +513,7 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         &["expected a *DEFINE_CURVE, found none in this deck"],
     );
     let table = |head: &str| format!("#1\n{head}\n{}", rows(1.0, 1.0, " ", "."));
-    t("a.txt", table("double nose(5,2)"), None, &["does not say its units", "# d [m], F [N]"]);
+    t("a.txt", table("double nose(5,2)"), None, &["does not state its units", "# d [m], F [N]"]);
     t(
         "a.txt",
         table("double fd_load(9,2)"),
@@ -555,8 +555,8 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         &mat[..60],
         None,
         &[
-            "byte 0: matrix fd_load declares 5 rows of 2, but the file has 32 bytes behind its name",
-            "it may be cut",
+            "byte 0: matrix fd_load declares 5 rows of 2, but the file has 32 bytes after its name",
+            "it may be truncated",
         ],
     );
     t("a.mat", &mat[..10], None, &["byte 0: expected a matrix of a MAT file of version 4"]);
@@ -601,7 +601,7 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         "a.cur",
         "x (m)\ny (N)\n0 0\n1 2 3\n",
         None,
-        &["line 4: expected two numbers, or CONTINUE behind a curve"],
+        &["line 4: expected two numbers, or CONTINUE after a curve"],
     );
 }
 
@@ -613,13 +613,13 @@ fn memory_is_bounded_by_the_number_of_curves_and_points() {
         let error = error.unwrap_err();
         assert!(error.contains(expected), "{name}: {error}");
     }
-    t("a.k", "*DEFINE_CURVE\n1\n", 20_000, "more than 10000 curves: take out the one");
+    t("a.k", "*DEFINE_CURVE\n1\n", 20_000, "more than 10000 curves: extract the one");
     t("a.cur", "CONTINUE\n", 20_000, "more than 10000 curves");
     t("a.rad", "/FUNCT/1\n", 20_000, "more than 10000 curves");
     t("a.mo", "package a\n", 20_000, "more than 10000 curves");
     t("a.csv", "a;b c,d\te ", 2_000_000, "expected a column deflection");
     t("a.txt", "1 2 3\n", 1_100_000, "more than 1000000 points");
-    t("a.csv", "1,1\n", 1_100_000, "more than 1000000 points: thin it");
+    t("a.csv", "1,1\n", 1_100_000, "more than 1000000 points: thin it out");
     t("a.cur", "1 1\n", 1_100_000, "more than 1000000 points");
     t("a.cur", "a (m) ", 1_000_000, "expected a curve: lines of two numbers");
 }
@@ -717,14 +717,18 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
     t(
         2,
         &["--speed", &v, "--mass", "24t"],
-        "nose.csv: the file does not say what its speed is measured against: give --kind wall",
+        "nose.csv: the file does not state what its speed is measured against: give --kind wall",
     );
     t(
         2,
         &["--speed", &v, "--kind", "wall"],
-        "nose.csv: the file does not say the mass of the body: give --mass",
+        "nose.csv: the file does not state the mass of the body: give --mass",
     );
-    t(2, &WALL, "nose.csv: the file does not say its speed: give --speed, such as --speed 36km/h");
+    t(
+        2,
+        &WALL,
+        "nose.csv: the file does not state its speed: give --speed, such as --speed 36km/h",
+    );
     t(2, &["--speed", "36"], "speed \"36\" has no unit");
     let with = |more: &[&'static str]| -> Vec<String> {
         WALL.iter()
@@ -741,7 +745,7 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
     t_with(
         2,
         &["other.csv"],
-        "--speed is given 1 time for 2 files: give it once for each file, in their order",
+        "--speed is given 1 time for 2 files: give it once for each file, in the same order",
     );
     t_with(2, &["--case", "a", "--case", "b"], "--case is given 2 times for 1 file");
     t_with(2, &["--other-mass", "3t"], "a wall has no mass: remove --other-mass");
@@ -754,12 +758,12 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
     t(
         1,
         &["--kind", "wall", "--mass", "240t", "--speed", &v],
-        "nose.csv: the curve takes up 0.1000 times the kinetic energy of 240.0 t",
+        "nose.csv: the curve absorbs 0.1000 times the kinetic energy of 240.0 t",
     );
     t(
         1,
         &["--kind", "wall", "--mass", "24t", "--speed", &v, "--unloading", "1MN/m"],
-        "is softer than the line from the largest deflection",
+        "is softer than the line from the maximum deflection",
     );
     // The second file is missing: the first is not written either.
     t(
@@ -846,7 +850,7 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
         1,
         &adding(&["--speed", "10m/s", "--kind", "wall", "--mass", "24kg", "--case", "b"]),
     );
-    assert!(error.contains("such an impact cannot be"), "{error}");
+    assert!(error.contains("such an impact is impossible"), "{error}");
     assert!(error.contains("--accept-energy"), "{error}");
 }
 
@@ -950,7 +954,7 @@ fn predicted_curves_come_back_as_a_group_that_trains() {
             "--replace",
         ],
     );
-    assert!(error.contains("case \"36kmh\" of group \"lead-car-wall\" is of the study \"lead car to rigid wall\", which builds it"), "{error}");
+    assert!(error.contains("case \"36kmh\" of group \"lead-car-wall\" belongs to the study \"lead car to rigid wall\", which builds it"), "{error}");
 }
 
 /// What crumple export writes comes back: the loading branch without the points that other tools
@@ -991,7 +995,7 @@ fn exported_curves_come_back() {
         let stiffness = facts.unloading_stiffness_n_per_m.unwrap();
         assert!((stiffness / expected.unloading_stiffness_n_per_m.unwrap() - 1.0).abs() < 1e-8);
         assert!(
-            curve.notes.iter().any(|n| n.contains("beyond the maximal crush of")),
+            curve.notes.iter().any(|n| n.contains("beyond the maximum crush of")),
             "{file}: {:?}",
             curve.notes
         );

@@ -1,4 +1,4 @@
-//! `crumple init`: studies proposed for run folders, held against the ones that were written by
+//! `crumple init`: studies proposed for run folders, compared with the ones that were written by
 //! hand and against crashes whose numbers are known; scenarios proposed for models; and the commands
 //! that go with them, `inspect` of folders and `build` without arguments.
 
@@ -188,7 +188,7 @@ fn a_binout_gives_the_proposal_of_its_texts() {
             let means = "\"smp d R14 (from OpenRadioss T01)\": a mean over two intervals";
             assert!(from.as_str().unwrap().starts_with(&format!("{by} {means}")), "{from}");
         };
-        said(&mut of_text, "its second line says");
+        said(&mut of_text, "its second line reads");
         said(&mut of_binout, "its version is");
         assert_eq!(of_text, of_binout, "{group_name}");
         crumple_ok(&here, &["build", "-q"]);
@@ -267,14 +267,14 @@ fn every_value_says_where_it_is_from() {
     }
     assert!(above("kind").contains("guessed: one body moves, and a rigid wall stops it"));
     assert!(above("deflection").contains("node \"COG of the rigid trailing mass\""));
-    assert!(above("filter").contains("read: its second line says"), "{}", above("filter"));
-    assert!(text.contains("# CANNOT BE SEEN: is this one body of a pair"));
+    assert!(above("filter").contains("read: its second line reads"), "{}", above("filter"));
+    assert!(text.contains("# CANNOT BE DETERMINED: is this one body of a pair"));
     assert!(text.contains("\n# half_model = true\n"));
     assert!(text.contains(
         "# read: x_velocity of 900001 in the first state: -3333.33 mm/s\nspeed = \"12km/h\""
     ));
     assert!(
-        text.contains("# mass: computed: impulse of the force over the change of velocity, behind")
+        text.contains("# mass: computed: impulse of the force over the change of velocity, after")
     );
     assert!(text.lines().all(|line| line.chars().count() <= 110), "no line is too long");
     // The same as one document.
@@ -298,7 +298,7 @@ fn half_models_are_asked_for() {
     let output = crumple_in(&here, &["init"]);
     assert!(output.status.success());
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(said.contains("the folders' names say twice the recorded speeds"), "{said}");
+    assert!(said.contains("the folders' names state twice the recorded speeds"), "{said}");
     let ours = study(&here, "study.toml");
     assert_eq!(ours["study"]["kind"].as_str(), Some("wall"));
     assert_eq!(by_path(&ours)[0].1, 6.0, "12kmh");
@@ -437,7 +437,7 @@ fn pairs_have_both_bodies() {
     assert!(text.contains("or side = \"surfb\", which has the same force"), "{text}");
     assert!(text.contains("or node 9: follows the impulse within"), "{text}");
     assert!(text.contains("or rcforc 1: \"box of truck\", bodies follow it within"), "{text}");
-    // In the other order if that is asked for.
+    // In the other order if that is requested.
     crumple_ok(&here, &["init", "--node", "9", "--minus-node", "6", "-o", "turned.toml"]);
     let turned = study(&here, "turned.toml");
     assert_eq!(turned["recipe"]["deflection"]["node"].as_integer(), Some(9));
@@ -481,7 +481,7 @@ fn a_pair_without_forces_is_guessed() {
         (Some("pair"), Some("guessed"))
     );
     let why = kind["from"].as_str().unwrap();
-    assert!(why.starts_with("two bodies move, and their velocities change against each other"));
+    assert!(why.starts_with("two bodies move, and their changes of momentum balance"));
     let deflection = &document["deflection"];
     assert_eq!(deflection["evidence"], "guessed");
     assert_eq!(deflection["value"]["node"], 6);
@@ -511,7 +511,7 @@ fn a_pair_without_forces_is_guessed() {
     let cases = Database::read(&here.join("curves.h5")).unwrap();
     let case = &cases.cases("pair")[0];
     assert!(case.curves.sampled.force_n().iter().copied().fold(0.0, f64::max) > 1e5);
-    // What the caller says of the bodies stands above it.
+    // What the caller says of the bodies is above it.
     crumple_ok(&here, &["init", "--node", "8", "--minus-node", "6", "-o", "turned.toml"]);
     let turned = study(&here, "turned.toml");
     assert_eq!(turned["study"]["kind"].as_str(), Some("pair"));
@@ -564,7 +564,7 @@ fn masses_are_never_made_up() {
     assert!(output.status.success());
     let said = String::from_utf8(output.stderr).unwrap();
     assert!(
-        said.contains("fill in mass of 50kmh: it follows from no force and no energy; say --mass"),
+        said.contains("fill in mass of 50kmh: no force and no energy give it: use --mass"),
         "{said}"
     );
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
@@ -587,7 +587,7 @@ fn masses_are_never_made_up() {
     );
 }
 
-/// A section stands for the force only where nothing else does, and tells no mass.
+/// A section is used for the force only if nothing else is, and gives no mass.
 #[test]
 fn a_section_is_the_last_choice() {
     let history = Crash::default().run();
@@ -615,7 +615,7 @@ fn a_section_is_the_last_choice() {
     assert_eq!(force["file"].as_str(), Some("rwforc"));
 }
 
-/// A last state right behind the one before would keep the force from being filtered.
+/// A last state right after the one before would keep the force from being filtered.
 #[test]
 fn a_last_state_off_the_raster_is_cut() {
     let mut history = Crash::default().run();
@@ -698,15 +698,15 @@ fn what_is_no_run_is_named_and_left_out() {
             "{text}"
         );
     };
-    said("again", "its files hold the same bytes as those of 48kmh");
-    said("converted", "its histories are those of 36kmh");
+    said("again", "its files are identical to those of 48kmh");
+    said("converted", "its histories are identical to those of 36kmh");
     said("died", "it died: nodout holds 3 whole states (line 33: the file ends");
     said(
         "aborted",
-        "it died: the record ends at 66.754 ms, while the bodies still close at 62 % of",
+        "it terminated early: the record ends at 66.754 ms, while the bodies still close at 62 % of",
     );
     said("empty", "the folder is empty");
-    said("planned", "it holds a deck and nothing that a solver wrote: it has not run");
+    said("planned", "it holds a deck but no solver output: it has not been run");
     said(
         "energies",
         "it has no histories of nodes (a nodout, or a binout or T01 with one): it has glstat",
@@ -732,13 +732,13 @@ fn a_run_that_died_early_says_where_its_record_ends() {
     keep(&killed.join("nodout"), "\n\n\n n o d a l   p r i n t", 20);
     let document = json(&crumple_ok(&here, &["init", "--json"]));
     assert_eq!(document["runs"].as_array().unwrap().len(), 4);
-    let died = "it died: the record ends at 14.253 ms, while the bodies still close at 93 % of their first speed";
+    let died = "it terminated early: the record ends at 14.253 ms, while the bodies still close at 93 % of their first speed";
     assert_eq!(left_out(&document), [("killed".into(), died.into())]);
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
     assert!(text.contains("\n# [[run]]\n# path = \"killed\"\n"), "{text}");
     // Alone its units are not known.
     let error = crumple_fails(&here, 1, &["init", "killed", "-o", "killed.toml"]);
-    assert!(error.contains("  killed: it died: the record ends at 0.0142"), "{error}");
+    assert!(error.contains("  killed: it terminated early: the record ends at 0.0142"), "{error}");
     assert!(error.contains("while the bodies still close at 93 %"), "{error}");
     assert!(!here.join("killed.toml").exists());
     // A force that ends early ends the record, too.
@@ -770,13 +770,13 @@ fn runs_of_another_recipe_are_reported_and_not_merged() {
     let said = |folder: &str| &out.iter().find(|(path, _)| path == folder).unwrap().1;
     assert_eq!(
         said("other_node"),
-        "it needs another recipe than the other runs: it has no moving node 900001; there 5001 \"COG of the rigid trailing mass\" would be taken"
+        "it needs a different recipe from the other runs: it has no moving node 900001; there 5001 \"COG of the rigid trailing mass\" would be taken"
     );
     assert_eq!(
         said("other_wall"),
-        "it needs another recipe than the other runs: rwforc 1 does not move its bodies, rwforc 2 does"
+        "it needs a different recipe from the other runs: rwforc 1 does not move its bodies, rwforc 2 does"
     );
-    assert!(said("pair").starts_with("it needs another recipe than the other runs: "));
+    assert!(said("pair").starts_with("it needs a different recipe from the other runs: "));
     assert_eq!(document["runs"].as_array().unwrap().len(), 4);
 }
 
@@ -838,7 +838,12 @@ fn nothing_is_overwritten() {
     let (_folder, here) = four_runs();
     fs::write(here.join("study.toml"), "mine").unwrap();
     let error = crumple_fails(&here, 1, &["init"]);
-    assert!(error.contains("study.toml is there already, and nothing is written over it: name another with -o, or remove it"), "{error}");
+    assert!(
+        error.contains(
+            "study.toml exists already and is not overwritten: name another with -o, or remove it"
+        ),
+        "{error}"
+    );
     assert_eq!(fs::read(here.join("study.toml")).unwrap(), b"mine");
     crumple_fails(&here, 1, &["init", "-o", "25kmh"]);
     let error = crumple_fails(&here, 2, &["init", "-o", "-", "--json"]);
@@ -920,7 +925,7 @@ fn what_the_caller_knows_stands_above_what_is_found() {
     );
 }
 
-/// A run that holds its histories as text and as T01 is read from the text, and it is said.
+/// A run that holds its histories as text and as T01 is read from the text, and it is reported.
 #[test]
 #[ignore = "needs ../shared (the real files)"]
 fn of_several_files_with_one_history_one_is_chosen() {
@@ -936,7 +941,10 @@ fn of_several_files_with_one_history_one_is_chosen() {
         notes,
         ["nodout is read, crashT01 holds it too", "rwforc is read, crashT01 holds it too"]
     );
-    assert_eq!(left_out(&document), [("copy".into(), "its histories are those of 36kmh".into())]);
+    assert_eq!(
+        left_out(&document),
+        [("copy".into(), "its histories are identical to those of 36kmh".into())]
+    );
     assert_eq!(document["runs"][0]["mass_kg"]["value"], 24_000.0);
 }
 
@@ -1085,7 +1093,7 @@ fn inspect_takes_folders() {
     );
     fs::create_dir(above.join("empty")).unwrap();
     let error = crumple_fails(above, 1, &["inspect", "empty"]);
-    assert!(error.contains("empty: no folder in it holds solver files"), "{error}");
+    assert!(error.contains("empty: none of its folders holds solver files"), "{error}");
 }
 
 #[test]

@@ -23,7 +23,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// What is said where a file is refused.
+/// What is reported where a file is refused.
 fn refused(name: &str, bytes: &[u8], options: &ReadOptions) -> String {
     match read_bytes(name, bytes, options) {
         Ok((curve, format)) => panic!("{format} took {}: {curve:?}", text(bytes)),
@@ -39,7 +39,7 @@ fn has(notes: &[String], part: &str) {
 fn titles_above_the_header_are_skipped() {
     let mm = |separator, decimal| rows(1e-3, 1e3, separator, decimal);
     let head = "Presse 4, Werk 2\nDatum: 12.03.2024\nSpecimen: 12\n\n";
-    let note = "titles: lines 1 to 3 are titles and no part of the table: \"Presse 4, Werk 2\", \"Datum: 12.03.2024\", \"Specimen: 12\"";
+    let note = "titles: lines 1 to 3 are titles, not part of the table: \"Presse 4, Werk 2\", \"Datum: 12.03.2024\", \"Specimen: 12\"";
     for table_text in [
         format!("Weg;Kraft\n[mm];[kN]\n{}", mm(";", ",")),
         format!("Weg;Kraft\n(mm);(kN)\n\n{}", mm(";", ".")),
@@ -81,7 +81,7 @@ fn titles_above_the_header_are_skipped() {
     wrong(
         "Weg;Kraft",
         "Hub;Last",
-        "line 5: expected a column deflection with its unit, such as d_m or d_mm, found \"Hub\"; or say which column it is with --deflection-column",
+        "line 5: expected a column deflection with its unit, such as d_m or d_mm, found \"Hub\"; or choose the column with --deflection-column",
     );
     wrong("\n[mm];[kN]", "", "line 5: the deflection has no unit (\"Weg\")");
 }
@@ -109,8 +109,7 @@ fn headers_of_instruments() {
             rows(1e-3, 1e3, ";", ".").lines().map(|line| format!("{line};7\n")).collect();
         let text = format!("d [mm];Force [kN];{other}\n{rows}");
         let notes = table("a.csv", text.as_bytes(), &given(None));
-        let is_said =
-            notes.iter().any(|n| n == &format!("columns: not taken: \"{other}\" (force)"));
+        let is_said = notes.iter().any(|n| n == &format!("columns: not used: \"{other}\" (force)"));
         assert_eq!(is_said, ["Force, filtered [kN]", "Kraft"].contains(&other), "{notes:?}");
     }
 }
@@ -226,7 +225,7 @@ fn texts_in_every_encoding() {
         ([b"\xEF\xBB\xBF", good.as_bytes()].concat(), None),
         ([vec![0xFF, 0xFE], pairs(u16::to_le_bytes)].concat(), Some("text: UTF-16, little-endian")),
         ([vec![0xFE, 0xFF], pairs(u16::to_be_bytes)].concat(), Some("text: UTF-16, big-endian")),
-        (latin1, Some("text: Latin-1, as it is no UTF-8")),
+        (latin1, Some("text: Latin-1, because it is not UTF-8")),
     ] {
         for name in ["a.csv", "a.txt"] {
             let (curve, _) = read_bytes(name, &bytes, &given(None)).unwrap();
@@ -301,7 +300,7 @@ fn curves_of_ls_prepost() {
     wrong(
         &single.replace("#pts=5", "#pts=6"),
         None,
-        "line 5: the curve declares 6 points (#pts), but the file has 5 for it: write the file anew, it may be cut",
+        "line 5: the curve declares 6 points (#pts), but the file has 5 for it: write the file again: it may be truncated",
     );
     wrong(
         &single.replace("1000   2000000\n", ""),
@@ -449,8 +448,8 @@ fn jumps_of_the_force_are_taken_and_said() {
     let ratio = case["work_over_energy"].as_f64().unwrap();
     assert!((ratio - 1.0).abs() < 1e-3, "{ratio}");
     let notes = case["notes"].to_string();
-    assert!(notes.contains("points: 1 that repeat the one before removed"), "{notes}");
-    assert!(notes.contains("the force jumps from 0 to 1000000 N at 0 m (line 2), from 1000000 to 2000000 N at 0.4 m (line 4), from 2000000 to 1000000 N at 0.7 m (line 6): the points there are set apart by 0.0001 of the largest deflection"), "{notes}");
+    assert!(notes.contains("points: 1 removed (repeats of the previous one)"), "{notes}");
+    assert!(notes.contains("the force jumps from 0 to 1000000 N at 0 m (line 2), from 1000000 to 2000000 N at 0.4 m (line 4), from 2000000 to 1000000 N at 0.7 m (line 6): the points there are set apart by 0.0001 of the maximum deflection"), "{notes}");
     // Such a curve trains nothing by itself, but it runs and goes out.
     crumple_ok(here, &["export", "new.h5", "--to", "lsdyna", "-o", "a.k"]);
     // Back and forth is still refused.
@@ -511,11 +510,11 @@ fn radioss_functions() {
     wrong(&two, &si, "choose one with --curve: 5 (\"nose 5\"), 6 (\"nose 6\")");
     let seven = ReadOptions { curve: Some("7".into()), ..si.clone() };
     wrong(&two, &seven, "the file has no curve \"7\": it has 5 (\"nose 5\")");
-    wrong(&one, &given(None), "the file does not say its units");
+    wrong(&one, &given(None), "the file does not state its units");
     wrong(
         &begin("x"),
         &si,
-        "expected a /FUNCT, found none in this file (of a run's files the starter, _0000.rad, has them)",
+        "expected a /FUNCT, found none in this file (in a run, the starter, _0000.rad, has them)",
     );
     wrong("/RUN/x/1\n0.2\n/TFILE/4\n0.1\n", &si, "expected a /FUNCT");
     wrong(
@@ -553,7 +552,7 @@ fn radioss_functions() {
     wrong(
         &smooth,
         &si,
-        "line 2: expected /FUNCT/5 with points between which it is straight, in the units of the deck, found /FUNCT_SMOOTH/5: write it as such points",
+        "line 2: expected /FUNCT/5 with linear interpolation between its points, in the units of the deck, found /FUNCT_SMOOTH/5: write it as such points",
     );
     t(
         &(smooth + &one.replace("/5", "/7")),
@@ -563,7 +562,7 @@ fn radioss_functions() {
     wrong(
         &one.replace("FUNCT/5", "FUNCT/5/2"),
         &si,
-        "line 1: expected /FUNCT/5 with points between which it is straight, in the units of the deck, found /FUNCT/5/2",
+        "line 1: expected /FUNCT/5 with linear interpolation between its points, in the units of the deck, found /FUNCT/5/2",
     );
     let five = ReadOptions { curve: Some("5".into()), ..si.clone() };
     wrong(&format!("{one}{one}"), &five, "the file has 2 curves \"5\": leave one of them in it");
@@ -604,7 +603,7 @@ fn exported_decks_and_packages_come_back() {
         "model Spring\n  Real x;\nend Spring;\n",
         "expected a package that crumple export wrote (constant Real d[…], f[…]), found none: write other curves as a table text (#1, double name(n,2)), CSV or MAT file",
     );
-    wrong(&mo[..mo.find("constant Real f").unwrap() + 200], "it may be cut");
+    wrong(&mo[..mo.find("constant Real f").unwrap() + 200], "it may be truncated");
     wrong(&mo.replacen("0.00000000E+00", "zero", 1), "expected a number, found \"zero\"");
     wrong(&mo.replacen("constant Real d[", "constant Real d[1", 1), "constant d declares");
     wrong(
@@ -685,7 +684,7 @@ fn a_folder_of_several_tests_names_them() {
         [&["db", "add", "c.h5"][..], files, &["--group", "g", "--kind", "wall"]].concat()
     };
     let error = crumple_fails(here, 1, &add(&["tests"]));
-    assert!(error.contains("tests: the folder holds 7 ISO-MME tests: give those that are meant, each by itself: tests/12kmh tests/18kmh"), "{error}");
+    assert!(error.contains("tests: the folder holds 7 ISO-MME tests: give each one you need separately: tests/12kmh tests/18kmh"), "{error}");
     crumple_ok(here, &add(&["tests/36kmh", "tests/48kmh"]));
     // Several tests in one folder: each by its .mme file.
     fs::create_dir_all(here.join("flat/Channel")).unwrap();
@@ -719,7 +718,7 @@ fn an_impossible_import_speaks_of_the_file() {
         crumple_fails(folder.path(), 1, &[&arguments[..], &WALL, more].concat())
     };
     let error = refused(speed() * 0.577, &[]);
-    assert!(error.contains("takes up 3.0") && error.contains("look at units, speed and mass; at whether the curve ends at the maximal crush of this impact, neither before nor behind; and at whether its columns are deflection and force of the whole body. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"), "{error}");
+    assert!(error.contains("absorbs 3.0") && error.contains("check units, speed and mass; whether the curve ends at the maximum crush of this impact, neither before nor after it; and whether its columns are deflection and force of the whole body. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"), "{error}");
     let error = refused(speed() * 0.5_f64.sqrt(), &[]);
     assert!(error.contains("likely the mass, half a structure taken for a whole one"), "{error}");
     let error = refused(speed() * 0.5, &[]);
@@ -851,7 +850,7 @@ fn a_legacy_curve_is_exported_directly() {
     t(
         2,
         &["export", "nose.csv", "--to", "csv", "--kind", "wall"],
-        "nose.csv: the file does not say its speed: give --speed",
+        "nose.csv: the file does not state its speed: give --speed",
     );
     t(
         2,
@@ -867,7 +866,7 @@ fn a_legacy_curve_is_exported_directly() {
     t(
         2,
         &["export", "c.h5", "--to", "csv", "--kind", "wall"],
-        "are for the file of a measured or legacy curve",
+        "apply only to the file of a measured or legacy curve",
     );
     t(
         1,

@@ -1,6 +1,6 @@
 //! Messages: pages of `tests/messages`, errors as JSON, help, man pages, narrow terminals.
 //!
-//! A page of messages is a test: what stands before its first case is done at the beginning of each.
+//! A page of messages is a test: what is before its first case is done at the beginning of each.
 //! A heading `##` is a case; a block with a file's name is that file, `diff` changes it, `sh` prepares,
 //! and `console` shows what each command prints, on standard error too, and its exit code. A command
 //! that fails leaves no file behind. To write the pages again (and look at the difference):
@@ -151,7 +151,7 @@ vehicles = [ { name = \"A1\", mass = \"24t\" } ]
 curve = \"c\"
 ";
 
-/// With `--json` an error is one document on standard output, and nothing else is said.
+/// With `--json` an error is one document on standard output, and nothing else is reported.
 #[test]
 fn errors_as_json() {
     let folder = tempfile::tempdir().unwrap();

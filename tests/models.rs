@@ -22,7 +22,7 @@ use serde_json::Value;
 
 const GROUPS: [&str; 3] = ["lead-car-pair", "lead-car-wall", "vehicle-pair"];
 
-/// A body of `mass_kg` against a wall, stopped by `force(d, ḋ)` and thrown back on a line of
+/// A body of `mass_kg` against a wall, stopped by `force(d, ḋ)` and rebounded on a line of
 /// 100 MN/m; 400 states each 0.75 ms.
 pub fn case(name: &str, v: f64, mass_kg: f64, force: &dyn Fn(f64, f64) -> f64) -> Case {
     let (mut d, mut speed, mut largest) = (0.0_f64, v, 0.0_f64);
@@ -276,7 +276,7 @@ fn student_t(n: usize) -> f64 {
     (n as f64).sqrt() * low.tan()
 }
 
-/// Root mean square of the residuals of one force at the inner speeds, left out, in ratio to the local level and over
+/// Root mean square of the residuals of one force at the inner speeds, left out, relative to the local level and over
 /// one gap, times Student's t for the independent stretches of the curves: the half width of its band at the mean of
 /// the gaps.
 fn half_width_by_hand(cases: &[Case], rule: MaxCrushRule, force: ForceKind) -> f64 {
@@ -377,7 +377,7 @@ fn a_declared_body_force_has_one_band() {
     assert_eq!(bands, [ForceKind::Body]);
 }
 
-/// Models trained before the body force had a band are read; what they lack is said.
+/// Models trained before the body force had a band are read; what they lack is reported.
 #[test]
 fn older_models_have_no_band_of_the_body_force() {
     let folder = demo_folder();
@@ -390,7 +390,7 @@ fn older_models_have_no_band_of_the_body_force() {
     std::fs::write(here.join("older.model"), model.to_string()).unwrap();
     let predict = |model: &str| crumple_ok(here, &["predict", model, "--speed", "50km/h"]);
     let (newer, older) = (predict("lead.model"), predict("older.model"));
-    let said = "band of body force   not known until the model is trained anew";
+    let said = "band of body force   unknown until the model is trained again";
     assert!(older.contains(said) && !newer.contains(said), "{older}");
     for (text, bands) in [(&newer, 2), (&older, 1)] {
         assert_eq!(text.matches("\n  band                 ±").count(), bands, "{text}");
@@ -403,7 +403,7 @@ fn older_models_have_no_band_of_the_body_force() {
     std::fs::write(here.join("s.toml"), scenario).unwrap();
     let error = crumple_fails(here, 1, &["simulate", "s.toml"]);
     assert!(
-        error.contains("no band around its body force: remove band, or train the model anew"),
+        error.contains("no band around its body force: remove band, or train the model again"),
         "{error}"
     );
 }
@@ -642,7 +642,7 @@ fn several_parameters() {
             let curve = predict(&model, &ask(angle, obstacle)).unwrap();
             curve.force_n.iter().copied().fold(0.0, f64::max)
         };
-        // At the cases themselves the models must tell them apart.
+        // At the cases themselves the models must distinguish them.
         let (wall, pole, tilted) = (peak(0.0, "wall"), peak(0.0, "pole"), peak(10.0, "wall"));
         assert!((pole / wall - 0.7).abs() < 0.06, "{}: {}", options.name(), pole / wall);
         assert!((tilted / wall - 0.8).abs() < 0.06, "{}: {}", options.name(), tilted / wall);
@@ -821,7 +821,7 @@ fn jumps_of_the_collapse_are_warned_of() {
     assert!(codes(8.0).contains(&"out_of_range"));
 }
 
-/// Parameters stand in the manifest, the database, the model and the prediction.
+/// Parameters are in the manifest, the database, the model and the prediction.
 #[test]
 fn parameters_through_the_commands() {
     let folder = tempfile::tempdir().unwrap();
@@ -871,7 +871,7 @@ fn parameters_through_the_commands() {
     assert!(!here.join("m2").exists());
 }
 
-/// For trains the ends of the range count; a group whose runs tell no stopped mass says so, and the choice goes on.
+/// For trains the ends of the range count; a group whose runs tell no stopped mass says so, and the choice continues.
 #[test]
 fn the_choice_for_trains_counts_the_ends() {
     let demo = demo_folder();
@@ -880,7 +880,7 @@ fn the_choice_for_trains_counts_the_ends() {
         crumple_ok(demo.path(), &all)
     };
     let text = of("vehicle-pair", &["--for", "train"]);
-    let ends = "mean force error with the ends of the range ";
+    let ends = "mean force error, ends of the range included, ";
     assert!(text.contains(ends) && text.contains("that follows the closing speed"), "{text}");
     let plain = of("vehicle-pair", &[]);
     assert!(!plain.contains(ends));
@@ -913,15 +913,18 @@ fn the_choice_for_trains_counts_the_ends() {
         "no.model",
     ];
     let error = crumple_fails(demo.path(), 1, &arguments);
-    assert!(error.contains("model crush-law needs runs from whose momentum"), "{error}");
+    assert!(
+        error.contains("model crush-law takes the mass stopped in the crush zone from momentum"),
+        "{error}"
+    );
     assert!(!demo.path().join("no.model").exists());
-    // That a group is not for one of the models is said, but is nothing to be warned of.
+    // That a group is not for one of the models is reported, but is nothing to be warned of.
     let validated = ["validate", "curves.h5", "--group", "lead-car-pair", "--strict", "-v"];
     let table = crumple_ok(demo.path(), &validated);
     assert!(table.contains("lead-car-pair: without crush-law: "), "{table}");
 }
 
-/// Left-out errors of the bundled groups: the crush law where the runs tell one, and what is said of them in the
+/// Left-out errors of the bundled groups: the crush law where the runs tell one, and what is reported of them in the
 /// documents, alone and with the second design. Bands cover what was left out as they promise, on average.
 #[test]
 fn left_out_speeds_of_the_bundled_groups() {
@@ -1061,7 +1064,7 @@ fn a_speed_without_an_answer_is_named() {
     }
     assert_eq!(missing, 1, "{:?}", found.notes);
     let said = found.notes.iter().find(|n| n.starts_with("forest at 108 km/h: no row: ")).unwrap();
-    assert!(said.contains("the maximal crush by the spline rule is -"), "{said}");
+    assert!(said.contains("the maximum crush by the spline rule is -"), "{said}");
 }
 
 /// With three speeds there is nothing to choose by without one of them.
@@ -1074,7 +1077,7 @@ fn nested_validation_says_why_it_cannot_be() {
         let output = crumple_in(here, &["validate", "c.h5", "--nested", "--strict", "--json"]);
         assert_eq!(output.status.code(), Some(3));
         let said = format!(
-            "auto has no errors of its own: choosing anew without a speed needs at least 4, the group has {n}"
+            "auto has no errors of its own: choosing again without one speed needs at least 4, the group has {n}"
         );
         let error = String::from_utf8(output.stderr).unwrap();
         assert!(error.contains(&said), "{error}");
@@ -1204,7 +1207,7 @@ fn contact_and_body_force_rebound_alike() {
 }
 
 /// FE's own body force, with its own unloading, gives FE's motion back at every speed: velocity
-/// within 0.4 %, acceleration (CFC 60) within 5 %, to 30 ms after the largest crush.
+/// within 0.4 %, acceleration (CFC 60) within 5 %, to 30 ms after the maximum crush.
 #[test]
 fn the_recorded_force_gives_the_recorded_motion_back() {
     for (group, speeds) in [("lead-car-wall", 7), ("vehicle-pair", 9)] {
@@ -1257,7 +1260,7 @@ fn what_drives_a_train_is_the_prediction() {
 }
 
 /// The advice of `--next`, judged: of every two speeds that are not neighbours, both left out, one
-/// is asked for. What is left is the error at the other one, trained with the one that was run.
+/// is requested. What is left is the error at the other one, trained with the one that was run.
 #[test]
 fn the_next_run_is_nearly_the_best_of_two() {
     let folder = tempfile::tempdir().unwrap();

@@ -1,6 +1,6 @@
 //! The way of a new user from raw run folders to the report: the commands of
 //! docs/from-runs-to-train.md and those that `crumple` names without arguments, in folders that hold
-//! nothing but what a solver wrote; and what is said when something is not as it should be.
+//! nothing but what a solver wrote; and what is reported when something is not as it should be.
 
 use std::fs;
 use std::path::Path;
@@ -95,7 +95,7 @@ fn the_page_leads_from_all_files_of_a_solver_to_a_report() {
     }
 }
 
-/// What `crumple` shows as the usual order of work can be typed as it stands there, also where
+/// What `crumple` shows as the usual order of work can be typed as it is there, also where
 /// folders have names with spaces and umlauts.
 #[test]
 fn the_usual_order_of_work_works() {
@@ -140,7 +140,7 @@ fn a_killed_run_says_nothing_of_the_others() {
         let output = crumple_in(here, &["init", "runs", "-o", &format!("{states}.toml")]);
         assert_eq!(String::from_utf8(output.stderr).unwrap(), "", "{states} states");
         let printed = String::from_utf8(output.stdout).unwrap();
-        let died = "left out: runs/48kmh: it died: the record ends at ";
+        let died = "left out: runs/48kmh: it terminated early: the record ends at ";
         assert!(printed.contains(died), "{printed}");
         let without_its_run: Vec<&str> =
             printed.lines().filter(|line| !line.starts_with("left out: ")).collect();
@@ -165,7 +165,10 @@ fn a_killed_run_says_nothing_of_the_others() {
     let first: Vec<&str> = text.split_inclusive('\n').take(40).collect();
     fs::write(&rwforc, first.concat()).unwrap();
     let printed = crumple_ok(here, &["init", "runs", "-o", "force.toml"]);
-    assert!(printed.contains("left out: runs/48kmh: it died: the record ends at 22."), "{printed}");
+    assert!(
+        printed.contains("left out: runs/48kmh: it terminated early: the record ends at 22."),
+        "{printed}"
+    );
     assert!(printed.contains("\n36kmh  36 km/h     24.00 "), "{printed}");
 }
 
@@ -196,11 +199,12 @@ fn what_is_not_as_it_should_be_is_said_with_what_to_do() {
     let printed = crumple_ok(here, &["init", "runs"]);
     assert!(printed.contains("left out: runs/48kmh: the folder is empty"), "{printed}");
     assert!(
-        printed
-            .ends_with("wrote study.toml (1 run): look at what is guessed, then crumple build\n")
+        printed.ends_with(
+            "wrote study.toml (1 run): check the guessed values, then run crumple build\n"
+        )
     );
     // What is left to fill in is counted where the next step is named.
     fs::remove_file(here.join("runs/36kmh/rwforc")).unwrap();
     let printed = crumple_ok(here, &["init", "runs", "-o", "mass.toml"]);
-    assert!(printed.ends_with("wrote mass.toml (1 run): not complete, 1 line to fill in or to give as an option: then crumple build\n"), "{printed}");
+    assert!(printed.ends_with("wrote mass.toml (1 run): incomplete, 1 line to fill in or to give as an option; then run crumple build\n"), "{printed}");
 }

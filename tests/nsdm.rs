@@ -52,7 +52,7 @@ fn cases() -> Vec<Case> {
     report.database.cases("lead-car-wall").to_vec()
 }
 
-/// FE's body from contact to 30 ms after the largest deflection.
+/// FE's body from contact to 30 ms after the maximum deflection.
 fn window(case: &Case) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let end_s = case.curves.original.time_s()[case.loading_end()] + 0.030;
     let states = case.curves.sampled.time_s().iter().take_while(|&&t| t <= end_s).count();

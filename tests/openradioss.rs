@@ -315,7 +315,7 @@ fn restarted(bytes: &[u8], header: usize, first: usize, again: usize) -> [Vec<u8
     [part(&states[..first * state]), part(&states[(first - again) * state..])]
 }
 
-/// T01 and T02 are one record, whose impulses go on.
+/// T01 and T02 are one record, whose impulses continue.
 #[test]
 fn a_restart_goes_on_where_the_run_ended() {
     let folder = tempfile::tempdir().unwrap();
@@ -342,10 +342,10 @@ fn a_restart_goes_on_where_the_run_ended() {
     assert!(listed.contains("runT01") && !listed.contains("runT02"), "{listed}");
     fs::rename(at("runT02"), at("runT03")).unwrap();
     let message = section(&at("runT01"), "nodout").problems[0].to_string();
-    assert_eq!(message, "runT02 is not there, so that what continues behind it is not read");
+    assert_eq!(message, "runT02 is missing, so its continuation is not read");
     fs::remove_file(at("runT01")).unwrap();
     let message = section(&at("runT03"), "nodout").problems[0].to_string();
-    assert_eq!(message, "runT02 is not there, so that the record begins late");
+    assert_eq!(message, "runT02 is missing, so the record starts late");
     // What does not hold the same is not joined.
     fs::write(at("runT01"), written(3040, &[(0, 9, 9), (102, 1, 6)], 5)).unwrap();
     fs::write(at("runT02"), written(3040, &[(0, 8, 9), (102, 1, 6)], 5)).unwrap();
@@ -353,7 +353,7 @@ fn a_restart_goes_on_where_the_run_ended() {
     assert_eq!(file.time.len(), 5);
     assert_eq!(
         file.problems[0].to_string(),
-        "T02, which goes on, holds other histories: it is not read, nor what follows"
+        "T02, the continuation, holds other histories: it and what follows are not read"
     );
 }
 
@@ -402,14 +402,14 @@ fn every_group_is_read() {
     let notes = section(&path, "rwforc").notes;
     assert_eq!(
         notes[1],
-        "no tangential impulses are recorded of 3: the forces there are the normal ones alone"
+        "no tangential impulses are recorded for 3: their forces are the normal ones alone"
     );
-    // The variables of one object may stand in several groups: no force is then half of one.
+    // The variables of one object may be in several groups: no force is then half of one.
     fs::write(&path, written(3040, &[(102, 3, 3), (102, 3, 6)], 5)).unwrap();
     assert_eq!(value("rwforc", 3, "x_force"), 6.0 * 1024.0);
 }
 
-/// The last force of a record that goes on is a difference over one interval.
+/// The last force of a record that continues is a difference over one interval.
 #[test]
 fn a_cut_record_says_that_its_last_force_will_change() {
     let bytes = written(3040, &[(0, 9, 9), (102, 3, 6)], 50);
@@ -424,6 +424,6 @@ fn a_cut_record_says_that_its_last_force_will_change() {
     assert!(!said("rwforc"));
     assert!(
         section(&path, "rwforc").notes[0]
-            .ends_with("the last force changes where the record goes on")
+            .ends_with("the last force changes when the record continues")
     );
 }

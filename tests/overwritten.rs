@@ -236,7 +236,7 @@ fn our_nodout_with_many_nodes() {
     damage_and_cut("nodout", &fixture("fe/lead-car-pair/36kmh/nodout"));
 }
 
-/// A binary file has no check sums: zeros among values are only known by what stands around
+/// A binary file has no checksums: zeros among values are only known by what stands around
 /// them. A value whose neighbours in time are zero as well cannot be known to be damaged, nor
 /// can one in the first state.
 fn damage_binary(format: &str, path: &Path, size: usize) {

@@ -45,8 +45,9 @@ fn describe(page: &mut String, command: &[String]) {
 
 #[test]
 fn the_command_line_is_described() {
-    let mut page =
-        String::from("# Command line\n\nWhat `crumple COMMAND --help` prints, of every command.\n");
+    let mut page = String::from(
+        "# Command line\n\nThe output of `crumple COMMAND --help` for every command.\n",
+    );
     describe(&mut page, &[]);
     assert!(
         page.matches("\n### crumple ").count() >= 18 && page.contains("\n#### crumple db copy\n")
@@ -57,7 +58,7 @@ fn the_command_line_is_described() {
 #[test]
 fn exit_codes_and_error_codes_are_described() {
     let mut page = String::from(
-        "# Exit codes and error codes\n\nScripts can rely on both: a code never changes its meaning.\n\n| exit code | meaning |\n|---|---|\n",
+        "# Exit codes and error codes\n\nScripts can rely on both: codes never change their meaning.\n\n| exit code | meaning |\n|---|---|\n",
     );
     for (code, meaning) in EXIT_CODES {
         writeln!(page, "| {code} | {meaning} |").unwrap();

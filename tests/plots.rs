@@ -1,4 +1,4 @@
-//! Pictures: no text leaves one or overlaps another, series can be told apart, the bytes are always the same.
+//! Pictures: no text leaves one or overlaps another, series can be distinguished, the bytes are always the same.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -210,7 +210,7 @@ fn every_kind_of_file_is_drawn() {
             &[
                 "FE at 48 km/h",
                 "FE at 60 km/h",
-                "maximal crush",
+                "maximum crush",
                 "empirical 90 % range from 5 left-out inner speeds",
             ],
         ),

@@ -151,13 +151,13 @@ fn units_and_factors_are_those_of_the_arguments() {
     let error = crumple_fails(here, 1, &["rate", "a.csv", "t.csv"]);
     assert_eq!(
         error,
-        "error: a.csv lasts 0.199 s and t.csv 199 s, if both count time in s: write the unit of each behind its name, such as a.csv,time=s and t.csv,time=ms\n"
+        "error: a.csv lasts 0.199 s and t.csv 199 s, if both count time in s: write the unit of each after its name, such as a.csv,time=s and t.csv,time=ms\n"
     );
     let said = ["a.csv,time=s", "t.csv,time=ms"];
     assert!(rate(here, &said)["l1_ratio"].as_f64().unwrap() < 1e-12);
     // Both in ms: nothing compares them, but a filter sees it.
     let error = crumple_fails(here, 1, &["rate", "t.csv", "t.csv", "--cfc", "60"]);
-    assert!(error.contains("it lasts 199 s, so its times may be in ms: then write ,time=ms behind the file's name; else filter with a lower class"), "{error}");
+    assert!(error.contains("it lasts 199 s, so its times may be in ms: then write ,time=ms after the file's name; else use a lower class"), "{error}");
     let both = rate(here, &["t.csv,time=ms", "t.csv,time=ms", "--cfc", "60"]);
     assert_eq!(both["to_s"], 0.199);
 }
@@ -186,7 +186,7 @@ fn histories_of_other_programs() {
     assert!(error.contains("a.cur: line 2, column 1 (\"Time <TIME/0.001>;\"): expected a time in s: write a.cur,time=ms"), "{error}");
     let error = crumple_fails(here, 1, &["rate", "a.csv", "a.cur"]);
     assert!(
-        error.contains("name one of \"A900001\", \"B900002\" behind the file's name: a.csv:COLUMN"),
+        error.contains("name one of \"A900001\", \"B900002\" after the file's name: a.csv:COLUMN"),
         "{error}"
     );
     // Whatever its name says.
@@ -231,12 +231,12 @@ fn wrong_input_says_where_and_what_to_do() {
     t(
         &["a.csv", "b.csv"],
         1,
-        "b.csv: there are several columns: name one of \"v\", \"a_m_per_s2[B1]\" behind the file's name: b.csv:COLUMN",
+        "b.csv: there are several columns: name one of \"v\", \"a_m_per_s2[B1]\" after the file's name: b.csv:COLUMN",
     );
     t(
         &["a.csv:w", "b.csv"],
         1,
-        "a.csv: there is no column \"w\": name one of \"a_m_per_s2[A1]\" behind the file's name: a.csv:COLUMN",
+        "a.csv: there is no column \"w\": name one of \"a_m_per_s2[A1]\" after the file's name: a.csv:COLUMN",
     );
     t(&["a.csv", "b.csv:v"], 1, "b.csv: line 2, column 2 (\"v\"): expected a number");
     t(
@@ -248,7 +248,7 @@ fn wrong_input_says_where_and_what_to_do() {
     t(
         &["a.csv", "back.csv"],
         1,
-        "back.csv: line 4, column 1 (\"t\"): time 0.1 does not come after 0.2: times must rise strictly",
+        "back.csv: line 4, column 1 (\"t\"): time 0.1 does not come after 0.2: times must increase strictly",
     );
     t(&["a.csv", "few.csv"], 1, "few.csv: a: a signal needs at least 5 samples, found 2");
     t(&["a.csv", "empty.csv"], 1, "empty.csv: the table is empty");
@@ -260,7 +260,7 @@ fn wrong_input_says_where_and_what_to_do() {
     t(
         &["a.csv", "a.csv", "--from=0.5s"],
         1,
-        "what is asked for, from 0.5 s to 0.199 s, lies outside the common times",
+        "the requested interval, from 0.5 s to 0.199 s, lies outside the common times",
     );
     t(&["a.csv", "none.csv"], 1, "none.csv: No such file");
     t(&["a.csv", "none.csv:v"], 1, "none.csv: No such file");
@@ -276,8 +276,9 @@ fn wrong_input_says_where_and_what_to_do() {
     );
     let error = crumple_fails(here, 1, &["rate", "a.csv", "note"]);
     assert!(
-        error
-            .contains("a CSV file has the ending .csv, or its column behind its name: note:COLUMN"),
+        error.contains(
+            "a CSV file has the extension .csv, or its column after its name: note:COLUMN"
+        ),
         "{error}"
     );
     t(
@@ -288,7 +289,7 @@ fn wrong_input_says_where_and_what_to_do() {
     t(
         &["a.csv", "a.csv", "--id=1"],
         2,
-        "--id chooses a history of a solver's file, but that is a CSV",
+        "--id chooses a history of a solver file, but this is a CSV",
     );
     let nodout = fixture("fe/lead-car-wall/36kmh/nodout");
     let nodout = nodout.to_str().unwrap();
@@ -299,7 +300,7 @@ fn wrong_input_says_where_and_what_to_do() {
     t(
         &[nodout, nodout, "--component=x_velocity", "--column=x"],
         2,
-        "--column names a column of a CSV file, but that is a solver's",
+        "--column names a column of a CSV file, but this is a solver",
     );
 }
 
@@ -316,7 +317,7 @@ fn degenerate_and_long_signals_are_rated() {
     assert_eq!((&of["l1_ratio"], &of["samples"]), (&Value::Null, &491.into()));
     assert_eq!(
         String::from_utf8_lossy(&text.stderr),
-        "warning: the reference is zero throughout: there is nothing to be relative to\n"
+        "warning: the reference is zero throughout: relative measures are undefined\n"
     );
     let of = rate(here, &["one.csv", "one.csv"]);
     assert_eq!((&of["iso18571"]["rating"], &of["cora"]["rating"]), (&1.0.into(), &1.0.into()));
@@ -327,7 +328,7 @@ fn degenerate_and_long_signals_are_rated() {
     assert!(of["warnings"][0].as_str().unwrap().contains("too many for ISO/TS 18571 and CORA"));
 }
 
-/// A file of a run that died is rated as far as it goes, and that is said.
+/// A file of a run that died is rated as far as it goes, and that is reported.
 #[test]
 fn damage_of_a_solver_file_is_a_warning() {
     let folder = tempfile::tempdir().unwrap();

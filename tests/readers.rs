@@ -780,9 +780,7 @@ fn of_a_state_written_twice_the_last_writing_counts() {
     assert_eq!(values(&file, 1, "normal_force"), [1e6, 1e5, 1e6]);
     assert_eq!(codes(&file), [ProblemCode::RepeatedState]);
     let message = file.problems[0].to_string();
-    assert!(
-        message.ends_with("the state at time 0.045002 is written twice: the last writing counts")
-    );
+    assert!(message.ends_with("the state at time 0.045002 is written twice: the last one counts"));
     // States as near to each other as their times can tell are not.
     let near = ["1.00000E+01", "1.00001E+01", "1.00001E+01", "1.00002E+01"].map(|t| (t, one));
     let file = read("rwforc", &wall_rows(&near));
@@ -800,7 +798,7 @@ fn of_a_state_written_twice_the_last_writing_counts() {
     assert_eq!(codes(&file), [ProblemCode::RepeatedState]);
 }
 
-/// What is left of a number is not another number: the state is left out, and it is said.
+/// What is left of a number is not another number: the state is left out, and it is reported.
 #[test]
 fn cut_numbers_are_not_read() {
     let states = |damaged: usize, value: &str| -> SolverFile {
@@ -991,7 +989,7 @@ fn a_time_that_lost_digits_is_named() {
     let file = read("matsum", &text);
     assert_eq!(&file.time[..], [0.0, 1.0, 3.0]);
     assert!(codes(&file).contains(&ProblemCode::BadLine));
-    // The first one is said by those below.
+    // The first one is reported by those below.
     let text = part("0.500E+00") + &part("1.0000E+00") + &part("2.0000E+00");
     assert_eq!(read("matsum", &text).problems[0].line, Some(4));
 }

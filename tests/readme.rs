@@ -53,7 +53,7 @@ documents! {
     feeding_importing_holds: "docs/feeding/importing.md";
 }
 
-/// Runs all commands of a document and holds it against what they print.
+/// Runs all commands of a document and compares it with what they print.
 fn holds(name: &str) {
     let path = root().join(name);
     let text = std::fs::read_to_string(&path).unwrap();
@@ -88,7 +88,7 @@ fn with_outputs(text: &str, here: &Path) -> String {
                 run(command, here);
             }
             (Some("console"), command) => {
-                // What stands there as output is replaced by what is printed.
+                // What is there as output is replaced by what is printed.
                 let Some(command) = command.strip_prefix("$ ") else { continue };
                 out += line;
                 out += &run(command, here);

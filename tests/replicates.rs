@@ -48,9 +48,9 @@ fn twice(cases: &[Case]) -> Vec<Case> {
     cases.iter().flat_map(|c| [c.clone(), again(c)]).collect()
 }
 
-/// Of n runs, deviations from their mean in ratio to it, by hand: the force is the same at every
+/// Of n runs, deviations from their mean relative to it, by hand: the force is the same at every
 /// deflection, so its local level is its mean. That holds but for the last millimetre, where the
-/// stronger runs have turned back while their mean goes on.
+/// stronger runs have turned back while their mean continues.
 #[test]
 fn a_known_scatter_comes_out() {
     let speeds = [8.0, 16.0];
@@ -82,7 +82,7 @@ fn a_known_scatter_comes_out() {
     near(both.velocity_l1, (2.0 * three.velocity_l1 + both.speeds[1].velocity_l1) / 3.0);
 }
 
-/// The velocities by another route: sums over the states up to 30 ms after the largest deflection.
+/// The velocities by another route: sums over the states up to 30 ms after the maximum deflection.
 #[test]
 fn the_scatter_of_velocities_is_that_of_the_records() {
     let mut cases = [8.0, 16.0].map(|v| flat(&format!("v{v}"), v, 0.0)).to_vec();
@@ -199,7 +199,7 @@ fn runs_of_the_same_bytes_change_no_prediction() {
     }
 }
 
-/// Parameters tell runs apart that would else be replicates, and one of each kind is not.
+/// Parameters distinguish runs that would else be replicates, and one of each kind is not.
 #[test]
 fn replicates_agree_in_parameters() {
     let mut cases = twice(&family(&[8.0, 12.0, 16.0]));
@@ -246,12 +246,12 @@ fn every_command_takes_replicates() {
     assert_eq!(scatter["speeds"][0]["runs"], serde_json::json!(["a", "b"]));
     crumple_ok(here, &["train", "c.h5", "--group", "made", "-o", "m.model"]);
     let text = crumple_ok(here, &["predict", "m.model", "--speed", "12m/s"]);
-    assert!(text.contains("scatter between equal runs ±"), "{text}");
+    assert!(text.contains("scatter between repeated runs ±"), "{text}");
     crumple_ok(here, &["export", "m.model", "--speed", "12m/s", "-o", "m.csv"]);
     let all = ["compare", "c.h5", "--group", "made", "--speed", "12m/s", "--nsdm-seeds", "0"];
     crumple_ok(here, &all);
     crumple_ok(here, &["report", "c.h5", "-o", "r.html"]);
-    assert!(std::fs::read_to_string(here.join("r.html")).unwrap().contains("Equal runs lie apart"));
+    assert!(std::fs::read_to_string(here.join("r.html")).unwrap().contains("Repeated runs differ"));
     // Another recipe is not a replicate.
     cases[4].provenance.recipe = r#"{"recipe": {"filter": "CFC60"}}"#.into();
     database_of(&here.join("d.h5"), &[("made", cases)]);

@@ -30,7 +30,7 @@ fn the_demo_ends_with_a_small_page_that_needs_nothing() {
     }
     for text in [
         "Warnings",
-        "How far predictions lie from FE",
+        "Accuracy of predictions",
         "Predicted curve at",
         "Methods",
         "Scenario scenario.toml",
@@ -43,7 +43,7 @@ fn the_demo_ends_with_a_small_page_that_needs_nothing() {
     ] {
         assert!(page.contains(text), "{text}");
     }
-    // Without the script, pictures and tables stand there.
+    // Without the script, pictures and tables are there.
     assert!(page.matches("<svg viewBox").count() >= 15 && page.matches("<table>").count() >= 15);
 }
 

@@ -1,4 +1,4 @@
-//! Every value of the real LS-DYNA samples, held against an independent reading.
+//! Every value of the real LS-DYNA samples, compared with an independent reading.
 //!
 //! The program reads fixed columns; the reading here knows no columns: it finds numbers by
 //! their grammar, so that the two cannot share a mistake about layout.
@@ -478,7 +478,7 @@ fn every_sample_is_read_or_refused() {
                 "ncforc" => "an LS-DYNA text file of a kind that is not read",
                 "d3plot" => {
                     assert!(path.is_dir());
-                    "no folder in it holds solver files"
+                    "none of its folders holds solver files"
                 }
                 _ => {
                     assert_eq!(output.status.code(), Some(0), "{shown}: {error}");

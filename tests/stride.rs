@@ -298,7 +298,7 @@ fn blocks_and_maps_give_the_same() {
     assert_eq!(left.len(), 4, "{left:?}");
 }
 
-/// The nodes of each component stand in a dataset of their own.
+/// The nodes of each component are in a dataset of their own.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]
 fn h5py_finds_the_nodes_of_what_was_written_state_by_state() {

@@ -302,7 +302,7 @@ fn factors_and_each() {
          { what = \"force\", curve = \"inner\", values = [1, 2] },\n\
          { what = \"force\", curve = \"nose\", values = [1, 2] } ]\n",
     );
-    // An unloading stiffness that is asked for is not scaled, the curve's own is.
+    // An unloading stiffness that is requested is not scaled, the curve's own is.
     let text = folder.text("s.toml");
     folder.put(
         "s.toml",
@@ -380,7 +380,7 @@ fn h5py_finds_in_hdf5_what_csv_holds() {
     assert!(compare_with_csv(&folder) > 20);
 }
 
-/// The same of a file that is not put together in memory, and of its shards.
+/// The same for a file that is not put together in memory, and of its shards.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]
 fn h5py_finds_in_large_hdf5_what_csv_holds() {
@@ -439,7 +439,7 @@ fn items_that_fail_are_rows_with_their_reason() {
     let output = crumple_in(folder.path(), &["sweep", "s.toml", "-o", "out.csv"]);
     assert_eq!(output.status.code(), Some(0));
     let error = String::from_utf8(output.stderr).unwrap();
-    assert!(error.contains("4 of 6 items failed; their rows say why"), "{error}");
+    assert!(error.contains("4 of 6 items failed; their rows give the reason"), "{error}");
     assert!(error.contains("item 1: the mass of A1 is 0 kg: expected more than 0"), "{error}");
     let (_, rows) = rows(&folder.text("out.csv"));
     let status: Vec<&str> = rows.iter().map(|r| r[r.len() - 2].as_str()).collect();
@@ -685,7 +685,7 @@ fn another_sweeps_file_is_not_taken_up() {
     assert!(error.contains("the row of item 11 is missing or damaged"), "{error}");
 }
 
-/// What cannot be written is said; rows that are there stay for the next time.
+/// What cannot be written is reported; rows that are there stay for the next time.
 #[cfg(target_os = "linux")]
 #[test]
 fn full_disks_and_missing_folders() {
@@ -715,7 +715,7 @@ fn a_second_writer_is_known() {
     assert_eq!(folder.names(), ["out.csv"]);
 }
 
-/// Ctrl-C: what is done stays, and it is said how to go on.
+/// Ctrl-C: what is done stays, and it is reported how to continue.
 #[cfg(unix)]
 #[test]
 fn an_interrupt_ends_behind_the_rows_that_are_done() {
@@ -738,9 +738,9 @@ fn an_interrupt_ends_behind_the_rows_that_are_done() {
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(1));
     let error = String::from_utf8(output.stderr).unwrap();
-    assert!(error.contains("of 200000 rows; the same command goes on there"), "{error}");
+    assert!(error.contains("of 200000 rows; the same command resumes there"), "{error}");
     let done: usize =
-        error.split("stopped behind ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        error.split("stopped after ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert_eq!(folder.text("out.csv.part").lines().count(), 8 + done);
     assert!(!folder.path().join("out.csv").exists());
 }
@@ -784,7 +784,7 @@ fn only_all_shards_of_one_sweep_are_merged() {
     assert!(error.contains("finished.h5 is HDF5: merge the shards as .csv"), "{error}");
     let error = folder.fails(2, "sweep merge -o p1.csv p1.csv p2.csv p3.csv");
     assert!(error.contains("names the input itself"), "{error}");
-    // Rows that end early, named by the first that is missing; those of a run that goes on, too.
+    // Rows that end early, named by the first that is missing; those of a run that continues, too.
     let text = folder.text("p2.csv");
     let lines: Vec<&str> = text.lines().collect();
     folder.put("cut.csv", &(lines[..lines.len() - 1].join("\n") + "\n"));
@@ -795,7 +795,7 @@ fn only_all_shards_of_one_sweep_are_merged() {
     assert!(error.contains("cut.csv: the row of item 5 is missing or damaged"), "{error}");
     folder.put("cut.csv", &format!("{text}8,more\n"));
     let error = folder.fails(1, "sweep merge -o all.csv p3.csv cut.csv p1.csv");
-    assert!(error.contains("there is something behind the last row"), "{error}");
+    assert!(error.contains("there is unexpected data after the last row"), "{error}");
 }
 
 #[test]

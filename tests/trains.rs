@@ -62,7 +62,7 @@ fn shipped_scenarios_run() {
 }
 
 /// Interior interfaces get curves for their own speeds, far below the trains'; all get the
-/// trains' speed if that is asked for.
+/// trains' speed if that is requested.
 #[test]
 fn interfaces_have_their_own_speeds() {
     let demo = demo_folder();
@@ -137,7 +137,7 @@ fn couplings_pull() {
     assert!(coupled["ledger"]["max_energy_error"].as_f64().unwrap() < 1e-3);
 }
 
-/// Stages stand in series on one stroke, with steps between them.
+/// Stages are in series on one stroke, with steps between them.
 #[test]
 fn stages_are_followed() {
     let text = scenario(
@@ -236,7 +236,7 @@ fn wrong_trains_are_explained() {
     let no_unloading = nose.replace(", unloading = \"100MN/m\"", "");
     t(&no_unloading, one, "it has stages, which do not say how they unload");
     let flat = nose.replace("stroke = \"300mm\"", "stroke = \"0.1mm\"");
-    t(&flat, one, "stage 2 has a stroke of 0.0001 m: expected over 0.2 mm");
+    t(&flat, one, "stage 2 has a stroke of 0.1 mm: expected more than 0.2 mm");
     let tension = nose.replace("unloading", "tension = \"pull\", unloading");
     t(&tension, one, "its tension curve \"pull\" is not in [curves]");
     let damper =
@@ -338,7 +338,7 @@ fn what_does_not_fit_in_a_train_is_said() {
     let swapped = compared(&swapped);
     assert!(swapped.contains("FE's record of A2 fits the run's A3"), "{swapped}");
     let late = compared(&text.replace("until =", "contact = \"8ms\"\nuntil ="));
-    assert!(late.contains("fits better by") && late.contains("when it is moved by +"), "{late}");
+    assert!(late.contains("fits better by") && late.contains("when it is shifted by +"), "{late}");
 }
 
 /// The mean deceleration of the summary is that of the histories: from the contact to where the
@@ -564,7 +564,7 @@ fn leaving_the_data_is_said() {
         assert_eq!(run["summary"]["limits"]["beyond_data"], serde_json::json!(["A1|wall"]));
         let printed = crumple_ok(here, &["simulate", "far.toml"]);
         assert!(
-            printed.contains("cannot be told: A1|wall left the data of the curve"),
+            printed.contains("unknown: A1|wall went beyond the data of its curve"),
             "{printed}"
         );
         let stops = text(&format!("{curve}, end = \"error\""), "200t");
@@ -577,7 +577,7 @@ fn leaving_the_data_is_said() {
     assert_eq!(run["summary"]["limits"]["beyond_data"], serde_json::json!([]));
 }
 
-/// A model, its predicted curve and what is exported of that go on alike beyond the maximal crush and
+/// A model, its predicted curve and what is exported of that go on alike beyond the maximum crush and
 /// the data: a heavy vehicle behind pushes the nose to where it bottoms.
 #[test]
 fn curves_of_one_model_go_on_alike() {
@@ -674,12 +674,12 @@ fn a_curve_of_another_impact_is_said() {
         (case, "48km/h"),
     ] {
         let shown = own.replace("km/h", " km/h");
-        let said = format!("it is of {shown}, and A1|wall meets at 36 km/h");
+        let said = format!("it is for {shown}, but A1|wall closes at 36 km/h");
         assert!(warnings(curve, "36km/h", "24t").contains(&said), "{curve}");
-        assert!(!warnings(curve, own, "24t").contains("it is of "), "{curve}");
+        assert!(!warnings(curve, own, "24t").contains("it is for "), "{curve}");
         if !curve.contains(".csv") {
             let heavy = warnings(curve, own, "30t");
-            assert!(heavy.contains("it is of 24.00 t, and A1|wall moves 30.00 t"), "{heavy}");
+            assert!(heavy.contains("it is for 24.00 t, but A1|wall moves 30.00 t"), "{heavy}");
         }
     }
 }

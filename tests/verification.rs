@@ -219,8 +219,8 @@ fn real_files(page: &mut String) {
 #[ignore = "needs ../shared (the real files)"]
 fn the_page_says_what_the_tests_find() {
     let mut page = String::from(
-        "# Verification\n\nNumbered cases, each held by a test of that name. A deviation is given as a share of its tolerance, rounded up; \
-         above 1 the test fails.\n\n## Closed forms\n\nTolerances are half a unit of the last digit that the case prints (7 to 8 digits), and \
+        "# Verification\n\nNumbered cases, each checked by the test named. Deviations are given relative to the tolerance, rounded up; \
+         above 1 the test fails.\n\n## Closed forms\n\nTolerances are half a unit of the last printed digit (7 to 8 digits), and \
          1e-9 m/s and m for the reference method.\n\n| no. | case | source | values compared | largest deviation / tolerance | test |\n|---|---|---|---|---|---|\n",
     );
     for (k, ((name, test), case, source)) in CLOSED.into_iter().enumerate() {
@@ -245,10 +245,10 @@ fn the_page_says_what_the_tests_find() {
         let no = CLOSED.len() + k + 1;
         writeln!(page, "| {no} | {what} | {against} | {tolerance} | `{file}::{test}` |").unwrap();
     }
-    page += "\n## Real files\n\nFiles of public projects and of our own runs, read without a problem or with the problem that their project \
-             names; `fixtures/samples` has those whose licence lets us hand them on.\n\n| kind | files | written by |\n|---|---|---|\n";
+    page += "\n## Real files\n\nFiles of public projects and of our own runs, read without problems or with the problem that their project \
+             reports; `fixtures/samples` contains those whose licence permits redistribution.\n\n| kind | files | written by |\n|---|---|---|\n";
     real_files(&mut page);
-    page += "\n## What no test can see\n\nA clock of the force that is off by less than about 3 ms; force, mass and speed that are wrong \
+    page += "\n## Not detectable\n\nA time shift of the force of less than about 3 ms; force, mass and speed that are wrong \
              together; one design that replaces another at a single speed and has the same title, level and order of peaks.\n";
     hold(&page);
 }

@@ -61,7 +61,7 @@ fn near_ids_come_first() {
     );
 }
 
-/// What inspect finds in a file that cannot be used stands in build's message.
+/// What inspect finds in a file that cannot be used is in build's message.
 #[test]
 fn a_run_that_fails_says_what_is_wrong_with_its_files() {
     let study = Study::new("lead-car-wall", "\"24t\"", "\"24t\"");
@@ -106,7 +106,7 @@ fn the_other_runs_go_on() {
     assert_eq!(list["groups"]["lead-car-wall"].as_array().unwrap().len(), 6);
 }
 
-/// A run that died: its complete states are used, and it is said.
+/// A run that died: its complete states are used, and it is reported.
 #[test]
 fn a_cut_run_is_used_as_far_as_it_goes() {
     let study = Study::new("lead-car-wall", "\"24t\"", "\"24t\"");
@@ -234,7 +234,7 @@ fn a_named_format_that_does_not_fit_is_an_error() {
         for command in ["histories", "inspect"] {
             let error = crumple_fails(here, 1, &[command, nodout, "--format", format]);
             let expected =
-                format!("this is not a {format}: it looks like a nodout, read it as that");
+                format!("this is not a {format}: it looks like a nodout: read it as such");
             assert!(error.contains(&expected), "{error}");
         }
     }
@@ -349,5 +349,8 @@ fn outputs_replace_no_other_kind_of_file() {
     fs::create_dir(elsewhere.path().join("crumple-demo")).unwrap();
     fs::write(elsewhere.path().join("crumple-demo/scenario.toml"), "# mine\n").unwrap();
     let error = crumple_fails(elsewhere.path(), 2, &["demo"]);
-    assert!(error.contains("scenario.toml exists and is not the demo's"), "{error}");
+    assert!(
+        error.contains("scenario.toml exists and differs from what the demo writes"),
+        "{error}"
+    );
 }

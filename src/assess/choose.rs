@@ -2,8 +2,8 @@
 //!
 //! `auto` considers the models that are at or below `nearest`, `linear` and `forest` in mean force error and in mean
 //! velocity error. Of these it takes the simplest one within 10 % of the smallest force error. Speeds inside the range and
-//! its two ends are reported apart. The errors of what was chosen flatter it, so `--nested` repeats the choice without each
-//! left-out speed. For trains the ends count as the inner speeds do, and of the best models those are taken first
+//! its two ends are reported separately. The errors of the chosen model are optimistic, so `--nested` repeats the choice without each
+//! left-out speed. For trains the ends count as much as the inner speeds, and among the best models those are preferred
 //! whose force follows the closing speed.
 
 use schemars::JsonSchema;
@@ -14,7 +14,7 @@ use crate::surrogate::MODELS;
 use crate::surrogate::leave_one_out::{Means, Validation};
 use crate::unit::km_per_h;
 
-/// Mean errors that differ by less are a tie: three to five speeds say no more.
+/// Mean errors that differ by less are a tie: three to five speeds resolve no more.
 const TIE: f64 = 0.10;
 
 /// Where the queries of a model will lie.
@@ -55,14 +55,14 @@ pub(crate) fn choose(means: &[Means], purpose: Purpose) -> Option<(String, Strin
     let (over, preferred) = match purpose {
         Purpose::Vehicle => ("", "the simplest"),
         Purpose::Train => {
-            (" with the ends of the range", "the simplest that follows the closing speed")
+            (", ends of the range included,", "the simplest that follows the closing speed")
         }
     };
     let best = means.iter().filter(keeps).map(|m| m.force_l1).fold(f64::INFINITY, f64::min);
     let tied = means.iter().filter(keeps).filter(|m| m.force_l1 <= (1.0 + TIE) * best);
     if let Some(chosen) = tied.min_by_key(|m| rank(m)) {
         let reason = format!(
-            "mean force error{over} {:.2} %, the smallest is {:.2} %; of those within 10 % {preferred}",
+            "{preferred} of the models whose mean force error{over} is within 10 % of the smallest (its own {:.2} %, smallest {:.2} %)",
             chosen.force_l1 * 100.0,
             best * 100.0
         );
@@ -72,7 +72,7 @@ pub(crate) fn choose(means: &[Means], purpose: Purpose) -> Option<(String, Strin
     let chosen = means.iter().min_by(|a, b| worst(a).total_cmp(&worst(b)))?;
     let compared: Vec<&str> = baselines().map(|m| m.model.as_str()).collect();
     let reason = format!(
-        "no model is at or below each of {} in both force and velocity; this one comes nearest (force {:.2} %, velocity {:.2} %)",
+        "no model is at least as good as each of {} in both force and velocity; this one comes closest (force {:.2} %, velocity {:.2} %)",
         compared.join(", "),
         chosen.force_l1 * 100.0,
         chosen.velocity_l1 * 100.0
@@ -108,7 +108,7 @@ pub struct Gap {
 }
 
 impl Gap {
-    /// The gaps with a known error first, the largest first; without errors the widest in ratio to
+    /// The gaps with a known error first, the largest first; without errors the widest relative to
     /// its speeds.
     fn rank(&self) -> (bool, f64) {
         let (low, high) = self.between_m_per_s;
@@ -119,7 +119,7 @@ impl Gap {
 /// The gaps between training speeds, those where a run would bring most first.
 ///
 /// A left-out speed is predicted over the gap that its absence leaves; the error expected
-/// in the middle of a gap is that of the speeds at its ends, in ratio of the gaps. Gaps at
+/// in the middle of a gap is that of the speeds at its ends, relative to the gaps. Gaps at
 /// the ends of the range have one such speed.
 pub fn gaps(set: &TrainingSet, validation: &Validation) -> Vec<Gap> {
     let mut speeds: Vec<f64> = set.cases.iter().map(|c| c.speed_m_per_s).collect();
@@ -158,13 +158,13 @@ pub(crate) fn next_run(set: &TrainingSet, validation: &Validation) -> Option<Nex
     let Gap { between_m_per_s: (low, high), expected_force_l1 } = gaps.next()?;
     let reason = match expected_force_l1 {
         Some(error) => format!(
-            "of all gaps between training speeds, the one from {} to {} has the largest expected force error ({:.1} %), judged by the speeds at its ends when they were left out",
+            "of all intervals between training speeds, the one from {} to {} has the largest expected force error ({:.1} %), estimated from the errors at its two ends when left out",
             km_per_h(low),
             km_per_h(high),
             error * 100.0
         ),
         None => format!(
-            "the gap from {} to {} is the widest in ratio to its speeds, and there are too few speeds to leave one out",
+            "the interval from {} to {} is the widest relative to its speeds, and there are too few speeds to leave one out",
             km_per_h(low),
             km_per_h(high)
         ),

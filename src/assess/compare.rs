@@ -1,4 +1,4 @@
-//! Comparison of the methods at a speed that is left out: the curve of each in one multi-body
+//! Comparison of the methods at a left-out speed: the curve of each in the same multi-body
 //! model, against FE.
 
 use schemars::JsonSchema;
@@ -30,16 +30,16 @@ pub(crate) struct Comparison {
     pub inner: bool,
     /// Mass of the one-mass model: the body's, or the reduced mass of a pair.
     pub mass_kg: f64,
-    /// From contact to 30 ms after FE's largest deflection, as far as the record reaches.
+    /// From contact to 30 ms after FE's maximum deflection, as far as the record reaches.
     pub window_s: f64,
-    /// Largest force of FE's record, in N.
+    /// Peak force of FE's record, in N.
     #[serde(rename = "reference_peak_force_N")]
     pub reference_peak_force_n: f64,
-    /// Largest deflection of FE's record, in m.
+    /// Maximum deflection of FE's record, in m.
     pub reference_max_crush_m: f64,
-    /// Time by the clock that FE took for this run, in s; null where its case file is missing.
+    /// Wall-clock time of FE for this run, in s; null where its case file is missing.
     pub fe_time_s: Option<f64>,
-    /// The same of the runs that the curves were made from.
+    /// The same for the runs that the curves were made from.
     pub training_time_s: Option<f64>,
     /// One row per method.
     pub rows: Vec<Row>,
@@ -70,11 +70,11 @@ pub(crate) struct NsdmFit {
     pub seed: u64,
     /// Ratio of the errors of the velocity at the speed it was fitted at.
     pub own_velocity_l1: f64,
-    /// The same of the acceleration.
+    /// The same for the acceleration.
     pub own_acceleration_l1: f64,
     /// Ratio of the errors of the velocity at the speed that is left out.
     pub velocity_l1: f64,
-    /// The same of the acceleration.
+    /// The same for the acceleration.
     pub acceleration_l1: f64,
     /// Time the fit took, in s.
     pub fit_time_s: f64,
@@ -164,7 +164,7 @@ fn left_out_at<'a>(speed_m_per_s: f64, set: &'a TrainingSet) -> Result<LeftOutCa
         Ok(left_out) => Ok(left_out),
         Err(NotLeftOut::Truncated { case }) => Err(error!(
             Comparison,
-            "case \"{case}\" ended while loading: it is not a reference; compare at another speed"
+            "case \"{case}\" ended while loading and cannot serve as the reference: compare at another speed"
         )),
         Err(NotLeftOut::Motion(error)) => Err(error),
         Err(NotLeftOut::TooFew { .. }) => Err(too_few()),
@@ -187,7 +187,7 @@ fn no_case(group: &str, asked_m_per_s: f64, set: &TrainingSet) -> Error {
     )
 }
 
-/// The one case that FDRM and NSDM use: of the speed that was asked for, else the nearest to
+/// The one case that FDRM and NSDM use: of the speed that was requested, else the nearest to
 /// `left_out_m_per_s`.
 fn fixed_case<'a>(
     group: &str,

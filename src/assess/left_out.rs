@@ -16,7 +16,7 @@ use crate::surrogate::predict::Prediction;
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query};
 use crate::unit::km_per_h;
 
-/// Fewest steps along FE's crush at which forces are compared.
+/// Minimum number of steps along FE's crush at which forces are compared.
 const STEPS: usize = 400;
 
 /// What to ask a model of this group's so that it predicts the case.
@@ -38,9 +38,9 @@ pub(crate) fn query_of(case: &Case, model: &Model) -> Query {
 
 /// A case that is left out, and what is left.
 pub(crate) struct LeftOutCase<'a> {
-    /// As the training set has it.
+    /// As in the training set.
     pub own: &'a TrainingCase,
-    /// Its records: a run, or the mean of the runs that it stands for.
+    /// Its records: a run, or the mean of the runs that it represents.
     pub case: &'a Case,
     /// The training set without the cases of its speed.
     pub rest: TrainingSet,
@@ -115,7 +115,7 @@ impl<'a> LeftOutCase<'a> {
         }
     }
 
-    /// Predicts the case by one model and every rule for the maximal crush.
+    /// Predicts the case by one model and every rule for the maximum crush.
     pub(super) fn trial(&self, kind: ModelKind) -> LeftOutRun<'_> {
         let to_text = |error: Error| error.to_string();
         let answers = || -> Result<Answers, Error> {
@@ -223,14 +223,14 @@ pub(super) fn rebounding(own: &TrainingCase, envelope: &Envelope) -> ForceCurve 
     )
 }
 
-/// A prediction by one rule for the maximal crush.
+/// A prediction by one rule for the maximum crush.
 pub(super) struct Answer {
     curve: PredictedCurve,
     pub energy_error: f64,
     pub max_crush_error: f64,
 }
 
-/// One model at one case by every rule that was asked, or why that has no answer.
+/// One model at one case by every requested rule, or why that is impossible.
 pub(super) type Answers = BTreeMap<MaxCrushRule, Result<Answer, String>>;
 
 /// A row of the table, and what bands are made of.
@@ -286,7 +286,7 @@ fn peak_errors(along: &[f64], reference: &[f64], predicted: &[f64]) -> Vec<PeakE
 /// Why a case cannot be left out.
 #[derive(Debug, thiserror::Error)]
 pub enum NotLeftOut {
-    /// Its largest deflection is not known.
+    /// Its maximum deflection is not known.
     #[error("case \"{case}\" ended while loading: not left out")]
     Truncated {
         /// Its name.

@@ -116,7 +116,7 @@ pub(super) fn fit_nsdm(fixed: &Case, settings: &ComparisonSettings) -> Result<Fi
     Ok(FittedNsdm { made_from, reference, fits, training_s: fixed.provenance.solver_wall_time_s })
 }
 
-/// The motion of a case that a spring and damper are fitted to: to 30 ms after its largest
+/// The motion of a case that a spring and damper are fitted to: to 30 ms after its maximum
 /// deflection.
 pub(super) fn nsdm_target(reference: &Reference) -> Result<Target, Error> {
     let until = reference.inside();
@@ -129,7 +129,7 @@ pub(super) fn nsdm_target(reference: &Reference) -> Result<Target, Error> {
     )
 }
 
-/// The reference method's model: its forest, and its spline for the maximal crush where speed
+/// The reference method's model: its forest, and its spline for the maximum crush where speed
 /// alone differs.
 pub(super) fn ddtcm_model(set: &TrainingSet, seed: u64) -> Result<Model, Error> {
     let options = ForestOptions { seed, ..ForestOptions::paper() };
@@ -151,7 +151,7 @@ pub(super) fn ddtcm(left_out: &LeftOutCase<'_>, seed: u64) -> Result<Method, Err
     method("ddtcm", made_from, left_out, &curve, driving, (fit_s, predict_s))
 }
 
-/// The model that leaving speeds out chooses among the others; the body's force drives.
+/// The model that leaving speeds out chooses among the others; the body force drives.
 pub(super) fn best(
     left_out: &LeftOutCase<'_>,
     group: &str,

@@ -2,7 +2,7 @@
 //!
 //! FE's own curve in a run comes from the speeds alone: between two states the mean force is the change of kinetic energy
 //! over that of deflection. A body that runs on it has FE's speeds at FE's deflections, whatever the filter. Its unloading
-//! has FE's shape, and the energy of FE's mean speed of separation over 20 ms. A recorded force swings, so what is stored
+//! has FE's shape, and the energy of FE's mean separation speed over 20 ms. A recorded force oscillates, so the stored energy
 //! is scaled by the mean force and not by the force itself.
 
 use crate::curve::body::filtered;
@@ -13,7 +13,7 @@ use crate::multibody::{
 };
 use crate::signal::{derivative, interpolate, l1_ratio};
 
-/// The comparison ends this long after FE's largest deflection, so that rebound counts.
+/// The comparison ends this long after FE's maximum deflection, so that rebound counts.
 const AFTER_MAX_CRUSH_S: f64 = 0.030;
 /// The record is followed so much longer that the filter does not see its end.
 const FOR_FILTER_S: f64 = 0.050;
@@ -33,7 +33,7 @@ pub struct Reference {
     acceleration_filtered: Vec<f64>,
 }
 
-/// Errors of a multi-body run against FE, from contact to 30 ms after FE's largest
+/// Errors of a multi-body run against FE, from contact to 30 ms after FE's maximum
 /// deflection, as `Σ|p − r|/Σ|r|`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotionErrors {

@@ -1,4 +1,4 @@
-//! Rows: the motion that a method gives, rated against FE's.
+//! Rows: the motion of each method, rated against FE's.
 
 use std::time::Instant;
 
@@ -35,7 +35,7 @@ pub(crate) struct Row {
     /// Largest force at the interface, in N; of a spring and damper mass times deceleration.
     #[serde(rename = "peak_force_N")]
     pub peak_force_n: f64,
-    /// Largest deflection of the run, in m.
+    /// Maximum deflection of the run, in m.
     pub max_crush_m: f64,
     /// Time to fit, from the training cases on.
     pub fit_time_s: f64,

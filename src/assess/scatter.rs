@@ -1,4 +1,4 @@
-//! Scatter: how far nominally equal runs lie from their mean, which no model can remove.
+//! Scatter: deviation of nominally repeated runs from their mean, which no model can remove.
 
 use super::left_out::forces_n;
 use super::reference::Reference;
@@ -10,7 +10,7 @@ use crate::signal::l1_ratio;
 use crate::surrogate::band;
 use crate::surrogate::leave_one_out::{BodyScatter, Scatter, SpeedScatter};
 
-/// Fewest steps along a run's crush at which forces are compared, as for left-out speeds.
+/// Minimum number of steps along a run's crush at which forces are compared, as for left-out speeds.
 const STEPS: usize = 400;
 
 /// The scatter of the set's cases that are means of several of `cases`; `None` without any, or if
@@ -51,7 +51,7 @@ struct Apart {
     body: Option<Squares>,
 }
 
-/// Squares of the residuals of one force in ratio to its local level.
+/// Squares of the residuals of one force relative to its local level.
 struct Squares {
     mean: f64,
     largest: f64,

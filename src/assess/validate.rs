@@ -1,9 +1,9 @@
-//! Validation: every model at every speed that is left out, and the model that is chosen.
+//! Validation: every model at every left-out speed, and the chosen model.
 //!
-//! Each speed is left out and predicted by every model with every rule for the largest crush, and each prediction drives
+//! Each speed is left out and predicted by every model with every rule for the maximum crush, and each prediction drives
 //! the multi-body model of one mass. Accelerations are compared after CFC 60 on both sides, the class of SAE J211 for
-//! comparing structures of vehicles, and unfiltered beside it: above 100 Hz FE's body oscillates on its crush zone, which
-//! no curve over deflection can hold. FE's own curves in the same model stand beside them.
+//! comparing structures of vehicles, and also unfiltered: above 100 Hz FE's body oscillates on its crush zone, which
+//! no curve over deflection can hold. FE's own curves in the same model are listed with them.
 
 use std::collections::BTreeMap;
 
@@ -59,14 +59,14 @@ pub enum Choice {
     /// The one that leave-one-speed-out chooses; seed of the forests, and their number of trees
     /// if not their own.
     Auto {
-        /// Where the model will be asked.
+        /// Where the model will be used.
         purpose: Purpose,
         /// Of all random draws.
         seed: u64,
         /// Of each forest.
         trees: Option<usize>,
     },
-    /// This one; it is validated beside `nearest` and `linear`.
+    /// This one; it is validated with `nearest` and `linear`.
     Kind(ModelKind),
 }
 
@@ -87,7 +87,7 @@ pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Error
             train_chosen(group, cases, &kept, validation)
         }
         Choice::Kind(kind) => {
-            // What the model itself refuses is said before it is validated.
+            // Errors of the model itself come before the validation.
             Model::check_fits(&TrainingSet::new(group, cases)?, kind)?;
             let mut candidates = vec![ModelKind::nearest(), ModelKind::linear()];
             candidates.retain(|baseline| baseline.name() != kind.name());
@@ -260,7 +260,7 @@ fn trials<'a>(kinds: &[ModelKind], left_out: &'a [LeftOutCase<'a>]) -> Vec<LeftO
     pairs.par_iter().map(|(kind, case)| case.trial(*kind)).collect()
 }
 
-/// What the left-out speeds tell of all models.
+/// Results of the left-out speeds for all models.
 #[derive(Default)]
 struct Tables {
     rows: Vec<LeftOut>,
@@ -319,7 +319,7 @@ impl Tables {
 /// Residuals of each force at the inner speeds, and at the ends.
 type ResidualsOf = BTreeMap<(ForceKind, LeftOutSpeeds), Vec<Residuals>>;
 
-/// The rows of one model, by its rule for the maximal crush.
+/// The rows of one model, by its rule for the maximum crush.
 struct ModelTable {
     rule: MaxCrushRule,
     rows: Vec<LeftOut>,
@@ -380,7 +380,7 @@ pub(crate) fn add_nested(
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
     if speeds.len() < 4 {
         validation.notes.push(format!(
-            "auto has no errors of its own: choosing anew without a speed needs at least 4, the group has {}",
+            "auto has no errors of its own: choosing again without one speed needs at least 4, the group has {}",
             speeds.len()
         ));
         return Ok(());
@@ -431,7 +431,7 @@ pub(crate) fn add_nested(
 
 /// Why a model is not among the means.
 fn without_means(model: &str) -> String {
-    format!("{model} has no means and cannot be chosen: it has no answer at every inner speed")
+    format!("{model} has no means and cannot be chosen: it cannot predict every inner speed")
 }
 
 /// With too few speeds to leave one out.

@@ -84,7 +84,7 @@ impl BuildReport {
 /// Builds the study at `manifest` into the database at `path`.
 ///
 /// Runs whose recipe, entry and files are unchanged are not read again. A run that cannot
-/// be used is reported, and the others go on; the file is written once, whole, and not at all if
+/// be used is reported, and the others continue; the file is written once, whole, and not at all if
 /// nothing has changed. A study, group or run that was renamed takes its cases along, with their
 /// tags and notes. `progress` is called with the name of each run when it is done, from any thread.
 ///
@@ -216,7 +216,7 @@ fn put(
     results: Vec<(String, Result<Option<Case>, Error>)>,
 ) -> Result<Vec<BuiltRun>, Error> {
     let now = clock::now_utc();
-    // What users said of each.
+    // Tags and notes of users.
     let said = database
         .all()
         .map(|c| (CasePath::of(c), (c.provenance.tags.clone(), c.provenance.user_notes.clone())));

@@ -1,16 +1,16 @@
-//! Which cases of a database are a study's, and where they belong now.
+//! Which cases of a database belong to a study, and where they belong now.
 //!
-//! A case knows its study by name, and by [`Origin`](crate::curve::Origin) the manifest, group and
-//! run that it was built from, as they were called then.
+//! A case records its study by name, and by [`Origin`](crate::curve::Origin) the manifest, group and
+//! run that it was built from, by their names at that time.
 //!
 //! 1. The cases of a study are those of its name and group.
 //! 2. If there are none, study or group may have been renamed: then the study's cases are those of
-//!    a study and group that were built from the same manifest, or from one that is gone, and of
-//!    which one at least is made of the same bytes by the same recipe as a run of this study.
-//! 3. A run's case is the one of its name; for a run that has none, a case made of the same whose
+//!    a study and group that were built from the same manifest, or from one that no longer exists, and of
+//!    which at least one has the same bytes and recipe as a run of this study.
+//! 3. The case of a run is the one with its name; for a run without one, a case made of the same data whose
 //!    name no run has any more.
-//! 4. A case goes where the manifest says if the manifest says something else than it did when the
-//!    case was built. Else it stays where it is: it may have been renamed in the database.
+//! 4. A case moves to the place given by the manifest if the manifest has changed since the
+//!    case was built. Otherwise it stays: it may have been renamed in the database.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::Path;

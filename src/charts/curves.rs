@@ -1,4 +1,4 @@
-//! Force over deflection: the runs of a group, predictions, and a speed that was left out.
+//! Force over deflection: the runs of a group, predictions, and a left-out speed.
 
 use super::speed;
 use crate::assess::reference::Reference;
@@ -63,7 +63,7 @@ fn names(cases: &[Case]) -> Vec<String> {
 
 /// Force over deflection of all runs of a group, loading and unloading.
 ///
-/// `force` is the recipe's force, or the body's beside it; runs without that force are named in a note.
+/// `force` is the recipe's force, or the body force; runs without that force are named in a note.
 pub fn group_curves(group: &str, cases: &[Case], force: ForceKind) -> Chart {
     let mut series = Vec::new();
     let mut missing = Vec::new();
@@ -94,7 +94,7 @@ pub(crate) fn file_curve(title: &str, name: &str, deflection_m: &[f64], force_n:
     Chart::of(title, panel)
 }
 
-/// A predicted curve with its band, over the training curves beside its speed.
+/// A predicted curve with its band, over the training curves next to its speed.
 ///
 /// `neighbours` are a model's cases; the nearest below and above are drawn, or the two nearest outside of all.
 pub fn prediction(curve: &PredictedCurve, neighbours: &[ModelCase]) -> Chart {
@@ -109,7 +109,7 @@ pub fn prediction(curve: &PredictedCurve, neighbours: &[ModelCase]) -> Chart {
         panel.series.push(Series::line(&name, look, case.deflection_m.clone(), force_n.clone()));
     }
     add_prediction(&mut panel, curve);
-    panel.marks.push(Mark { name: "maximal crush".into(), x: curve.max_deflection_m });
+    panel.marks.push(Mark { name: "maximum crush".into(), x: curve.max_deflection_m });
     let title = format!(
         "{} at {}: {} force by the model {}",
         curve.provenance.group,
@@ -131,13 +131,13 @@ fn beside(cases: &[ModelCase], v: f64) -> Vec<&ModelCase> {
     sorted.into_iter().skip(from).take(2).collect()
 }
 
-/// A maximal crush is within those of the runs up to this share above the largest.
+/// A maximum crush is within those of the runs up to this share above the largest.
 const SAME_CRUSH: f64 = 0.01;
 
 /// The look of predictions.
 const PREDICTED: usize = 1;
 
-/// The predicted line, its band below it, and the body's force beside it, whose own band would
+/// The predicted line, its band below it, and the body force beside it, whose own band would
 /// cover that of the line: it is drawn with that force alone.
 fn add_prediction(panel: &mut Panel, curve: &PredictedCurve) {
     // A band is known, and a line is whole, as far as the runs were crushed, within the line's own scatter.
@@ -187,7 +187,7 @@ fn band_name(curve: &PredictedCurve) -> String {
     }
 }
 
-/// A curve that was predicted without the run beside it.
+/// A curve predicted without the run shown with it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LeftOutPrediction<'a> {
     /// The run that was left out.
@@ -198,7 +198,7 @@ pub(crate) struct LeftOutPrediction<'a> {
     pub motion: Option<(&'a [f64], &'a [f64])>,
 }
 
-/// A run that was left out beside its prediction: force over deflection, and the speed over time.
+/// A left-out run with its prediction: force over deflection, and the speed over time.
 pub(crate) fn left_out(LeftOutPrediction { case, curve, motion }: LeftOutPrediction) -> Chart {
     let kind = curve.provenance.force_kind;
     let mut forces = axes(largest(&curve.force_n).max(case.peak_force_n()));
@@ -237,7 +237,7 @@ pub(crate) fn left_out(LeftOutPrediction { case, curve, motion }: LeftOutPredict
 }
 
 /// Trains the model of `choice` on the runs at other speeds, predicts the curve at `speed_m_per_s`, lets its body force (or its
-/// only force) stop one mass, and draws both beside the run.
+/// only force) stop one mass, and draws both with the run.
 ///
 /// # Errors
 /// If there is no such run, or the others are too few.

@@ -1,4 +1,4 @@
-//! Histories of a solver's file over time, in its own units; raw, and filtered beside it.
+//! Histories of a solver file over time, in its own units; raw, and filtered as well.
 
 use crate::error::{Error, error};
 use crate::history::History;
@@ -11,14 +11,14 @@ use crate::unit::UnitSystem;
 pub struct HistoryOptions {
     /// The file's units; without them, numbers stand as in the file.
     pub units: Option<UnitSystem>,
-    /// Channel frequency class of SAE J211-1, such as 60, for filtered lines beside the raw ones.
+    /// Channel frequency class of SAE J211-1, such as 60, for additional filtered lines.
     pub filter_class: Option<u32>,
 }
 
-/// Most lines of a chart.
+/// Maximum number of lines of a chart.
 const MOST: usize = 24;
 
-/// Histories over time; quantities of different components stand in panels side by side.
+/// Histories over time; quantities of different components are in panels side by side.
 ///
 /// # Errors
 /// For none or more than 24 histories, or samples that the filter does not take.

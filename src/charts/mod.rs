@@ -1,4 +1,4 @@
-//! What crumple's results look like: charts of curves, predictions, runs and histories.
+//! Charts of curves, predictions, runs and histories.
 //!
 //! Each function takes results and gives a [`Chart`](crate::plot::Chart); `crumple plot` writes it, the report shows it.
 //!
@@ -28,7 +28,7 @@ pub use curves::{group_curves, left_out_at, prediction};
 pub use histories::{HistoryOptions, histories};
 pub use motion::{Motion, Quantity, train_speeds};
 
-/// A speed in km/h with at most one digit behind the point.
+/// A speed in km/h with at most one digit after the point.
 fn speed(m_per_s: f64) -> String {
     km_per_h(m_per_s)
 }

@@ -1,4 +1,4 @@
-//! A multi-body run over time: speeds, accelerations, forces, energies; and force over deflection. And
+//! A multi-body run over time: speeds, accelerations, forces, energies; force over deflection; and
 //! the speeds of a train by several methods.
 
 use crate::assess::train::TrainComparison;
@@ -84,7 +84,7 @@ impl Motion {
         if header.first().map(String::as_str) != Some("time_s") || header.len() < 2 {
             return Err(error!(
                 Plot,
-                "line {line}: expected the columns of crumple simulate -o: \"time_s\", then such as \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\"",
+                "line {line}: expected the columns of crumple simulate -o: \"time_s\", then for example \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\"",
                 found = header.join(",")
             ));
         }
@@ -141,7 +141,7 @@ impl Motion {
         if bodies.is_empty() && interfaces.is_empty() {
             return Err(error!(
                 Plot,
-                "line {line}: expected the columns of crumple simulate -o: \"time_s\", then such as \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\"",
+                "line {line}: expected the columns of crumple simulate -o: \"time_s\", then for example \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\"",
                 found = header.join(",")
             ));
         }
@@ -243,8 +243,8 @@ fn time() -> Axis {
     Axis::new("time", "ms", 1e3)
 }
 
-/// Methods that are parts of another; they stand in the table, and more lines than looks would be
-/// told apart by nothing.
+/// Methods that are parts of another; they are in the table, and more lines than looks would be
+/// distinguished by nothing.
 const ON_THE_WAY: [&str; 2] = ["rate_only", "rate_live"];
 
 /// A panel for each vehicle, with FE's speed and that of every method, but for those that are parts

@@ -43,6 +43,6 @@ pub(super) fn one_of<T: Copy + Send + Sync + 'static>(
 pub(super) const MAX_CRUSH_RULES: &[(&str, MaxCrushRule, &str)] = &[
     ("spline", MaxCrushRule::Spline, "Cubic spline through the training speeds (reference method)"),
     ("monotone", MaxCrushRule::Monotone, "Monotone cubic through (0, 0) and the training speeds"),
-    ("energy", MaxCrushRule::Energy, "Where the curve has taken up the kinetic energy"),
+    ("energy", MaxCrushRule::Energy, "Where the curve has absorbed the kinetic energy"),
     ("motion", MaxCrushRule::Motion, "Where the body's own force has stopped it"),
 ];

@@ -24,11 +24,11 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, progress};
   crumple build other-study.toml -o curves.h5     # adds a group
 Only runs that changed since the last build are read again. A run that cannot be used is
 reported and left out (exit code 1); the others are built. W/E is the work of a curve over the
-energy of its impact: up to 5 % off 1 is usual, more is a wrong mass, speed or unit.")]
+energy of its impact: within 5 % of 1 is usual; more points to a wrong mass, speed or unit.")]
 pub(super) struct Args {
     /// Study manifest (TOML); study.toml if absent
     study: Option<PathBuf>,
-    /// Database to write or to update; curves.h5 beside the study if absent
+    /// Database to write or to update; curves.h5 next to the study if absent
     #[arg(short, long)]
     output: Option<PathBuf>,
 }
@@ -59,7 +59,7 @@ struct Document {
     database: String,
     group: String,
     runs: Vec<RunReport>,
-    /// What is odd in a run beside the others of its group.
+    /// What is unusual in a run compared with its group.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     group_warnings: Vec<String>,
     removed: Vec<String>,
@@ -178,7 +178,7 @@ fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
     }
     for run in runs {
         if let Some(renamed) = &run.renamed {
-            writeln!(out, "note: {}: is {renamed} in the database", run.name)?;
+            writeln!(out, "note: {}: called {renamed} in the database", run.name)?;
         }
     }
     for line in moved_lines(moved) {
@@ -187,7 +187,7 @@ fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
     for group in earlier_groups {
         writeln!(
             out,
-            "note: group {group} was built from this manifest when it said something else; it stays: crumple db rm removes it"
+            "note: group {group} was built from an earlier version of this manifest and is kept: crumple db rm removes it"
         )?;
     }
     writeln!(out, "wrote {database} (group {group})")
@@ -201,7 +201,7 @@ fn moved_lines(moved: &[Moved]) -> Vec<String> {
         if from.name == to.name {
             *groups.entry((&from.group, &to.group)).or_default() += 1;
         } else {
-            lines.push(format!("{from}: renamed since it was built, is {to} now"));
+            lines.push(format!("{from}: renamed since it was built, now {to}"));
         }
     }
     let group = |((from, to), count): (&(&str, &str), &usize)| {

@@ -20,24 +20,24 @@ use super::output;
 use super::progress::Bar;
 use super::{CommandResult, Failure, GlobalOptions, Outcome};
 
-/// Compare FE with FDRM, NSDM, DDTCM and the best model, each in the same multi-body model
+/// Compare FE with FDRM, NSDM, DDTCM and the best model, all in the same multi-body model
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   crumple compare curves.h5 --group lead-car-wall --speed 48km/h
   crumple compare curves.h5 --group lead-car-wall                 # every inner speed, and means
   crumple compare curves.h5 --group lead-car-wall --fixed-speed 36km/h --nsdm-start least-squares
   crumple compare --train train-set.toml
-Rows: fe is FE's own curve in the one-mass model, the floor for predictions of that force; fe_body is
-made from FE's own speeds and checks that curve, force law and run are consistent; fdrm is the FE
-curve of one speed, nsdm the spring and damper fitted to that run; ddtcm the reference
-method's forest and spline; best the model that leaving speeds out chooses
-among the others, by its body force. Errors are sum|p-r|/sum|r| from contact to 30 ms after FE's
-largest crush; accelerations are filtered with CFC 60, in brackets not. --json has every measure;
-those under velocity and acceleration are taken at 10 kHz, as crumple rate takes them.
-With --train, a scenario whose curves are cases of a database runs with the curves of each method,
-and the vehicles' speeds are compared with FE's, which its [reference] names. rate_live lets the
-crush force follow the speeds of the run; split_ends gives each vehicle two ends with the mass that
-they stop. Several trains are compared one by one and in their means.")]
+Rows: fe is FE's own contact force in the one-mass model, the floor for predictions of that force;
+fe_body is derived from FE's own speeds and checks that curve, force law and run agree; fdrm is
+FE's curve at one other speed; nsdm is the spring and damper fitted to that run; ddtcm is the
+reference method's random forest and spline; best is the model chosen by leaving speeds out,
+without this one, driven by its body force. Errors are sum|p-r|/sum|r| from contact to 30 ms after
+FE's maximum crush; accelerations are filtered with CFC 60, unfiltered in brackets. --json has
+every measure; those of velocity and acceleration are evaluated at 10 kHz, as by crumple rate.
+With --train, a scenario whose curves are database cases is run with the curves of each method, and
+the vehicles' speeds are compared with the FE run in its [reference]. rate_live lets the crush
+force follow the closing speeds of the run; split_ends gives each vehicle two ends with the mass
+that they stop. Several trains are compared one by one and on average.")]
 pub(super) struct Args {
     /// Curve database
     #[arg(required_unless_present = "train", conflicts_with = "train")]
@@ -193,7 +193,11 @@ fn cells(row: &Row) -> Vec<String> {
     let score = |rating: &Rating| {
         rating.iso18571.map_or("-".to_string(), |iso| format!("{:.3}", iso.rating))
     };
-    let factor = |f: Option<f64>| f.map_or("-".into(), |f| format!("{f:.3e}"));
+    let factor = |f: Option<f64>| match f {
+        None => "-".into(),
+        Some(f) if (0.01..1e3).contains(&f) => format!("{f:.2}"),
+        Some(f) => format!("{f:.1e}"),
+    };
     let unfiltered = row.acceleration_unfiltered_l1 * 100.0;
     vec![
         row.method.clone(),
@@ -445,7 +449,7 @@ fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
     let fe_time = comparison.fe_time_s.map_or(String::new(), |t| format!("; FE took {t:.0} s"));
     writeln!(
         out,
-        "velocity errors to {:.1} ms, accelerations (CFC 60) in brackets{fe_time}",
+        "velocity errors up to {:.1} ms, accelerations (CFC 60) in brackets{fe_time}",
         comparison.until_s * 1e3
     )?;
     let rows: Vec<Vec<String>> = comparison
@@ -473,7 +477,7 @@ fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
             cells
         })
         .collect();
-    let mut heading = vec!["method", "driven by", "mean", "mean, of first speed"];
+    let mut heading = vec!["method", "driven by", "mean", "mean, of initial speed"];
     heading.extend(vehicles.iter().map(|v| v.as_str()));
     heading.push("curves at");
     output::table(out, &heading, &rows)?;
@@ -483,7 +487,7 @@ fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
         .iter()
         .map(|row| format!("{} {:.2} ms", row.method, row.simulation_time_s * 1e3))
         .collect();
-    writeln!(out, "time of curves and run: {}", times.join(", "))?;
+    writeln!(out, "time for curves and run: {}", times.join(", "))?;
     writeln!(out, "\nspeeds in m/s")?;
     let step = comparison.time_s.len().div_ceil(SPEED_ROWS).max(1);
     let columns = |of: &BTreeMap<String, Vec<f64>>, i: usize| {

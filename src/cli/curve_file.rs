@@ -1,4 +1,4 @@
-//! What a measured or legacy curve's file does not say of itself, as several commands take it.
+//! Options for data missing from a measured or legacy curve's file, shared by several commands.
 
 use crate::formats::read::{ColumnNames, ReadOptions};
 use crate::import::Settings;
@@ -9,19 +9,19 @@ use super::arguments::{mass, one_of};
 /// How a curve's file is read.
 #[derive(clap::Args)]
 pub(super) struct Reading {
-    /// Format of the file, if not by its content (crumple db add --list)
+    /// Format of the file, if not recognised by its content (crumple db add --list)
     #[arg(long)]
     from: Option<String>,
-    /// Number or name of the curve in a file of several
+    /// Number or name of the curve in a file that holds several
     #[arg(long)]
     curve: Option<String>,
-    /// Column of the deflection in a table, by its header or its number from 1
+    /// Deflection column of a table, by its header or its number from 1
     #[arg(long, value_name = "COLUMN")]
     deflection_column: Option<String>,
-    /// Column of the force
+    /// Force column
     #[arg(long, value_name = "COLUMN")]
     force_column: Option<String>,
-    /// Column of the time; none for force over deflection without times (slow tests)
+    /// Time column; none for force over deflection without times (quasi-static tests)
     #[arg(long, value_name = "COLUMN")]
     time_column: Option<String>,
 }
@@ -29,18 +29,18 @@ pub(super) struct Reading {
 /// How a file is read, and the impact that its curve belongs to.
 #[derive(clap::Args)]
 pub(super) struct CurveFile {
-    /// What the speed is measured against [default: what the file says, else the group's]
+    /// What the speed is measured against [default: as the file states, else the group's]
     #[arg(long, value_parser = one_of(KINDS))]
     kind: Option<SpeedKind>,
-    /// Mass of the other body of a pair [default: what the file says, else that of the body]
+    /// Mass of the other body of a pair [default: as the file states, else that of the body]
     #[arg(long, value_parser = mass, allow_hyphen_values = true)]
     other_mass: Option<f64>,
-    /// Unloading stiffness from the largest deflection, such as 80MN/m [default: the file's]
+    /// Unloading stiffness from the maximum deflection, such as 80MN/m [default: the file's]
     #[arg(long, value_parser = stiffness, allow_hyphen_values = true)]
     unloading: Option<f64>,
     #[command(flatten)]
     reading: Reading,
-    /// Take curves whose energy cannot be that of speed and mass
+    /// Accept curves whose energy is impossible for the speed and mass
     #[arg(long)]
     accept_energy: bool,
 }
@@ -55,12 +55,12 @@ fn stiffness(text: &str) -> Result<f64, String> {
 }
 
 impl Reading {
-    /// Whether anything is said.
+    /// Whether any of the options is given.
     pub(super) fn is_asked(&self) -> bool {
         self.options() != ReadOptions::default()
     }
 
-    /// What is said here; the rest is as by default.
+    /// The given options, and defaults for the rest.
     pub(super) fn options(&self) -> ReadOptions {
         ReadOptions {
             format: self.from.clone(),
@@ -76,13 +76,13 @@ impl Reading {
 }
 
 impl CurveFile {
-    /// Whether anything is said.
+    /// Whether any of the options is given.
     pub(super) fn is_asked(&self) -> bool {
         let is_number = self.other_mass.is_some() || self.unloading.is_some();
         self.kind.is_some() || is_number || self.accept_energy || self.reading.is_asked()
     }
 
-    /// What is said here; the rest is as by default.
+    /// The given options, and defaults for the rest.
     pub(super) fn settings(&self) -> Settings {
         Settings {
             kind: self.kind,

@@ -1,4 +1,4 @@
-//! What `crumple inspect` says of a keyword deck.
+//! Output of `crumple inspect` for a keyword deck.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -37,7 +37,7 @@ pub(super) struct DeckReport<'a> {
 #[derive(Serialize)]
 struct Parameter<'a> {
     name: &'a str,
-    /// None if the deck does not say it plainly.
+    /// None if the deck does not state it clearly.
     value: Option<Plain<'a>>,
 }
 

@@ -1,4 +1,4 @@
-//! `crumple demo`: the whole flow on the bundled FE runs.
+//! `crumple demo`: the whole workflow on the bundled FE runs.
 
 use crate::error::Error;
 use std::io::{self, Write};
@@ -24,7 +24,7 @@ use serde::Serialize;
 use super::output;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, progress};
 
-/// Run the whole flow on bundled FE runs: database, forest, prediction, MB run, exports
+/// Run the whole workflow on bundled FE runs: database, models, prediction, multi-body run, exports
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   crumple demo
@@ -47,7 +47,7 @@ const SEED: u64 = 0;
 /// FE's run of a whole train, for the comparison of methods.
 static TRAIN_SET: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/fixtures/train-set");
 
-/// Scenarios, written beside the models that they name.
+/// Scenarios, written next to the models that they name.
 static SCENARIOS: Dir<'_> = include_dir!("$CARGO_MANIFEST_DIR/examples/trains");
 /// The one that the demo runs.
 const SCENARIO: &str = "scenario.toml";
@@ -101,7 +101,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let start = Instant::now();
     if let Some(edited) = edited_scenario(&args.output).filter(|_| !options.overwrite) {
         return Err(Failure::Usage(format!(
-            "{} exists and is not the demo's, as if it had been edited: name another folder with -o, or replace it with --overwrite",
+            "{} exists and differs from what the demo writes: name another folder with -o, or replace it with --overwrite",
             edited.display()
         )));
     }
@@ -259,7 +259,7 @@ impl Flow<'_> {
 }
 
 /// Writes the bundled files of a folder and all below it.
-/// Most bytes of a scenario that is held against the bundled one.
+/// Maximum number of bytes of a scenario that is compared with the bundled one.
 const MAX_SCENARIO: u64 = 1 << 20;
 
 /// A scenario of an earlier demo in `folder` that is not as it was written.

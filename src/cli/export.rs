@@ -28,12 +28,12 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input};
   crumple export test12.csv --speed 50km/h --kind wall --mass 24t --to lsdyna -o test12.k
   crumple export --list
 
-Beyond the maximal crush, files for multi-body tools go on: along faster runs where a model has them,
-else at the level of the curve's last tenth to 1.5 times the maximal crush, and then rising with the
-unloading stiffness. --tail changes that.
+Beyond the maximum crush, files for multi-body tools continue along faster runs where a model has
+them, else at the mean level of the curve's last tenth up to 1.5 times the maximum crush, and then
+rise with the unloading stiffness. --tail changes this.
 
 ONNX: input is records, double, N x 2: speed_m_per_s, deflection_m (then the model's further
-parameters); output is force_N, float, N x 1. Splits are decided in double; the force is rounded to float, by 6e-8 of its value.")]
+parameters); output is force_N, float, N x 1. Splits are evaluated in double; the force is rounded to float (6e-8).")]
 pub(super) struct Args {
     /// Predicted curve (JSON of crumple predict), model (of crumple train), curve database, or a measured
     /// or legacy curve's file (crumple db add --list)
@@ -49,7 +49,7 @@ pub(super) struct Args {
     which: Which,
     #[command(flatten)]
     target: Target,
-    /// Units of a measured or legacy curve's file where it does not say them
+    /// Units of a measured or legacy curve's file if it does not state them
     #[arg(long, value_parser = units)]
     input_units: Option<UnitSystem>,
     #[command(flatten, next_help_heading = "Measured and legacy curves")]
@@ -59,16 +59,16 @@ pub(super) struct Args {
 /// Which curves of a model or database.
 #[derive(clap::Args)]
 struct Which {
-    /// Speeds of a model's curves, of a database's cases, or of a measured curve, with units; repeated or after commas
+    /// Speeds of a model's curves, of a database's cases, or of a measured curve, with units; repeated or separated by commas
     #[arg(long, value_parser = arguments::speed, value_delimiter = ',', allow_hyphen_values = true)]
     speed: Vec<f64>,
     /// Mass of a model's body, or of each body of a pair, with its unit (default: the training runs')
     #[arg(long, value_parser = arguments::mass, allow_hyphen_values = true)]
     mass: Option<f64>,
-    /// Rule for a model's maximal crush [default: the model's own]
+    /// Rule for a model's maximum crush [default: the model's own]
     #[arg(long, value_parser = one_of(MAX_CRUSH_RULES))]
     max_crush: Option<MaxCrushRule>,
-    /// Answer further outside a model's training speeds than a third of their range
+    /// Allow speeds outside a model's training speeds by more than a third of their range
     #[arg(long)]
     extrapolate: bool,
     /// Value of a model's further parameter, as NAME=VALUE; may be repeated
@@ -85,7 +85,7 @@ struct Which {
 /// The target's format and what it leaves open.
 #[derive(clap::Args)]
 pub(super) struct Target {
-    /// Format, if not by the file's extension (crumple export --list)
+    /// Format, if not given by the file's extension (crumple export --list)
     #[arg(long)]
     to: Option<String>,
     /// Units of the file, such as mm-t-s (default: lsdyna and radioss the study's, adams mm and N, others SI)
@@ -97,10 +97,10 @@ pub(super) struct Target {
     /// Number of the first curve in the target's deck [default: 101]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=99_999_000))]
     curve_id: Option<u32>,
-    /// What the curve does beyond the maximal crush [default: bottom for multi-body tools]
+    /// How the curve continues beyond the maximum crush [default: bottom for multi-body tools]
     #[arg(long, value_parser = one_of(TAILS))]
     tail: Option<Tail>,
-    /// Make a flank that is steeper than the unloading stiffness less steep, at equal energy
+    /// Reduce rises steeper than the unloading stiffness, at equal energy
     #[arg(long)]
     soften: bool,
     /// Spring material of LS-DYNA [default: s08]
@@ -113,18 +113,18 @@ pub(super) struct Target {
 
 /// Forces of a curve.
 pub(super) const FORCES: &[(&str, ForceKind, &str)] = &[
-    ("body", ForceKind::Body, "The force that moves a body of one mass"),
+    ("body", ForceKind::Body, "The force that drives a body of one mass"),
     (
         "contact",
         ForceKind::Contact,
-        "What the obstacle feels: for bodies whose crush zone is a mass of its own",
+        "The force on the obstacle: for bodies whose crush zone is a separate mass",
     ),
 ];
 
-/// What a curve does beyond its maximal crush.
+/// What a curve does beyond its maximum crush.
 const TAILS: &[(&str, Tail, &str)] = &[
-    ("none", Tail::None, "Nothing: the last point is the maximal crush"),
-    ("hold", Tail::Hold, "Goes on along faster runs, or at the level of its last tenth"),
+    ("none", Tail::None, "Nothing: the last point is the maximum crush"),
+    ("hold", Tail::Hold, "Continues along faster runs, or at the mean level of its last tenth"),
     ("bottom", Tail::Bottom, "The same, and then rises with the unloading stiffness"),
 ];
 
@@ -183,8 +183,8 @@ impl Target {
         }
     }
 
-    /// The files of curves for `path`, of the force that was asked for or of the body's; of both where
-    /// the format holds both and none was asked for.
+    /// The files of curves for `path`, of the force that was requested or of the body's; of both where
+    /// the format holds both and none was requested.
     pub(super) fn export(
         &self,
         format: &Format,
@@ -200,7 +200,7 @@ impl Target {
         }
         format.export(curves, &self.options(path)).map_err(|error| {
             if self.force.is_none() && error.is_about("force") {
-                Failure::Usage("the curve has no force that moves a body of one mass (its runs record no velocities): say --force contact to export the force that the obstacle feels".into())
+                Failure::Usage("the curve has no force that drives a body of one mass (its runs record no velocities): use --force contact to export the force on the obstacle".into())
             } else {
                 error.into()
             }
@@ -234,7 +234,7 @@ impl Target {
             Err(Failure::Usage(format!(
                 "{} holds a whole model in SI: remove --units and --soften{}",
                 format.name,
-                if forced { " and --force: it is of the recipe's force" } else { "" }
+                if forced { " and --force: it holds the recipe's force" } else { "" }
             )))
         } else {
             Ok(())
@@ -316,7 +316,7 @@ fn export(
     export_curves(args, format, (input, &chosen), output)
 }
 
-/// The same of a format that is made of curves.
+/// The same for a format that is made of curves.
 fn export_curves(
     args: &Args,
     format: &Format,

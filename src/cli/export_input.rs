@@ -1,4 +1,4 @@
-//! What `crumple export` is given: a predicted curve, a model, a database or another curve's file, by content.
+//! The input of `crumple export`: a predicted curve, a model, a database or another curve's file, by content.
 
 use crate::error::error;
 use std::io::Read;
@@ -29,11 +29,11 @@ pub(super) enum Input {
 /// Which curves of it.
 pub(super) struct Chosen<'a> {
     pub speeds_m_per_s: &'a [f64],
-    /// What is asked of a model; its speed is not used.
+    /// The query to a model; its speed is not used.
     pub query: Query,
     pub group: Option<&'a str>,
     pub cases: &'a [String],
-    /// What is said of a measured or legacy curve, and the units of its file.
+    /// Options about a measured or legacy curve, and the units of its file.
     pub file: &'a CurveFile,
     pub input_units: Option<UnitSystem>,
 }
@@ -72,13 +72,13 @@ impl Input {
         }
     }
 
-    /// Refuses what is said of a curve's file where there is none.
+    /// Refuses options about a curve's file if the input is not one.
     pub(super) fn check_said(&self, chosen: &Chosen<'_>) -> Result<(), Failure> {
         let is_said = chosen.file.is_asked() || chosen.input_units.is_some();
         match (self, is_said) {
             (Self::File(_), _) | (_, false) => Ok(()),
             (_, true) => Err(Failure::Usage(
-                "--kind, --other-mass, --unloading, --from, --curve, --deflection-column, --force-column, --time-column, --accept-energy and --input-units are for the file of a measured or legacy curve: curves of crumple predict, models and databases say these themselves".into(),
+                "--kind, --other-mass, --unloading, --from, --curve, --deflection-column, --force-column, --time-column, --accept-energy and --input-units apply only to the file of a measured or legacy curve: predicted curves, models and databases hold these values".into(),
             )),
         }
     }
@@ -137,27 +137,27 @@ impl Chosen<'_> {
             || !self.cases.is_empty();
         if is_asked {
             Err(Failure::Usage(format!(
-                "{what} is of one speed and mass: remove --speed, --mass, --max-crush, --extrapolate, --parameter, --group, --case, or give the model or the database"
+                "{what} has one speed and mass: remove --speed, --mass, --max-crush, --extrapolate, --parameter, --group, --case, or give the model or the database"
             )))
         } else {
             Ok(())
         }
     }
 
-    /// Whether anything is asked that only a model can answer.
+    /// Whether any option is given that only applies to a model.
     fn asks_a_model(&self) -> bool {
         let Query { mass_kg, rule, extrapolate, parameters, .. } = &self.query;
         mass_kg.is_some() || rule.is_some() || *extrapolate || !parameters.is_empty()
     }
 
-    /// Refuses what an export of a whole model has no use for; a table takes all that is asked of
+    /// Refuses options that an export of a whole model does not use; a table accepts all options of
     /// a model.
     pub(super) fn check_for_model(&self, is_table: bool) -> Result<(), Failure> {
         let of_database = self.group.is_some() || !self.cases.is_empty();
         let of_curve = self.asks_a_model() || !self.speeds_m_per_s.is_empty();
         match (of_database, of_curve && !is_table) {
             (true, _) => Err(Failure::Usage(
-                "--group and --case are for a database: a model is of one group".into(),
+                "--group and --case are for a database: a model has only one group".into(),
             )),
             (false, true) => Err(Failure::Usage(
                 "this holds a whole model: remove --speed, --mass, --max-crush, --extrapolate, --parameter".into(),
@@ -168,7 +168,7 @@ impl Chosen<'_> {
 
     fn of_model(&self, model: &Model) -> Result<Vec<PredictedCurve>, Failure> {
         if self.group.is_some() || !self.cases.is_empty() {
-            let message = "--group and --case are for a database: a model is of one group";
+            let message = "--group and --case are for a database: a model has only one group";
             return Err(Failure::Usage(message.into()));
         }
         if self.speeds_m_per_s.is_empty() {
@@ -189,7 +189,7 @@ impl Chosen<'_> {
     /// The case that a measured or legacy curve's file makes.
     fn of_file(&self, path: &Path) -> Result<Case, Failure> {
         if self.speeds_m_per_s.len() > 1 || self.cases.len() > 1 {
-            let message = "a file holds the curve of one impact: say one --speed and one --case";
+            let message = "a file holds the curve of one impact: give one --speed and one --case";
             return Err(Failure::Usage(message.into()));
         }
         if self.query.rule.is_some() || self.query.extrapolate {

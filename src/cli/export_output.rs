@@ -41,7 +41,7 @@ struct Document<'a> {
 }
 
 impl Destination<'_> {
-    /// Writes the files and says what there is to say of them.
+    /// Writes the files and prints their notes.
     pub(super) fn write(&self, exported: Exported, options: GlobalOptions) -> Result<(), Failure> {
         let notes = &exported.notes;
         if !options.json && !options.quiet {

@@ -1,4 +1,4 @@
-//! What a file is by its first bytes: for commands that take several kinds.
+//! The kind of a file by its first bytes, for commands that accept several kinds.
 
 use std::io::Read;
 use std::path::Path;

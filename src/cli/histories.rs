@@ -22,7 +22,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
   crumple histories run/rcforc --id 3:surfa -o force.csv
   crumple histories run/nodout -o nodout.h5
   crumple histories run/nodout -o nodout.h5 --units mm-t-s
-HDF5 has named dimensions, titles of nodes and walls (from the file or the deck beside it) and units.")]
+HDF5 has named dimensions, titles of nodes and walls (from the file or the deck next to it) and units.")]
 pub(super) struct Args {
     /// File written by a solver
     file: PathBuf,
@@ -35,16 +35,16 @@ pub(super) struct Args {
     /// Section of a binout to read, such as nodout or rwforc/forces
     #[arg(long)]
     section: Option<String>,
-    /// Kind of the file (nodout, rcforc, …), if not by its content
+    /// Kind of the file (nodout, rcforc, …), if not recognised by its content
     #[arg(long)]
     format: Option<String>,
-    /// Read through a memory map: faster, but only for files that nothing writes to
+    /// Read through a memory map: faster, but only for files that no process is writing to
     #[arg(long)]
     map: bool,
     /// Where to write: .csv, .h5 or .hdf5 (default: CSV on standard output)
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// Units of the file, such as mm-t-s, to be named in HDF5 [default: those of the deck beside it]
+    /// Units of the file, such as mm-t-s, to be named in HDF5 [default: those of the deck next to it]
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
     /// Replace an HDF5 file that is not a file of histories, such as a curve database
@@ -68,7 +68,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         _ => None,
     };
     let beside = Beside { units: args.units, deck: deck.as_ref() };
-    // JSON on standard output beside a file needs the values themselves.
+    // JSON on standard output next to a file needs the values themselves.
     let straight = output.filter(|_| matches!(target, Some(Target::Hdf5)) && !options.json);
     let format = args.format.as_deref();
     let bar = Bar::new(options, "reading");

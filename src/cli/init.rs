@@ -8,14 +8,14 @@ use crate::init::{
     self, GivenForce, Proposal, Proposed, ProposedRun, Request, ScenarioProposal, UserHints,
 };
 use crate::study::StudyKind;
-use crate::unit::{UnitSystem, km_per_h};
+use crate::unit::{Shown, UnitSystem, km_per_h};
 use serde::Serialize;
 
 use super::arguments;
 use super::output;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, progress};
 
-/// Look into run folders and write a commented study; or a scenario for models
+/// Examine run folders and write a commented study; or write a scenario for models
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   crumple init                                 # the run folders below this one
@@ -23,8 +23,8 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, progress}
   crumple init runs --half-model               # one body of a pair, cut at the symmetry plane
   crumple init runs --node 900001 --force rcforc:3:surfa --mass 24t
   crumple init --scenario lead.model -o scenario.toml
-Each value in the study says whether it was read, computed or guessed, and from what. Then
-crumple build makes the curves of it.")]
+Each value in the study says whether it was read, computed or guessed, and from what. Then run
+crumple build to extract the curves.")]
 pub(super) struct Args {
     /// Run folders, or folders above them; with --scenario model files
     #[arg(value_name = "RUN|MODEL")]
@@ -44,13 +44,13 @@ pub(super) struct Args {
 #[derive(clap::Args)]
 #[group(id = "known", multiple = true, conflicts_with = "scenario")]
 struct GivenArgs {
-    /// Units of the solver's files, such as mm-t-s
+    /// Units of the solver files, such as mm-t-s
     #[arg(long, value_parser = |text: &str| UnitSystem::parse(text))]
     units: Option<UnitSystem>,
-    /// What hits what
+    /// Kind of impact
     #[arg(long, value_parser = arguments::one_of(KINDS))]
     kind: Option<StudyKind>,
-    /// The runs are of one body against the symmetry plane of a pair
+    /// The runs model one body of a pair, cut at the symmetry plane
     #[arg(long, conflicts_with = "minus_node")]
     half_model: bool,
     /// Node of the body
@@ -129,7 +129,7 @@ fn scenario(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult
             options.print(|out| {
                 writeln!(
                     out,
-                    "wrote {scenario}: put your trains in, then crumple simulate {scenario}"
+                    "wrote {scenario}: put in your trains, then run crumple simulate {scenario}"
                 )
             })?;
         }
@@ -156,11 +156,11 @@ fn study(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
             group: known.group.clone(),
         },
     };
-    let bar = progress::Bar::new(options, "looking into runs");
+    let bar = progress::Bar::new(options, "examining runs");
     let done = AtomicUsize::new(0);
     let proposal = init::propose(&request, |name| {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
-        bar.step(&format!("{done} runs looked over, last {name}"));
+        bar.step(&format!("{done} runs examined, last {name}"));
     });
     bar.end();
     let proposal = proposal?;
@@ -206,7 +206,7 @@ fn print(out: &mut dyn std::io::Write, proposal: &Proposal, output: &Path) -> st
     }
     writeln!(out)?;
     let rows: Vec<Vec<String>> = proposal.runs.iter().map(row).collect();
-    output::table(out, &["run", "speed", "mass (t)", "max crush (m)", "states"], &rows)?;
+    output::table(out, &["run", "speed", "mass", "max crush (m)", "states"], &rows)?;
     for note in &proposal.notes {
         writeln!(out, "note: {note}")?;
     }
@@ -215,9 +215,9 @@ fn print(out: &mut dyn std::io::Write, proposal: &Proposal, output: &Path) -> st
     }
     let runs = output::counted(proposal.runs.len(), "run");
     let next = match proposal.missing().len() {
-        0 => "look at what is guessed, then crumple build".into(),
+        0 => "check the guessed values, then run crumple build".into(),
         lines => format!(
-            "not complete, {} to fill in or to give as an option: then crumple build",
+            "incomplete, {} to fill in or to give as an option; then run crumple build",
             output::counted(lines, "line")
         ),
     };
@@ -256,7 +256,7 @@ fn row(run: &ProposedRun) -> Vec<String> {
     vec![
         run.name.clone(),
         shown(run.speed_m_per_s.value().map(|v| km_per_h(*v))),
-        shown(run.mass_kg.value().map(|kg| format!("{:.2}", kg / 1e3))),
+        shown(run.mass_kg.value().map(|kg| Shown::one_mass(*kg))),
         shown(run.crush_m.map(|m| format!("{m:.3}"))),
         run.states.to_string(),
     ]

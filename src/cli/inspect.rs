@@ -16,25 +16,23 @@ use super::{CommandResult, GlobalOptions, Outcome};
 use crate::solver::decks::Search;
 use crate::solver::runs::{output_files, run_folders};
 
-/// Say what solver files hold: format, version, entities, components, states, damage
+/// Show what solver files hold: format, version, entities, components, states, damage
 #[derive(clap::Args)]
-#[command(
-    after_help = "Titles that a file does not give are taken from the keyword deck beside it.
+#[command(after_help = "Titles missing from a file are taken from the keyword deck next to it.
 Examples:
   crumple inspect run/nodout
-  crumple inspect run/main.k               # what a deck says of its run
+  crumple inspect run/main.k               # what a deck says about its run
   crumple inspect runs                     # the files of every run below a folder
   crumple inspect run/nodout run/rcforc --json
-  crumple inspect --strict run/rwforc      # exit code 3 if the file is damaged"
-)]
+  crumple inspect --strict run/rwforc      # exit code 3 if the file is damaged")]
 pub(super) struct Args {
     /// Files written by a solver, run folders, or folders above them
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Kind of the files (nodout, rcforc, …), if not by their content
+    /// Kind of the files (nodout, rcforc, …), if not recognised by their content
     #[arg(long)]
     format: Option<String>,
-    /// Read through a memory map: faster, but only for files that nothing writes to
+    /// Read through a memory map: faster, but only for files that no process is writing to
     #[arg(long)]
     map: bool,
 }
@@ -182,7 +180,7 @@ fn reports(inspected: &Inspected) -> Vec<Report<'_>> {
     .collect()
 }
 
-/// The deck beside a file, if an entity of the file lacks a title.
+/// The deck next to a file, if an entity of the file lacks a title.
 fn deck_for(path: &Path, sections: &[SolverFile]) -> Option<(PathBuf, Deck)> {
     let lacks = |file: &SolverFile| file.entities.iter().any(|e| e.title.is_none());
     if !sections.iter().any(lacks) {
@@ -322,7 +320,7 @@ pub(super) fn asked(paths: &[PathBuf]) -> Result<Vec<Asked>, Failure> {
         let failed = |e| Failure::Failed(format!("{}: {e}", path.display()).into());
         let found = run_folders(path).map_err(failed)?;
         if found.runs.is_empty() {
-            let message = format!("{}: no folder in it holds solver files", path.display());
+            let message = format!("{}: none of its folders holds solver files", path.display());
             return Err(Failure::Failed(message.into()));
         }
         for folder in found.runs {

@@ -70,10 +70,10 @@ pub struct GlobalOptions {
     /// Exit with code 3 if there was damage or a warning
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub strict: bool,
-    /// Read databases, models and unfinished sweeps whose numbers are not those that were written
+    /// Accept databases, models and unfinished sweeps that were changed after they were written
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub accept_changed: bool,
-    /// Replace an output that is a file of another kind: a database, a model, a manifest, a solver's file
+    /// Replace an output that is a file of another kind: a database, a model, a manifest, a solver file
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub overwrite: bool,
 }
@@ -223,7 +223,7 @@ fn arguments() -> Result<Cli, ExitCode> {
     let matches = shell::command().try_get_matches_from(arguments);
     matches.and_then(|matches| Cli::from_arg_matches(&matches)).map_err(|error| {
         if wants_json && error.use_stderr() {
-            // Without the word before it, and without the usage and the way to the help behind it.
+            // Without the word before it, and without the usage and the way to the help after it.
             let text = error.render().to_string();
             let said = text.split("\n\nUsage:").next().unwrap_or_default();
             let said = said.split("\n\nFor more information").next().unwrap_or_default();

@@ -1,6 +1,6 @@
 //! Standard output and standard error: text, tables and JSON documents; a closed pipe is not
 //! an error. Everything printed goes through here, where control characters are taken out:
-//! a title in a solver's file may hold an escape sequence, which a terminal would obey.
+//! a title in a solver file may hold an escape sequence, which a terminal would obey.
 
 use std::borrow::Cow;
 use std::error::Error;
@@ -100,16 +100,16 @@ pub(super) fn plain(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// What stands for a control character.
+/// Replacement of a control character.
 const REPLACED: &str = "\u{fffd}";
 
 /// Passes bytes on without control characters but line ends and tabs: those of ASCII, and
 /// those from U+0080 to U+009F, which UTF-8 writes as `0xc2` and a byte.
 struct ControlFilter<W, F> {
     out: W,
-    /// What stands for a control character of that code.
+    /// Replacement of a control character of that code.
     instead: F,
-    /// Whether a `0xc2` waits for the byte behind it.
+    /// Whether a `0xc2` waits for the byte after it.
     held: bool,
 }
 
@@ -225,7 +225,7 @@ fn table_within(
 const GAP: &str = "  ";
 
 /// A table as a list: each row by its first cell, below it a line for each other one; what is
-/// longer than a line goes on in the next.
+/// longer than a line continues in the next.
 fn list(
     out: &mut dyn Write,
     width: usize,
@@ -305,13 +305,13 @@ pub(super) fn width() -> Option<usize> {
     out.is_terminal().then(|| stated().or_else(|| size(&out)).unwrap_or(80).max(LEAST))
 }
 
-/// The same of standard error.
+/// The same for standard error.
 pub(super) fn error_width() -> Option<usize> {
     let err = io::stderr();
     err.is_terminal().then(|| stated().or_else(|| size(&err)).unwrap_or(80).max(LEAST))
 }
 
-/// What the user asks for, whatever the terminal has.
+/// The user's choice, whatever the terminal supports.
 fn stated() -> Option<usize> {
     std::env::var("COLUMNS").ok()?.parse().ok().filter(|width| *width > 0)
 }

@@ -32,12 +32,12 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
 #[command(after_help = "Examples:
   crumple plot curves.h5 --group lead-car-wall -o curves.svg            # curves by speed
   crumple plot curves.h5 --group lead-car-wall --left-out 48km/h -o left-out.png
-  crumple plot lead.model --speed 50km/h -o lead50.svg                  # band, over its neighbours
+  crumple plot lead.model --speed 50km/h -o lead50.svg                  # with band and neighbouring runs
   crumple plot scenario.toml --quantity energy -o energy.svg            # runs the scenario
   crumple plot result.csv --quantity crush -o crush.svg
   crumple plot train-set.toml --train -o train.svg                      # FE's train and the methods
   crumple plot run/nodout --id 900001 --component x_velocity --units mm-t-s --cfc 60 -o nodout.svg
-The content says what the file is. SVG and PNG show the same drawing; \"-o -\" is SVG on standard output.")]
+The kind of file is recognised by its content. SVG and PNG show the same drawing; \"-o -\" is SVG on standard output.")]
 pub(super) struct Args {
     /// Database, model, predicted curve, scenario, result (CSV), solver file, or a curve's file (crumple db
     /// add --list)
@@ -57,7 +57,7 @@ pub(super) struct Args {
     /// Of a model: speed of the curve
     #[arg(long, value_parser = arguments::speed)]
     speed: Option<f64>,
-    /// Of a scenario or result: what is drawn
+    /// Of a scenario or result: quantity to draw
     #[arg(long, value_parser = one_of(QUANTITIES), default_value = "velocity")]
     quantity: Quantity,
     /// Of a scenario with FE's run as reference: compare the methods in the whole train
@@ -72,14 +72,14 @@ pub(super) struct Args {
     /// Of a solver file: section of a binout
     #[arg(long)]
     section: Option<String>,
-    /// Of a solver file: its kind (nodout, rcforc, …), if not by its content
+    /// Of a solver file: its kind (nodout, rcforc, …), if not recognised by its content
     #[arg(long)]
     format: Option<String>,
     /// Of a solver file: its units, such as mm-t-s; without them axes are in the file's units. Of a
-    /// curve's file: its units where it does not say them
+    /// curve's file: its units if it does not state them
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
-    /// Of a solver file: filtered lines beside the raw ones, by channel frequency class such as 60
+    /// Of a solver file: also draw filtered lines, by channel frequency class such as 60
     #[arg(long, value_name = "CLASS", requires = "units", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     cfc: Option<u32>,
     #[command(flatten)]
@@ -90,10 +90,10 @@ pub(super) struct Args {
     /// Width in pixels
     #[arg(long, default_value_t = 780.0, value_parser = pixels)]
     width: f64,
-    /// Height of the area between the axes in pixels
+    /// Height of the plot area in pixels
     #[arg(long, default_value_t = 320.0, value_parser = pixels)]
     height: f64,
-    /// Pixels of a PNG for each pixel of the width
+    /// Pixels of a PNG per pixel of the width
     #[arg(long, default_value_t = 2.0, value_parser = scale)]
     scale: f64,
 }
@@ -128,7 +128,7 @@ fn scale(text: &str) -> Result<f64, String> {
     within(text, 0.5, 8.0)
 }
 
-/// Most bytes of a result that is drawn.
+/// Maximum number of bytes of a result that is drawn.
 const MOST_RESULT: u64 = 1 << 30;
 
 #[derive(Serialize)]
@@ -146,7 +146,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     args.output.iter().try_for_each(|output| options.keep_others(output, FileKind::Curve))?;
     let to_stdout = args.output.iter().filter(|path| is_stdout(path)).count();
     if to_stdout > 1 || to_stdout == 1 && options.json {
-        return Err(Failure::Usage("standard output takes one of: one \"-o -\", or --json".into()));
+        return Err(Failure::Usage(
+            "standard output can take only one of them: one \"-o -\", or --json".into(),
+        ));
     }
     let mut chart = chart(args, options)?;
     if let Some(title) = &args.title {

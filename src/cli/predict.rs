@@ -33,19 +33,19 @@ pub(super) struct Args {
     /// Mass of the body, or of each body of a pair, with its unit (default: the training runs')
     #[arg(long, value_parser = arguments::mass, allow_hyphen_values = true)]
     mass: Option<f64>,
-    /// Rule for the maximal crush [default: the one that was best when speeds were left out]
+    /// Rule for the maximum crush [default: the best one when speeds were left out]
     #[arg(long, value_parser = one_of(MAX_CRUSH_RULES))]
     max_crush: Option<MaxCrushRule>,
-    /// The reference method's choices: maximal crush by the cubic spline
+    /// The reference method's choices: maximum crush by the cubic spline
     #[arg(long, conflicts_with = "max_crush")]
     paper: bool,
     /// Value of a further parameter of the training cases, as NAME=VALUE; may be repeated
     #[arg(long, value_parser = arguments::parameter, value_name = "NAME=VALUE")]
     parameter: Vec<(String, Parameter)>,
-    /// Scale the force so that the curve takes up the impact's kinetic energy (by 0.8 to 1.25)
+    /// Scale the force so that the curve absorbs the impact's kinetic energy (by 0.8 to 1.25)
     #[arg(long)]
     energy_correct: bool,
-    /// Answer further outside the training speeds than a third of their range
+    /// Allow speeds outside the training speeds by more than a third of their range
     #[arg(long)]
     extrapolate: bool,
     /// File to write, in the format of its extension or of --to; may be repeated
@@ -65,7 +65,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     args.target.check(&formats)?;
     let to_stdout = args.output.iter().filter(|path| is_stdout(path)).count();
     if to_stdout > 1 || to_stdout == 1 && options.json {
-        return Err(Failure::Usage("standard output takes one of: one \"-o -\", or --json".into()));
+        return Err(Failure::Usage(
+            "standard output can take only one of them: one \"-o -\", or --json".into(),
+        ));
     }
     args.output.iter().try_for_each(|output| keep_input(&args.model, output))?;
     args.output.iter().try_for_each(|output| options.keep_others(output, FileKind::Curve))?;
@@ -162,7 +164,9 @@ fn files<'a>(
 fn rests_on(band: &Band, in_range: bool) -> String {
     let place = if in_range { "between training speeds" } else { "outside the training speeds" };
     let (one, how) = match band.left_out {
-        LeftOutSpeeds::Inner => ("curve", "left out between others, for the width of the gap here"),
+        LeftOutSpeeds::Inner => {
+            ("curve", "left out in turn, scaled to the interval between the neighbouring speeds")
+        }
         LeftOutSpeeds::Ends => ("end", "of the range left out, growing with the distance"),
     };
     format!("{place}, from {} {how}", counted(band.curves, one))
@@ -189,7 +193,7 @@ fn print_unloading(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()
     Ok(())
 }
 
-/// How far FE may lie from each force of the curve, and what of it lies between equal runs.
+/// How far FE may lie from each force of the curve, and what of it lies between repeated runs.
 fn print_bands(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
     for (force, band) in curve.provenance.bands() {
         writeln!(
@@ -203,14 +207,14 @@ fn print_bands(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
         let Some(scatter) = band.scatter else { continue };
         writeln!(
             out,
-            "  of this              interpolation ±{:.1} %, scatter between equal runs ±{:.1} %",
+            "  of this              interpolation ±{:.1} %, scatter between repeated runs ±{:.1} %",
             band.interpolation_share() * 100.0,
             scatter.pointwise_share * 100.0
         )?;
     }
     let provenance = &curve.provenance;
     if provenance.band.is_some() && provenance.body_band.is_none() && curve.body_force_n.is_some() {
-        writeln!(out, "  band of body force   not known until the model is trained anew")?;
+        writeln!(out, "  band of body force   unknown until the model is trained again")?;
     }
     Ok(())
 }

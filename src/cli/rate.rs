@@ -15,7 +15,7 @@ use crate::rating::{self, Quantity, Rating, RatingSettings, Signal};
 use crate::solver::{self, Selection, WantedId};
 use crate::unit::TIME;
 
-/// Most bytes of a table that is rated: some million rows.
+/// Maximum number of bytes of a table that is rated: some million rows.
 const MAX_TABLE_BYTES: u64 = 256 << 20;
 
 /// Rate a prediction against a reference: ratios, peaks, ISO/TS 18571, CORA and others
@@ -28,15 +28,16 @@ const MAX_TABLE_BYTES: u64 = 256 << 20;
   crumple rate test.csv,time=ms model.csv,time=s
 A is the reference r, B the prediction p. Each is a CSV file (a header line; the first column is the
 time), FILE:COLUMN, or any file that crumple histories reads, FILE:ID:COMPONENT, in a binout with
-several sections FILE:SECTION:ID:COMPONENT; behind it ,scale=FACTOR on the values and ,time=UNIT of
-the times (s, ms, us). What both share may stand once, as --id and --component or --column. Both are filtered if asked, then interpolated
-linearly at common times 0.1 ms apart (10 kHz, as ISO/TS 18571 wants it). Accelerations are negative
-while the body is slowed down. ISO/TS 18571 and CORA take up to 2 s: choose with --from and --to.")]
+several sections FILE:SECTION:ID:COMPONENT; append ,scale=FACTOR for the values and ,time=UNIT for
+the times (s, ms, us). What both share can be given once, by --id and --component or --column. Both
+are filtered on request, then interpolated linearly at common times 0.1 ms apart (10 kHz, as required
+by ISO/TS 18571). Accelerations are negative during deceleration. ISO/TS 18571 and CORA take at most 2 s:
+choose with --from and --to.")]
 pub(super) struct Args {
-    /// Reference: CSV or a solver's file, with what to take from it
+    /// Reference: CSV or solver file, with the column or history to take
     #[arg(value_name = "A", value_parser = Address::parse, allow_hyphen_values = true)]
     reference: Address,
-    /// Prediction: CSV or a solver's file, with what to take from it
+    /// Prediction: CSV or solver file, with the column or history to take
     #[arg(value_name = "B", value_parser = Address::parse, allow_hyphen_values = true)]
     prediction: Address,
     #[command(flatten)]
@@ -44,33 +45,33 @@ pub(super) struct Args {
     /// Filter both with this channel frequency class, such as 60 or 180
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     cfc: Option<u32>,
-    /// Begin of what is rated, with its unit, such as 10ms
+    /// Start of the rated interval, with its unit, such as 10ms
     #[arg(long, value_parser = time, allow_hyphen_values = true)]
     from: Option<f64>,
-    /// End of what is rated, with its unit
+    /// End of the rated interval, with its unit
     #[arg(long, value_parser = time, allow_hyphen_values = true)]
     to: Option<f64>,
-    /// What the signals are (default: an acceleration if both names say so)
+    /// Kind of the signals (default: acceleration if both names indicate it)
     #[arg(long, value_parser = one_of(QUANTITIES))]
     quantity: Option<Quantity>,
 }
 
-/// Where the signal stands in both files.
+/// Where the signal is in both files.
 #[derive(clap::Args)]
 struct Both {
     /// Column of the CSV files
     #[arg(long)]
     column: Option<String>,
-    /// Node, wall or interface of the solver's files; 3:surfa is one side
+    /// Node, wall or interface of the solver files; 3:surfa is one side
     #[arg(long)]
     id: Option<WantedId>,
-    /// Component of the solver's files, named as in binout, such as x_velocity
+    /// Component of the solver files, named as in binout, such as x_velocity
     #[arg(long)]
     component: Option<String>,
     /// Section of binouts, such as nodout or rwforc/forces
     #[arg(long)]
     section: Option<String>,
-    /// Kind of the solver's files (nodout, rcforc, …), if not by their content
+    /// Kind of the solver files (nodout, rcforc, …), if not recognised by their content
     #[arg(long)]
     format: Option<String>,
 }
@@ -90,7 +91,7 @@ struct Address {
 impl Address {
     fn parse(text: &str) -> Result<Self, String> {
         let (mut rest, mut scale, mut unit) = (text, 1.0, None);
-        // A comma may stand in names as well.
+        // A comma may be in names as well.
         while let Some((before, last)) = rest.rsplit_once(',') {
             if let Some(value) = last.strip_prefix("scale=") {
                 scale = factor(value)?;
@@ -107,14 +108,14 @@ impl Address {
         let colons = rest.rmatch_indices(':').map(|(at, _)| at);
         let end =
             std::iter::once(rest.len()).chain(colons).find(|&at| Path::new(&rest[..at]).exists());
-        // Of no file: what does not stand there is said when it is read.
+        // No such file: what is missing is reported when it is read.
         let end = end.unwrap_or_else(|| rest.find(':').unwrap_or(rest.len()));
         let within = rest.get(end + 1..).map(String::from);
         Ok(Self { path: rest[..end].into(), within, scale, unit })
     }
 }
 
-/// The history of a solver's file that an address names.
+/// The history of a solver file that an address names.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct History<'a> {
     section: Option<&'a str>,
@@ -236,13 +237,14 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     Ok(if clean { Outcome::Clean } else { Outcome::Warned })
 }
 
-/// Refuses what chooses nothing: a column of a solver's file, a node of a table.
+/// Refuses what chooses nothing: a column of a solver file, a node of a table.
 fn used(args: &Args, is_table: [bool; 2]) -> Result<(), Failure> {
     let both = &args.both;
     let [a_is_table, b_is_table] = is_table;
     let (any_table, all_tables) = (a_is_table || b_is_table, a_is_table && b_is_table);
-    let column = "names a column of a CSV file, but that is a solver's: use --id and --component";
-    let history = "chooses a history of a solver's file, but that is a CSV: use --column";
+    let column =
+        "names a column of a CSV file, but this is a solver file: use --id and --component";
+    let history = "chooses a history of a solver file, but this is a CSV file: use --column";
     for (option, given, fits, why) in [
         ("--column", both.column.is_some(), any_table, column),
         ("--id", both.id.is_some(), !all_tables, history),
@@ -259,7 +261,7 @@ fn used(args: &Args, is_table: [bool; 2]) -> Result<(), Failure> {
 /// Records that differ this much in length are probably in different units.
 const LENGTHS: f64 = 100.0;
 
-/// Units are not guessed: records of very different lengths must say theirs.
+/// Units are not guessed: for records of very different lengths they must be given.
 fn same_unit_of_time(a: &Wanted, of_a: &Signal, b: &Wanted, of_b: &Signal) -> Result<(), Failure> {
     let length = |signal: &Signal| signal.range_s().1 - signal.range_s().0;
     let (long_a, long_b) = (length(of_a), length(of_b));
@@ -268,7 +270,7 @@ fn same_unit_of_time(a: &Wanted, of_a: &Signal, b: &Wanted, of_b: &Signal) -> Re
         return Ok(());
     }
     Err(failed(format!(
-        "{} lasts {long_a} s and {} {long_b} s, if both count time in s: write the unit of each behind its name, such as {},time=s and {},time=ms",
+        "{} lasts {long_a} s and {} {long_b} s, if both count time in s: write the unit of each after its name, such as {},time=s and {},time=ms",
         a.path.display(),
         b.path.display(),
         a.path.display(),
@@ -296,7 +298,7 @@ impl Wanted<'_> {
             {
                 match self.read_table() {
                     Err(_) if self.column.is_none() => Err(failed(format!(
-                        "{error}; a CSV file has the ending .csv, or its column behind its name: {}:COLUMN",
+                        "{error}; a CSV file has the extension .csv, or its column after its name: {}:COLUMN",
                         self.path.display()
                     ))),
                     read => read,
@@ -312,7 +314,7 @@ impl Wanted<'_> {
         let text = text.map_err(|e| failed(format!("{path}: {e}")))?;
         let read = formats::history(&text, self.column).map_err(|error| {
             let how = if error.is_about("column") {
-                format!(" behind the file's name: {path}:COLUMN")
+                format!(" after the file's name: {path}:COLUMN")
             } else {
                 String::new()
             };
@@ -361,7 +363,7 @@ impl Wanted<'_> {
             [] => return Err(failed(format!("{path}: it holds no history"))),
             [first, .., last] => {
                 return Err(failed(format!(
-                    "{path}: {} histories fit, from {} to {}: choose one as {path}:ID:COMPONENT (crumple inspect lists them)",
+                    "{path}: {} histories match, from {} to {}: choose one as {path}:ID:COMPONENT (crumple inspect lists them)",
                     file.histories.len(),
                     first.label(),
                     last.label()
@@ -371,7 +373,7 @@ impl Wanted<'_> {
         let label = history.label();
         if let Some(state) = history.values.iter().position(|v| v.is_nan()) {
             return Err(failed(format!(
-                "{path}: {label}: state {} at time {}: expected a number, but the file holds none there: choose a stretch without it by --from and --to, after writing the rest with crumple histories",
+                "{path}: {label}: state {} at time {}: expected a number, but the file holds none there: choose an interval without it with --from and --to, after writing the rest with crumple histories",
                 state + 1,
                 history.time[state]
             )));
@@ -422,6 +424,12 @@ fn milliseconds(time_s: f64) -> String {
     format!("{} ms", (time_s * 1e9).round() / 1e6)
 }
 
+/// Five significant digits.
+fn digits(value: f64) -> String {
+    let decimals = (4.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{value:.decimals$}")
+}
+
 /// The lines of the table: measure, value, and what belongs to it.
 fn rows(rating: &Rating) -> Vec<[String; 3]> {
     let percent = |ratio: f64| format!("{:.2} %", ratio * 100.0);
@@ -436,9 +444,9 @@ fn rows(rating: &Rating) -> Vec<[String; 3]> {
     let left_out = rating.pointwise.map(|p| format!("{} left out", percent(p.left_out)));
     row("pointwise", rating.pointwise.map(|p| percent(p.mean)), left_out.unwrap_or_default());
     let at = format!("at {}", milliseconds(rating.max_abs.time_s));
-    row("max_abs", Some(format!("{:.5}", rating.max_abs.value)), at);
+    row("max_abs", Some(digits(rating.max_abs.value)), at);
     for (number, peak) in rating.peaks.iter().enumerate() {
-        let at = format!("of {:.5} at {}", peak.value, milliseconds(peak.time_s));
+        let at = format!("of {} at {}", digits(peak.value), milliseconds(peak.time_s));
         let (value, more) = match (peak.error, peak.shift_s) {
             (Some(error), Some(shift_s)) => {
                 let word = if shift_s < 0.0 { "earlier" } else { "later" };
@@ -448,7 +456,7 @@ fn rows(rating: &Rating) -> Vec<[String; 3]> {
         };
         row(&format!("peak {}", number + 1), Some(value), more);
     }
-    row("integral", rating.integral_error.map(percent), "of p over that of r, less 1".into());
+    row("integral", rating.integral_error.map(percent), "of p over that of r, minus 1".into());
     let mut errors = |name: &str, of: Option<MagnitudePhase>| {
         let parts = of.map(|e| format!("M {:.4}, P {:.4}", e.magnitude, e.phase));
         row(name, of.map(|e| format!("{:.4}", e.combined)), parts.unwrap_or_default());
@@ -467,7 +475,7 @@ fn rows(rating: &Rating) -> Vec<[String; 3]> {
     row("CORA", rating.cora.map(|c| score(c.rating)), parts.unwrap_or_default());
     if let Some(of) = rating.deceleration {
         let both = |value: fn(&Deceleration) -> Option<f64>| {
-            let number = |of: &Deceleration| or_dash(value(of).map(|v| format!("{v:.5}")));
+            let number = |of: &Deceleration| or_dash(value(of).map(digits));
             (Some(number(&of.prediction)), format!("reference {}", number(&of.reference)))
         };
         let (value, more) = both(|d| d.mean);

@@ -20,7 +20,7 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
   crumple report curves.h5 -o report.html
   crumple report curves.h5 scenario.toml train-set.toml -o report.html
   crumple report curves.h5 --group lead-car-wall --speed 50km/h --nsdm-seeds 3 -o report.html
-The page needs no network and no other file. Scenarios are run; one with a [reference] is held against FE.")]
+The page needs no network and no other file. Scenarios are run; one with a [reference] is compared with FE.")]
 pub(super) struct Args {
     /// Curve database
     database: PathBuf,
@@ -32,7 +32,7 @@ pub(super) struct Args {
     /// Group to show; may be repeated (default: all)
     #[arg(long)]
     group: Vec<String>,
-    /// Speed of the predicted curves (default: the middle of each group's widest gap)
+    /// Speed of the predicted curves (default: the middle of each group's widest speed interval)
     #[arg(long, value_parser = arguments::speed)]
     speed: Option<f64>,
     /// Title of the page (default: the database's name)
@@ -67,7 +67,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     args.scenarios.iter().try_for_each(|scenario| keep_inputs(scenario, &args.output))?;
     options.keep_others(&args.output, FileKind::Curve)?;
     if is_stdout(&args.output) && options.json {
-        return Err(Failure::Usage("standard output takes one of: \"-o -\", or --json".into()));
+        return Err(Failure::Usage(
+            "standard output can take only one of them: \"-o -\", or --json".into(),
+        ));
     }
     let database = Database::read(&args.database)?;
     let settings = ReportSettings {

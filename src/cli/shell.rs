@@ -1,4 +1,4 @@
-//! `crumple completions`, `crumple man` and the help: made from the command line's own definition.
+//! `crumple completions`, `crumple man` and the help, generated from the definition of the command line.
 
 use std::path::{Path, PathBuf};
 
@@ -25,8 +25,8 @@ pub(super) struct Completions {
   crumple man | man -l -
   crumple man -o ~/.local/share/man/man1      # then: man crumple-build")]
 pub(super) struct Man {
-    /// Folder for crumple.1 and a page of every command, such as crumple-build.1; made if it is
-    /// not there
+    /// Folder for crumple.1 and a page of every command, such as crumple-build.1; created if it does
+    /// not exist
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
 }
@@ -58,7 +58,7 @@ const ORDER: [(&str, &str); 9] = [
     ("build", "their curves, in curves.h5"),
     ("validate curves.h5", "which model predicts best"),
     ("train curves.h5 -o M", "fit it"),
-    ("predict M --speed 50km/h", "a curve that was never run"),
+    ("predict M --speed 50km/h", "the curve at a speed never run"),
     ("init --scenario M", "a crash with it, in scenario.toml"),
     ("simulate scenario.toml", "a train, vehicle by vehicle"),
     ("report curves.h5 -o report.html", "all of it on one page"),
@@ -112,7 +112,7 @@ struct Pages {
 /// Writes a page of every command and of each of its own commands.
 fn write_pages(folder: &Path, options: GlobalOptions) -> CommandResult {
     std::fs::create_dir_all(folder).map_err(|source| {
-        let message = format!("cannot make {}: {source}", folder.display());
+        let message = format!("cannot create {}: {source}", folder.display());
         std::io::Error::new(source.kind(), message)
     })?;
     let mut command = Cli::command();

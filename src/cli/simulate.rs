@@ -336,7 +336,7 @@ fn print_energy(out: &mut dyn Write, ledger: &Ledger) -> io::Result<()> {
 
 fn print_limits(out: &mut dyn Write, limits: &Limits) -> io::Result<()> {
     let over = if !limits.beyond_data.is_empty() {
-        format!("cannot be told: {} left the data of the curve", limits.beyond_data.join(", "))
+        format!("unknown: {} went beyond the data of its curve", limits.beyond_data.join(", "))
     } else if limits.over.is_empty() {
         "no vehicle".into()
     } else {

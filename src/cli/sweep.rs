@@ -19,9 +19,9 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_inpu
 
 /// Run a scenario many times with varied speeds, masses, gaps and curves; a row of results each
 ///
-/// What is varied stands in the scenario's [sweep] table or in a file of its own (--plan). Rows
-/// come in order of items and are the same for any number of threads (RAYON_NUM_THREADS) and
-/// shards. A run that was stopped or killed goes on when the same command is given again.
+/// The scenario's [sweep] table, or a separate file (--plan), defines what is varied. Rows
+/// are in order of items and do not depend on the number of threads (RAYON_NUM_THREADS) and
+/// shards. An interrupted sweep resumes when the same command is given again.
 #[derive(clap::Args)]
 #[command(
     args_conflicts_with_subcommands = true,
@@ -48,17 +48,17 @@ pub(super) struct Args {
     /// Run block I of N blocks of the items
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<Shard>,
-    /// Start from the beginning, whatever an earlier run has left
+    /// Start from the beginning and discard the results of an earlier run
     #[arg(long)]
     restart: bool,
-    /// Say what would be run, and run nothing
+    /// Show what would be run, without running it
     #[arg(long)]
     dry_run: bool,
 }
 
 #[derive(clap::Subcommand)]
 enum Command {
-    /// Join the files of all shards of a sweep, given in any order
+    /// Join the files of all shards of a sweep, in any order
     #[command(after_help = "Examples:
   crumple sweep merge -o results.csv part*.csv
   crumple sweep merge -o results.h5 part*.csv")]
@@ -123,7 +123,7 @@ pub(super) fn run(args: &Args, global: GlobalOptions) -> CommandResult {
     let report = write(&sweep, output, &options, global)?;
     if !report.is_complete() {
         let message = format!(
-            "stopped behind {} of {} rows; the same command goes on there",
+            "stopped after {} of {} rows; the same command resumes there",
             report.done, report.rows
         );
         return Err(Failure::Failed(message.into()));
@@ -192,7 +192,7 @@ fn write(
     report
 }
 
-/// Set by the first Ctrl-C (or SIGTERM), so that a run ends behind the chunk it is at; the
+/// Set by the first Ctrl-C (or SIGTERM), so that a run ends after the chunk it is at; the
 /// second one ends it at once, which loses that chunk only.
 fn stop_flag() -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
@@ -235,8 +235,10 @@ impl<'a> Document<'a> {
 fn say(document: &Document<'_>, global: GlobalOptions, to_stdout: bool) -> CommandResult {
     let Document { report, seconds, output } = document;
     if report.failed > 0 {
-        let mut text =
-            format!("{} of {} items failed; their rows say why", report.failed, report.rows);
+        let mut text = format!(
+            "{} of {} items failed; their rows give the reason",
+            report.failed, report.rows
+        );
         for (item, message) in &report.messages {
             text.push_str(&format!("\n  item {item}: {message}"));
         }
@@ -255,8 +257,8 @@ fn say(document: &Document<'_>, global: GlobalOptions, to_stdout: bool) -> Comma
             table(out, &report.columns)?;
             let resumed = match report.resumed {
                 0 => String::new(),
-                n if n == report.rows => ", all of an earlier run".into(),
-                n => format!(", {n} of them of an earlier run"),
+                n if n == report.rows => ", all from an earlier run".into(),
+                n => format!(", {n} of them from an earlier run"),
             };
             writeln!(
                 out,

@@ -42,23 +42,23 @@ pub(super) struct Args {
     /// Kind of model
     #[arg(long, value_parser = model_names(), default_value = AUTO)]
     model: String,
-    /// Where the model will be asked: at vehicles of a train also far below the speeds of the runs, so
+    /// What the model is for: interfaces of a train also close far below the speeds of the runs, so
     /// that auto counts the ends of the range and prefers a force that follows the closing speed
     #[arg(long = "for", value_name = "USE", value_parser = one_of(PURPOSES), default_value = "vehicle")]
     purpose: Purpose,
     /// Number of trees [default: 50 of a forest, 500 of extra]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     trees: Option<u32>,
-    /// Seed of all random draws
+    /// Random seed
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Fewest samples of a leaf
+    /// Minimum samples per leaf
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     min_samples_leaf: u32,
-    /// Thresholds of splits [default: midpoint of a forest, random of extra]
+    /// Split thresholds [default: midpoint of a forest, random of extra]
     #[arg(long, value_parser = one_of(THRESHOLDS))]
     thresholds: Option<Thresholds>,
-    /// When a node is not split any more
+    /// When a node is no longer split
     #[arg(long, value_parser = one_of(STOP_RULES), default_value = "std-over-mean")]
     stop: StopRuleAt,
     /// Threshold of the stop rule: in N for var-over-mean, dimensionless for std-over-mean
@@ -83,7 +83,7 @@ fn model_names() -> PossibleValuesParser {
     PossibleValuesParser::new(iter::once(auto).chain(models))
 }
 
-/// Where a model will be asked.
+/// Where a model will be used.
 const PURPOSES: &[(&str, Purpose, &str)] = &[
     ("vehicle", Purpose::Vehicle, "One vehicle, between the speeds of the runs"),
     ("train", Purpose::Train, "Interfaces of a train, also beyond these speeds"),
@@ -98,7 +98,7 @@ const THRESHOLDS: &[(&str, Thresholds, &str)] = &[
 /// A rule with the threshold that it is given.
 type StopRuleAt = fn(f64) -> StopRule;
 
-/// When a node is not split any more.
+/// When a node is no longer split.
 const STOP_RULES: &[(&str, StopRuleAt, &str)] = &[
     ("never", |_| StopRule::Unpruned, "Grow until leaves are pure"),
     ("var-over-mean", StopRule::VarOverMean, "Var/Mean, as printed in the reference"),
@@ -144,7 +144,7 @@ impl Args {
         Ok(Choice::Kind(kind.with_forest(|own| self.forest(own))))
     }
 
-    /// A forest's own options with those that were asked for.
+    /// A forest's own options with those that were requested.
     fn forest(&self, own: ForestOptions) -> ForestOptions {
         let ForestOptions { table, .. } = ForestOptions::default();
         ForestOptions {
@@ -179,13 +179,13 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         model.cases.iter().filter(|c| c.truncated).map(|c| c.name.as_str()).collect();
     if !truncated.is_empty() {
         options.warn(&format!(
-            "runs that ended while loading are left out of the maximal crush: {}",
+            "runs that ended while loading are left out of the maximum crush: {}",
             truncated.join(", ")
         ));
     }
     if model.cases.len() < 3 {
         options.warn(&format!(
-            "the group has {}: with fewer than 3 no speed can be left out to see how good the model is",
+            "the group has {}: with fewer than 3, no speed can be left out to assess the model",
             counted(model.cases.len(), "curve")
         ));
     }
@@ -248,7 +248,7 @@ pub(super) fn stopped_mass_line(stopped: &StoppedMass, kind: SpeedKind) -> Strin
     let (end_m, all_kg) = stopped.in_all();
     let of = match kind {
         SpeedKind::Wall => "of the crush zone",
-        SpeedKind::Closing => "of reduced mass, half of what one of two equal ends has,",
+        SpeedKind::Closing => "of reduced mass (half that of one of two equal ends)",
     };
     let scatter_kg = stopped.residual_kg;
     format!(

@@ -1,4 +1,4 @@
-//! `crumple validate`: every model at every speed that is left out.
+//! `crumple validate`: every model at every left-out speed.
 
 use crate::error::Error;
 use crate::plural::counted;
@@ -22,24 +22,24 @@ use super::output;
 use super::progress::Bar;
 use super::{CommandResult, Failure, GlobalOptions, Outcome};
 
-/// Leave every speed out in turn, predict it by every model, and compare with FE
+/// Leave out every speed in turn, predict it with every model, and compare with FE
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   crumple validate curves.h5
   crumple validate curves.h5 --group lead-car-wall --next
   crumple validate curves.h5 --json
-Without --verbose only the mean errors, the choice and the bands are printed.
-Columns: force is sum|p-r|/sum|r| along FE's crush; energy and crush are prediction over FE (in
-the means by each rule for the crush, the model's own marked); peaks are the first two of FE's curve
-(force and place); velocity and acceleration (CFC 60; in brackets not filtered) are those of a
+Without --verbose, only mean errors, choice and bands are printed.
+Columns: force is sum|p-r|/sum|r| along FE's crush; energy and crush are prediction over FE (the
+means show crush by each rule, with the model's own marked); peaks are the first two of FE's curve
+(force and position); velocity and acceleration (CFC 60; unfiltered in brackets) are those of a
 multi-body run of one mass, driven by the model's body force, sum|p-r|/sum|r| to 30 ms after FE's
-largest crush. The means are over inner speeds; the ends of the range are extrapolation and stand
-apart. FE contact (floor) is FE's own contact force in that run: no prediction of that force
-can be expected to do better. FE body (check) is made from FE's own speeds, and only checks curve,
-force law and run. FE scatter (floor) is how far a run lies from the mean of several at its speed,
-which stands for them: no model can remove this part of an error, though the mean over n runs has
+maximum crush. The means are over inner speeds; the ends of the range are extrapolation and are listed
+separately. FE contact (floor) is FE's own contact force in that run: no prediction of that force
+can be expected to do better. FE body (check) is derived from FE's own speeds and only checks curve,
+force law and run. FE scatter (floor) is how far a run deviates from the mean of repeated runs at its
+speed: no model can remove this part of an error, though the mean over n runs has
 only its 1/sqrt(n). forest is the reference method (DDTCM), nearest is FDRM. --nested adds auto:
-model and rule chosen without the speed that is left out.")]
+model and rule chosen without the left-out speed.")]
 pub(super) struct Args {
     /// Curve database
     database: PathBuf,
@@ -49,7 +49,7 @@ pub(super) struct Args {
     /// Propose the speed whose FE run would help most
     #[arg(long)]
     next: bool,
-    /// Also leave speeds out of the choice itself: the honest error of auto (takes longer)
+    /// Also leave speeds out of the choice itself, for an unbiased error of auto (takes longer)
     #[arg(long)]
     nested: bool,
     /// Seed of the forests
@@ -151,7 +151,7 @@ fn validated(
     if args.next {
         next = next_run(&TrainingSet::new(group, cases)?, &validation);
         if next.is_none() {
-            let note = "there is no gap to run in: a second speed, far from the first, comes first";
+            let note = "there is no interval between speeds yet: first run a second speed, far from the first";
             validation.notes.push(note.into());
         }
     }
@@ -202,7 +202,7 @@ fn print_group(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
 }
 
 fn print_next(out: &mut dyn Write, next: &NextRun) -> io::Result<()> {
-    writeln!(out, "\nnext run: {}, as {}", km_per_h(next.speed_m_per_s), next.reason)?;
+    writeln!(out, "\nnext run: {}: {}", km_per_h(next.speed_m_per_s), next.reason)?;
     let then = next.other_gaps.iter().filter_map(|gap| {
         let (low, high) = gap.between_m_per_s;
         let error = gap.expected_force_l1? * 100.0;
@@ -229,11 +229,11 @@ pub(super) fn print_summary(out: &mut dyn Write, validation: &Validation) -> io:
     for (force, band) in bands(validation) {
         let span = km_per_h(band.span_m_per_s);
         let place = match band.left_out {
-            LeftOutSpeeds::Inner => format!("in a gap of {span}"),
-            LeftOutSpeeds::Ends => format!("{span} outside"),
+            LeftOutSpeeds::Inner => format!("between speeds {span} apart"),
+            LeftOutSpeeds::Ends => format!("{span} outside the range"),
         };
         let coverage = match band.coverage {
-            Some(share) => format!("covers {:.0} % of the points left out", share * 100.0),
+            Some(share) => format!("covers {:.0} % of the left-out points", share * 100.0),
             None => "not checked".into(),
         };
         writeln!(
@@ -273,7 +273,7 @@ fn peak(peak: &PeakError) -> String {
     }
 }
 
-/// What the row of FE's own curve is called. That of the body's force is made from FE's speeds, so
+/// What the row of FE's own curve is called. That of the body force is made from FE's speeds, so
 /// it is not a floor for predictions.
 fn own_curve(force: &str) -> String {
     match force {
@@ -291,14 +291,14 @@ fn floor(floor: &Floor) -> Vec<String> {
     cells
 }
 
-/// The means over the inner speeds, the floors beside them, and the choice.
+/// The means over the inner speeds with the floors, and the choice.
 pub(super) fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
     let group = &validation.group;
     if let Some(first) = validation.means.first() {
         let speeds = first.speeds;
         writeln!(
             out,
-            "{group}: means over {speeds} inner speeds left out in turn; the body's force drives the runs"
+            "{group}: means over {speeds} inner speeds left out in turn; the body force drives the runs"
         )?;
         let by_rule = MaxCrushRule::ALL.map(|rule| format!("by {}", rule.name()));
         let mut heading = vec!["model", "force", "energy", "crush"];
@@ -353,7 +353,7 @@ fn scatter_rows(validation: &Validation, inner: bool) -> impl Iterator<Item = Ve
     })
 }
 
-/// The scatter beside the means, pooled over the speeds that have several runs.
+/// The scatter, pooled over the speeds that have several runs.
 fn mean_scatter(scatter: &Scatter) -> Vec<String> {
     let mut cells = vec![SCATTER.into(), percent(scatter.force_l1)];
     cells.extend(["-"; 6].map(String::from));
@@ -362,7 +362,7 @@ fn mean_scatter(scatter: &Scatter) -> Vec<String> {
     cells
 }
 
-/// How far equal runs lie from their mean.
+/// How far repeated runs lie from their mean.
 fn scatter_line(scatter: &Scatter) -> String {
     let at = |at: &SpeedScatter| {
         format!("{} at {}", counted(at.runs.len(), "run"), km_per_h(at.speed_m_per_s))
@@ -382,20 +382,23 @@ fn band_line(force: &str, band: &Band) -> String {
         LeftOutSpeeds::Inner => (
             "curve",
             format!(
-                "in a gap of {span} between training speeds, in others by its power {POWER_OF_GAP}"
+                "between training speeds {span} apart, otherwise scaled by the interval to the power {POWER_OF_GAP}"
             ),
         ),
-        LeftOutSpeeds::Ends => {
-            ("end", format!("{span} outside the training speeds, elsewhere in proportion"))
-        }
+        LeftOutSpeeds::Ends => (
+            "end",
+            format!("{span} outside the training speeds, elsewhere in proportion to the distance"),
+        ),
     };
     let coverage = match band.coverage {
-        Some(share) => format!("covers {} of the points of the others left out", percent(share)),
+        Some(share) => {
+            format!("covers {} of the points of the other left-out curves", percent(share))
+        }
         None => format!("one {of} cannot be checked against others"),
     };
     let parts = match band.scatter {
         Some(scatter) => format!(
-            " (interpolation ±{}, scatter of equal runs ±{}, which no gap changes)",
+            " (interpolation ±{}, scatter of repeated runs ±{}, whatever the interval)",
             percent(band.interpolation_share()),
             percent(scatter.pointwise_share)
         ),

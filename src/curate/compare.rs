@@ -1,4 +1,4 @@
-//! Cases beside each other: what differs from the first of them.
+//! Cases side by side: what differs from the first of them.
 
 use crate::error::Error;
 use serde::Serialize;
@@ -8,10 +8,10 @@ use crate::dataset::grid;
 use crate::signal::l1_ratio;
 use crate::unit::SpeedKind;
 
-/// Cases beside each other.
+/// Cases side by side.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Comparison {
-    /// The case that the others are held against.
+    /// The case that the others are compared with.
     pub reference: String,
     /// One entry per case, the reference first.
     pub cases: Vec<Difference>,
@@ -32,23 +32,23 @@ pub(crate) struct Difference {
     pub force_kind: ForceKind,
     /// Mass of the body, in kg.
     pub mass_kg: f64,
-    /// Largest deflection, in m.
+    /// Maximum deflection, in m.
     pub max_deflection_m: f64,
     /// ∫F dd up to it, in J.
     #[serde(rename = "work_J")]
     pub work_j: f64,
-    /// Largest force, in N.
+    /// Peak force, in N.
     #[serde(rename = "peak_force_N")]
     pub peak_force_n: f64,
     /// Difference of the speed.
     pub speed_difference: f64,
     /// Difference of the mass.
     pub mass_difference: f64,
-    /// Difference of the largest deflection.
+    /// Difference of the maximum deflection.
     pub max_deflection_difference: f64,
     /// Difference of the work.
     pub work_difference: f64,
-    /// Difference of the largest force.
+    /// Difference of the peak force.
     pub peak_force_difference: f64,
     /// Deflection up to which both have a loading branch, in m.
     pub common_deflection_m: f64,
@@ -60,7 +60,7 @@ pub(crate) struct Difference {
 /// Steps of the common deflection at least.
 const STEPS: usize = 400;
 
-/// Holds cases against the first of them.
+/// Compares cases with the first of them.
 pub(crate) fn compare(cases: &[&Case]) -> Result<Option<Comparison>, Error> {
     let Some(first) = cases.first() else { return Ok(None) };
     let reference = first.loading()?.envelope;

@@ -30,7 +30,7 @@ pub(crate) enum OnConflict {
 pub(crate) struct Joined {
     /// Cases that were added under their own names.
     pub added: Vec<(PathBuf, CasePath)>,
-    /// Cases that are there already, under these names.
+    /// Cases that exist already, under these names.
     pub equal: Vec<(PathBuf, CasePath, CasePath)>,
     /// Cases that were added under these names.
     pub renamed: Vec<(PathBuf, CasePath, CasePath)>,
@@ -43,14 +43,14 @@ pub(crate) struct Joined {
 /// Where cases are copied to.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Target {
-    /// Another database, which is made if it is not there; the cases' own if absent.
+    /// Another database, which is created if it does not exist; the cases' own if absent.
     pub database: Option<PathBuf>,
     /// Their group there; their own if absent.
     pub group: Option<String>,
 }
 
 /// Joins the databases at `inputs`, in their order, into the file at `output`, which is one of them
-/// and then comes first, or is not there yet. Equal curves of a group are taken once, with the tags and notes of both.
+/// and then comes first, or does not exist yet. Equal curves of a group are taken once, with the tags and notes of both.
 pub(crate) fn merge(
     inputs: &[PathBuf],
     output: &Path,
@@ -62,7 +62,7 @@ pub(crate) fn merge(
     if !is_input && is_there(output)? {
         return Err(error!(
             Database,
-            "{} is there already: name it among the databases that are joined, or write to another file",
+            "{} exists already: name it among the databases to be joined, or write to another file",
             output.display()
         ));
     }
@@ -202,7 +202,7 @@ impl Join {
             let (path, names) = (path.display(), conflicts.join(", "));
             return Err(error!(
                 Database,
-                "{path}: other curves have these names already: {names}: rename the new ones with --rename, or take their place with --replace"
+                "{path}: other curves have these names already: {names}: rename the new ones with --rename, or replace the old ones with --replace"
             ));
         }
         self.database.change(|case| {

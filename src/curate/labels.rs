@@ -18,7 +18,7 @@ pub(crate) struct Labels {
     pub remove_tags: Vec<String>,
     /// Whether they lose all tags that they have.
     pub clear_tags: bool,
-    /// Notes that they get, behind those that they have.
+    /// Notes that they get, after those that they have.
     pub add_notes: Vec<String>,
     /// Notes that they lose.
     pub remove_notes: Vec<String>,
@@ -44,7 +44,7 @@ impl Labels {
             } else if tag.contains(|c: char| c.is_control() || [',', ';'].contains(&c)) {
                 "it may not contain \",\", \";\" or control characters"
             } else if tag.chars().count() > MAX_TAG {
-                "it has more than 100 characters; say it in a note"
+                "it has more than 100 characters; put it in a note"
             } else {
                 continue;
             };

@@ -3,7 +3,7 @@
 //!
 //! Every function that changes a database locks it, reads it, changes it in memory and puts the new
 //! file in the old one's place: a killed program leaves the one or the other, and a second writer
-//! is told.
+//! gets an error.
 
 mod compare;
 mod join;
@@ -33,14 +33,14 @@ pub(crate) use selection::SpeedRange;
 pub(crate) use tables::Tables;
 pub(crate) use tables::write_tables;
 
-/// Whether a database is changed or only asked what would change.
+/// Whether a database is changed, or only the changes are reported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Effect {
     Written,
     DryRun,
 }
 
-/// Writes a database, unless it is only to be said.
+/// Writes a database, unless this is a dry run.
 fn write(database: &Database, path: &Path, effect: Effect) -> Result<(), Error> {
     match effect {
         Effect::Written => Ok(database.write(path)?),

@@ -72,6 +72,6 @@ pub(crate) fn rename_group(path: &Path, group: &str, name: &str) -> Result<Vec<C
 pub(super) fn check(what: &'static str, name: &str) -> Result<(), Error> {
     names::check(name).map_err(|why| {
         let name = names::shown(name);
-        error!(Database, "\"{}\" is not a name of a {what}: {why}", name.escape_debug())
+        error!(Database, "\"{}\" is not a valid name for a {what}: {why}", name.escape_debug())
     })
 }

@@ -55,7 +55,7 @@ impl FromStr for SpeedRange {
         if low_m_per_s <= high_m_per_s {
             Ok(Self { low_m_per_s, high_m_per_s })
         } else {
-            Err(error!(Usage, "\"{text}\" ends below its beginning: write the lower speed first"))
+            Err(error!(Usage, "\"{text}\" ends below its start: write the lower speed first"))
         }
     }
 }
@@ -121,7 +121,7 @@ impl Selection {
         Ok(chosen)
     }
 
-    /// What is asked of a case, in words that follow "no case".
+    /// The selection, in words that follow "no case".
     fn asked(&self) -> String {
         let mut asked = Vec::new();
         if !self.cases.is_empty() {
@@ -195,7 +195,7 @@ mod tests {
         let said = |text: &str| range(text).unwrap_err().to_string();
         assert_eq!(
             said("40km/h..20km/h"),
-            "\"40km/h..20km/h\" ends below its beginning: write the lower speed first"
+            "\"40km/h..20km/h\" ends below its start: write the lower speed first"
         );
         assert!(said("..").contains("write 20km/h..40km/h"), "{}", said(".."));
         assert!(said("20..40").contains("speed \"20\" has no unit"), "{}", said("20..40"));

@@ -1,4 +1,4 @@
-//! Cases as CSV tables: one of the cases, and long ones of the samples of their curves.
+//! Cases as CSV tables: one of the cases, and long tables of the samples of their curves.
 
 use crate::error::Error;
 use std::collections::BTreeSet;
@@ -19,7 +19,7 @@ pub(crate) enum Tables {
     WithOriginals,
 }
 
-/// Writes the tables of cases into the folder at `path`, which is made if it is not there; returns
+/// Writes the tables of cases into the folder at `path`, which is created if it does not exist; returns
 /// their paths. Numbers have as many digits as they need to be read back the same; what a case
 /// does not have is empty.
 pub(crate) fn write_tables(

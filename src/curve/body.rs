@@ -1,4 +1,4 @@
-//! Body force: what moves the car body, from the rate of the deflection.
+//! Body force: the force that drives the car body, from the rate of the deflection.
 
 use super::loading::{loading_branch, loading_end};
 use super::{Case, Curve, Envelope};
@@ -14,8 +14,8 @@ pub struct BodyMotion {
     pub force: Envelope,
     /// Closing speed in m/s over deflection: an envelope by its shape, not a force.
     pub closing_speed: Envelope,
-    /// Speed of separation in m/s, the mean over up to 5 ms after the body force has first fallen to
-    /// zero behind the largest deflection; `None` if the record ends before it does.
+    /// Separation speed in m/s, the mean over up to 5 ms after the body force has first fallen to
+    /// zero after the maximum deflection; `None` if the record ends before it does.
     pub rebound_speed_m_per_s: Option<f64>,
 }
 
@@ -34,7 +34,7 @@ pub(crate) fn rebound_stiffness_n_per_m(
 /// effective mass, as [`body_motion`] filters it; of a table without times its own force.
 pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
     let time_s = case.curves.sampled.time_s();
-    // A motion that was made of a force says no more of it than the force itself.
+    // A motion computed from a force adds nothing to the force itself.
     if case.moves_by_its_force() {
         return case.curves.sampled.force_n().to_vec();
     }
@@ -42,7 +42,7 @@ pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
     let accelerations = derivative(time_s, &case.curves.closing_speed_m_per_s);
     let raw: Vec<f64> = accelerations.into_iter().map(|a| -mass * a).collect();
     let mut force_n = filtered(time_s, raw);
-    // The body does not yet feel the contact.
+    // The contact has not reached the body yet.
     force_n[0] = 0.0;
     force_n
 }
@@ -76,31 +76,31 @@ pub(crate) fn body_motion(case: &Case) -> Option<BodyMotion> {
     })
 }
 
-/// The force that moved the body as its speeds tell it, loading and unloading, not filtered.
+/// The force that drove the body, from its speeds, for loading and unloading, not filtered.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RecordedForce {
     /// Loading branch, in N.
     pub loading: Envelope,
-    /// Unloading branch from the largest deflection to where the force is first zero.
+    /// Unloading branch from the maximum deflection to where the force is first zero.
     pub unloading_deflection_m: Vec<f64>,
     pub unloading_force_n: Vec<f64>,
-    /// Stiffness in N/m of the straight line that gives back the energy of the separation.
+    /// Stiffness in N/m of the straight line that returns the energy of the separation.
     pub unloading_stiffness_n_per_m: Option<f64>,
 }
 
-/// The body still swings after it has left the obstacle: its speed of separation is the mean
+/// The body still oscillates after it has left the obstacle: its separation speed is the mean
 /// over this time, in s.
 const SEPARATION_S: f64 = 0.005;
 
-/// Speed of separation of closing speeds whose body has parted at state `from`.
+/// Separation speed of closing speeds whose body has parted at state `from`.
 fn separation_m_per_s(time_s: &[f64], closing_m_per_s: &[f64], from: usize) -> f64 {
     let until = time_s.iter().take_while(|&&time| time <= time_s[from] + SEPARATION_S).count();
     let after = &closing_m_per_s[from..until];
     -after.iter().sum::<f64>() / after.len() as f64
 }
 
-/// Near the largest deflection the force still swings in time while the deflection hardly
-/// moves: over the last share of it one mean force stands for all, so that the rebound does not depend on
+/// Near the maximum deflection the force still oscillates in time while the deflection hardly
+/// moves: over the last share of it one mean force is used, so that the rebound does not depend on
 /// where exactly a run stops.
 const LAST_SHARE: f64 = 0.005;
 
@@ -116,8 +116,8 @@ pub(crate) fn recorded_force(case: &Case) -> Option<RecordedForce> {
     let mean = |i: usize, j: usize| -0.5 * mass * (v[j] * v[j] - v[i] * v[i]) / (d[j] - d[i]);
     // The mean forces between them.
     let mut means = Vec::with_capacity(states.len());
-    // A body that swings forward at first would be pulled: what an interface that only pushes
-    // cannot give it is taken from the next pushes.
+    // A body that oscillates forward at first would need tension: the impulse that an interface that only pushes
+    // cannot provide is subtracted from the following pushes.
     let mut owed_j = 0.0;
     for w in states.windows(2) {
         let step = d[w[1]] - d[w[0]];

@@ -1,19 +1,19 @@
-//! Contact: when it begins in a record, and what of the record is not it.
+//! Contact: when it starts in a record, and which force pulses are not contact.
 //!
-//! Contact begins with the spell of force that holds most of the impulse, where the force crosses its threshold between two
-//! states. A record that begins in contact counts from its first state. The sign of a force is that of its impulse, which one
-//! wrong state does not turn. A body slows down two to four milliseconds after its nose has touched, so a body force takes the
-//! contact from a contact force that the recipe names (`contact`), or says that it cannot.
+//! Contact begins with the force pulse that holds most of the impulse, where the force crosses its threshold between two
+//! states. A record that starts in contact counts from its first state. The sign of a force is that of its impulse, which one
+//! wrong state does not reverse. A body slows down two to four milliseconds after its nose has touched, so for a body force the
+//! start of contact is taken from a contact force named in the recipe (`contact`), or a warning is given.
 
 /// A contact force is above this share of the largest, unless the recipe says otherwise.
 pub(crate) const THRESHOLD: f64 = 0.005;
 /// Before the crossing the force is gone where it is below this share of the threshold.
 const GONE: f64 = 0.1;
-/// Spells of force closer than this belong together: a nose plate may bounce.
+/// Force pulses closer than this belong together: a nose plate may bounce.
 const PAUSE_S: f64 = 0.010;
 /// A first piece of the contact with less than this share of its impulse may be noise.
 const SMALL_SHARE: f64 = 1e-3;
-/// Spells before the contact that are named one by one.
+/// Pulses before the contact that are listed individually.
 const NAMED: usize = 3;
 
 /// The force above which a record is in contact: a share of its largest.
@@ -29,7 +29,7 @@ pub(crate) struct Onset {
     /// From the last state without force to the first in contact, in s; `None` if the record
     /// begins in contact.
     pub interval_s: Option<f64>,
-    /// What the user should look at: spells before the contact, and a doubtful beginning.
+    /// What the user should check: pulses before the contact, and a doubtful start.
     pub warnings: Vec<String>,
 }
 
@@ -43,7 +43,7 @@ struct Spell {
     largest_n: f64,
 }
 
-/// The onset of the spell that holds most of the impulse; `None` if the force never exceeds the
+/// The onset of the pulse that holds most of the impulse; `None` if the force never exceeds the
 /// threshold.
 ///
 /// `time_s`: increasing, in s; `force_n`: as many values, in N, not filtered (a filter without
@@ -72,7 +72,7 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
         .take(NAMED)
         .map(|spell| {
             format!(
-                "contact: not the {} at {}, with {} of the impulse; contact begins at {} (contact_time = \"…ms\" in the run says otherwise)",
+                "contact: ignored the {} at {}, with {} of the impulse; contact starts at {} (contact_time = \"…ms\" in the run overrides this)",
                 spell.shown(),
                 milliseconds(time_s[spell.first]),
                 percent(spell.impulse_ns / total_ns),
@@ -81,7 +81,7 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
         })
         .collect();
     if main > NAMED {
-        warnings.push(format!("contact: {} more spells of force lie before it", main - NAMED));
+        warnings.push(format!("contact: {} more force pulses precede it", main - NAMED));
     }
     let first = pieces.iter().find(|p| p.first == contact.first);
     let second = pieces.iter().find(|p| p.first > contact.first && p.first <= contact.last);
@@ -89,7 +89,7 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
         && first.impulse_ns < SMALL_SHARE * contact.impulse_ns
     {
         warnings.push(format!(
-            "contact: it begins at {} with the {}, {} of the impulse, and goes on at {}: if that is noise, say contact_time = \"…ms\" in the run",
+            "contact: starts at {} with the {}, {} of the impulse, and resumes at {}: if that is noise, set contact_time = \"…ms\" in the run",
             milliseconds(crossing_s),
             first.shown(),
             percent(first.impulse_ns / contact.impulse_ns),
@@ -99,7 +99,7 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
     Some(Onset { time_s: crossing_s, interval_s, warnings })
 }
 
-/// Spells of states above the threshold; those less than `pause_s` apart are one.
+/// Pulses: states above the threshold; those less than `pause_s` apart are one.
 fn spells(time_s: &[f64], force_n: &[f64], threshold_n: f64, pause_s: f64) -> Vec<Spell> {
     let mut spells: Vec<Spell> = Vec::new();
     let last = time_s.len() - 1;
@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(
             found.warnings,
             [
-                "contact: not the force of up to 20.000 kN over 1 state at 15 ms, with 0.02 % of the impulse; contact begins at 49.005 ms (contact_time = \"…ms\" in the run says otherwise)"
+                "contact: ignored the force of up to 20.000 kN over 1 state at 15 ms, with 0.02 % of the impulse; contact starts at 49.005 ms (contact_time = \"…ms\" in the run overrides this)"
             ]
         );
     }

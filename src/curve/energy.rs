@@ -1,15 +1,15 @@
-//! Energy audit, and the refusal of runs whose energy or impulse cannot be.
+//! Energy audit, and the refusal of runs with an impossible energy or impulse.
 //!
-//! Refuses what no crash can be: work or impulse outside 0.67 to 1.5 of what mass and speed ask for, or a crush, speed or
-//! loading time of no vehicle. Units are told apart by trying the usual systems: energy, impulse, speed and the times must all
-//! fit, because SI and mm-kg-ms agree in energy and impulse. A run that ended while loading is held against the speed that it
+//! Refuses impossible crashes: work or impulse outside 0.67 to 1.5 times that of mass and speed, or a crush, speed or
+//! loading time of no vehicle. Units are distinguished by trying the usual systems: energy, impulse, speed and the times must all
+//! fit, because SI and mm-kg-ms agree in energy and impulse. A run that ended while loading is compared with the speed that it
 //! had reached.
 
 use super::loading::loading_end;
 use super::{Curve, EnergyAudit, Masses};
 use crate::unit::{Speed, UnitSystem, km_per_h};
 
-/// `W = ∫F dd` up to the largest deflection by the trapezoidal rule over the samples,
+/// `W = ∫F dd` up to the maximum deflection by the trapezoidal rule over the samples,
 /// and `E`, the kinetic energy of the impact.
 pub fn audit(curve: &Curve, masses: Masses, speed: Speed) -> EnergyAudit {
     let work_j = work_to_end(curve);
@@ -21,7 +21,7 @@ fn work_to_end(curve: &Curve) -> f64 {
     (1..=loading_end(curve)).map(|i| 0.5 * (f[i] + f[i - 1]) * (d[i] - d[i - 1])).sum()
 }
 
-/// Energy or impulse outside these shares of what the impact asks for is an error of the input.
+/// Energy or impulse outside these ratios to the impact's is an error of the input.
 pub(crate) const POSSIBLE: (f64, f64) = (0.67, 1.5);
 /// Two quantities of a record that should be one differ by less than this share of their range
 /// at any time, or the record is not one.
@@ -32,7 +32,7 @@ pub(crate) const IMPULSE_TOLERANCE: f64 = 0.05;
 const FASTEST_M_PER_S: f64 = 340.0;
 const LONGEST_CRUSH_M: f64 = 100.0;
 const SHORTEST_LOADING_S: f64 = 0.5e-3;
-/// A crush, in m, and a time to it, in s, as they are usual in crashes: to tell units by.
+/// A crush, in m, and a time to it, in s, that are usual in crashes, to recognise units.
 const USUAL_CRUSH_M: (f64, f64) = (2e-3, 20.0);
 const USUAL_LOADING_S: (f64, f64) = (2e-3, 3.0);
 /// Two speeds, or a speed's square and an energy, that agree this well have one cause.
@@ -58,7 +58,7 @@ pub(crate) struct StatedConditions<'a> {
     pub others: &'a [(String, f64)],
 }
 
-/// What the record gives in ratio to what the impact asks for.
+/// Energy and impulse of the record relative to those of the impact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct EnergyBalance {
     /// Work of the loading branch over the kinetic energy that it stopped.
@@ -70,7 +70,7 @@ pub(crate) struct EnergyBalance {
 /// Why a run cannot be what the manifest says.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "{found}: such an impact cannot be; {}. Correct the manifest, or take the run as it is with accept_energy = true",
+    "{found}: such an impact is impossible; {}. Correct the manifest, or take the run as it is with accept_energy = true",
     cause.of_run()
 )]
 pub struct ImpossibleRun {
@@ -95,7 +95,7 @@ impl ImpossibleRun {
     }
 }
 
-/// What an energy or impulse that cannot be likely comes from.
+/// The likely cause of an impossible energy or impulse.
 #[derive(Debug, Clone, PartialEq)]
 enum Cause {
     /// Units as which it would fit.
@@ -106,13 +106,13 @@ enum Cause {
     RecordedSpeed(String),
     /// Speed, deck or files of another run, as text with its speed.
     OtherRun(String),
-    /// A factor of two, with the mass that impulse and speeds ask for, as text.
+    /// A factor of two, with the mass that impulse and speeds imply, as text.
     Half(String),
     /// A factor of four, likewise.
     OneBody(String),
     /// Histories that do not belong together.
     Histories(&'static str),
-    /// Nothing that its size tells, likewise.
+    /// Unknown from its size, likewise.
     Unknown(String),
 }
 
@@ -124,7 +124,7 @@ impl Cause {
                 format!("likely the units: read as \"{units}\" it would fit")
             }
             Self::OtherUnits => {
-                "likely the units of the solver's files are others than the study says".into()
+                "likely the units: the solver files have others than the study states".into()
             }
             Self::RecordedSpeed(speed) => format!("likely the speed: the record's is {speed}"),
             Self::OtherRun(run) => format!("likely speed, deck or files of the run {run}"),
@@ -136,7 +136,7 @@ impl Cause {
             ),
             Self::Histories(cause) => (*cause).into(),
             Self::Unknown(mass) => {
-                format!("look at units, speed and mass{mass}, and at node and force of the recipe")
+                format!("check units, speed and mass{mass}, and node and force of the recipe")
             }
         }
     }
@@ -144,7 +144,7 @@ impl Cause {
     /// In words for somebody who has the curve in a file.
     fn of_file(&self) -> String {
         match self {
-            Self::OtherUnits => "likely the units of its columns are others".into(),
+            Self::OtherUnits => "likely the units of its columns".into(),
             Self::Half(mass) => format!(
                 "likely the mass{mass}, half a structure taken for a whole one, or the force of one of two sides"
             ),
@@ -152,7 +152,7 @@ impl Cause {
                 "likely the speed of one body taken for the closing speed of two (--kind), or the mass{mass}"
             ),
             Self::Unknown(mass) => format!(
-                "look at units, speed and mass{mass}; at whether the curve ends at the maximal crush of this impact, neither before nor behind; and at whether its columns are deflection and force of the whole body"
+                "check units, speed and mass{mass}; whether the curve ends at the maximum crush of this impact, neither before nor after it; and whether its columns are deflection and force of the whole body"
             ),
             Self::FittingUnits(_)
             | Self::RecordedSpeed(_)
@@ -164,8 +164,8 @@ impl Cause {
 
 impl StatedConditions<'_> {
     /// Work and impulse against the impact's, over the loading branch. A record that ends
-    /// while loading is held against the speed that it has reached; without recorded speeds
-    /// there is nothing to hold it against.
+    /// while loading is compared with the speed that it has reached; without recorded speeds
+    /// there is nothing to compare it with.
     pub(crate) fn balance(&self) -> EnergyBalance {
         let end = loading_end(self.curve);
         let mass = self.masses.effective_kg();
@@ -180,7 +180,7 @@ impl StatedConditions<'_> {
         let impulse_ns: f64 = (1..=end).map(|i| 0.5 * (f[i] + f[i - 1]) * (t[i] - t[i - 1])).sum();
         let lost_ns = self.closing_m_per_s.zip(self.recorded_m_per_s);
         let lost_ns = lost_ns.map(|(closing, first)| mass * (first - closing[end]));
-        // Next to nothing may be off by any factor: a record cut right after contact.
+        // Tiny values may be off by any factor: a record cut right after contact.
         let ratio = |is: f64, lost: f64, whole: f64| (lost > 0.1 * whole).then(|| is / lost);
         let recorded = self.recorded_m_per_s.unwrap_or(v);
         EnergyBalance {
@@ -189,7 +189,7 @@ impl StatedConditions<'_> {
         }
     }
 
-    /// Refuses what no crash can be, with the likely cause.
+    /// Refuses impossible crashes, with the likely cause.
     pub(crate) fn check(&self) -> Result<EnergyBalance, ImpossibleRun> {
         let balance = self.balance();
         let possible = |ratio: f64| (POSSIBLE.0..=POSSIBLE.1).contains(&ratio);
@@ -205,14 +205,14 @@ impl StatedConditions<'_> {
         let mut found = Vec::new();
         if beyond {
             found.push(format!(
-                "the largest crush is {} m after {} ms",
+                "the maximum crush is {} m after {} ms",
                 significant(crush_m),
                 significant(loading_s * 1e3)
             ));
         }
         if let Some(work) = balance.work {
             found.push(format!(
-                "the curve takes up {} times the kinetic energy of {} at {}",
+                "the curve absorbs {} times the kinetic energy of {} at {}",
                 significant(work),
                 self.shown_mass(),
                 self.speed
@@ -228,10 +228,11 @@ impl StatedConditions<'_> {
     }
 
     fn shown_mass(&self) -> String {
-        let tonnes = |kg: f64| format!("{} t", significant(kg / 1e3));
         match self.masses.other_kg {
-            Some(other) => format!("{} on {}", tonnes(self.masses.body_kg), tonnes(other)),
-            None => tonnes(self.masses.body_kg),
+            Some(other) => {
+                format!("{} on {}", significant_mass(self.masses.body_kg), significant_mass(other))
+            }
+            None => significant_mass(self.masses.body_kg),
         }
     }
 
@@ -267,10 +268,7 @@ impl StatedConditions<'_> {
         let mass = balance
             .impulse
             .map(|i| {
-                format!(
-                    " (impulse and speeds ask for {} t)",
-                    significant(i * self.masses.body_kg / 1e3)
-                )
+                format!(" (impulse and speeds give {})", significant_mass(i * self.masses.body_kg))
             })
             .unwrap_or_default();
         match work {
@@ -322,6 +320,15 @@ impl StatedConditions<'_> {
                 && (USUAL_LOADING_S.0..=USUAL_LOADING_S.1).contains(&(loading_s * time));
             all.then_some(name)
         })
+    }
+}
+
+/// A mass with four digits, in t or kg.
+fn significant_mass(kg: f64) -> String {
+    if kg < 1e3 {
+        format!("{} kg", significant(kg))
+    } else {
+        format!("{} t", significant(kg / 1e3))
     }
 }
 

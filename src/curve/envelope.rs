@@ -99,7 +99,7 @@ impl Envelope {
         &self.work_j
     }
 
-    /// Largest deflection of the table, in m.
+    /// Maximum deflection of the table, in m.
     pub fn end_m(&self) -> f64 {
         self.deflection_m[self.deflection_m.len() - 1]
     }
@@ -130,7 +130,7 @@ impl Envelope {
         self.work_j[self.work_j.len() - 1]
     }
 
-    /// The deflection at which the envelope has taken up `energy_j`; beyond its end the
+    /// The deflection at which the envelope has absorbed `energy_j`; beyond its end the
     /// last force holds. `None` if it never does.
     pub fn deflection_for_work(&self, energy_j: f64) -> Option<f64> {
         let end = self.work_j.len() - 1;
@@ -161,7 +161,7 @@ impl Envelope {
         (1..self.force_n.len()).map(slope).fold(0.0, f64::max)
     }
 
-    /// Largest force, in N.
+    /// Peak force, in N.
     pub fn peak_force_n(&self) -> f64 {
         self.force_n.iter().copied().fold(0.0, f64::max)
     }

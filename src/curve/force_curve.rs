@@ -1,5 +1,5 @@
-//! Force curves: what the database, models, files and NSDM give, and what multi-body runs,
-//! exports and comparisons take.
+//! Force curves: the output of database, models, files and NSDM, and the input of multi-body runs,
+//! exports and comparisons.
 
 use super::body::{rebound_stiffness_n_per_m, recorded_force};
 use super::tail::{Tail, bottomed, with_tail};
@@ -10,33 +10,33 @@ use crate::unit::SpeedKind;
 /// A force–deflection curve that can drive an interface, with what its source knows of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForceCurve {
-    /// Loading branch from (0, 0) to the maximal crush.
+    /// Loading branch from (0, 0) to the maximum crush.
     pub loading: Envelope,
-    /// The same force along deflections of which some lie beyond the maximal crush: neighbours
+    /// The same force along deflections of which some lie beyond the maximum crush: neighbours
     /// in a train push on where a body by itself would have stopped.
     pub beyond: Option<Envelope>,
     /// From the end of the loading branch.
     pub unloading: CurveUnloading,
-    /// Which force it is; `None` if its source does not say.
+    /// Which force it is; `None` if its source does not state it.
     pub kind: Option<ForceKind>,
     /// What its speed is measured against; `None` for a curve without a speed.
     pub speed_kind: Option<SpeedKind>,
     /// Speed that it belongs to.
     pub speed_m_per_s: Option<f64>,
-    /// Deflection up to which its source has data, in m, where the loading branch goes on behind it.
+    /// Deflection up to which its source has data, in m, where the loading branch continues after it.
     pub data_end_m: Option<f64>,
 }
 
-/// What is known of a curve's unloading from its largest deflection.
+/// The known unloading of a curve from its maximum deflection.
 #[derive(Clone, Debug, PartialEq)]
 pub enum CurveUnloading {
     /// Nothing.
     Unknown,
     /// A straight line of this stiffness in N/m.
     Stiffness(f64),
-    /// The recorded branch, from the largest deflection to where the force is first zero.
+    /// The recorded branch, from the maximum deflection to where the force is first zero.
     Recorded {
-        /// Of the straight line that gives back the same energy, in N/m.
+        /// Of the straight line that returns the same energy, in N/m.
         stiffness_n_per_m: f64,
         /// Falling.
         deflection_m: Vec<f64>,
@@ -45,19 +45,19 @@ pub enum CurveUnloading {
     },
 }
 
-/// Why a case has no curve of the force that was asked for.
+/// Why a case has no curve of the force that was requested.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(crate) enum ForceCurveError {
     /// Its loading branch is not an envelope.
     #[error("{0}")]
     Envelope(#[from] Error),
-    /// Its body force cannot be told from its speeds.
+    /// Its body force cannot be computed from its speeds.
     #[error("its samples contain no loading branch")]
     NoMotion,
 }
 
 impl ForceCurve {
-    /// A curve of which nothing else is known.
+    /// A curve without further data.
     pub(crate) fn bare(loading: Envelope) -> Self {
         Self {
             loading,
@@ -70,7 +70,7 @@ impl ForceCurve {
         }
     }
 
-    /// A force that moves bodies of one mass, and of which nothing else is known.
+    /// A force that drives bodies of one mass, without further data.
     pub(crate) fn of_body(loading: Envelope) -> Self {
         Self { kind: Some(ForceKind::Body), ..Self::bare(loading) }
     }
@@ -180,7 +180,7 @@ impl CurveUnloading {
         stiffness_n_per_m.map_or(Self::Unknown, Self::Stiffness)
     }
 
-    /// Stiffness in N/m of the line that gives back the same energy, if it is known.
+    /// Stiffness in N/m of the line that returns the same energy, if it is known.
     pub fn stiffness_n_per_m(&self) -> Option<f64> {
         match self {
             Self::Unknown => None,

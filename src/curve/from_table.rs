@@ -1,9 +1,9 @@
-//! From a table of force over deflection to the curve of a case: with times as of an FE record,
-//! without them by the motion that the table itself asks for.
+//! From a table of force over deflection to the curve of a case: with times like an FE record,
+//! without them by the motion that the table itself implies.
 //!
-//! **Without times** the largest deflection of the table is taken as the largest crush. A body
+//! **Without times** the maximum deflection of the table is taken as the maximum crush. A body
 //! that starts at the impact speed `v0` and is stopped there by the table's own force has
-//! `v(d)² = v0² (1 − W(d)/W(end))`; time is the integral of `dd/v`. Behind it the table's own
+//! `v(d)² = v0² (1 − W(d)/W(end))`; time is the integral of `dd/v`. After it the table's own
 //! unloading branch, or a line of the unloading stiffness, drives the body back; then both part.
 //! Every point of the table is a state, with states between them at an eighth of the common
 //! interval, so that straight lines over time follow the motion.
@@ -15,6 +15,7 @@ use super::{Curve, EnergyAudit, Quality, RecordedCurves, contact, energy, loadin
 use crate::error::{Error, ErrorCode, error};
 use crate::plural::counted;
 use crate::signal::interpolate;
+use crate::unit::Shown;
 
 /// Study of the cases that were added from files and not built of FE runs.
 pub(crate) const IMPORTED: &str = "imported";
@@ -23,11 +24,11 @@ fn impossible_table(impossible: energy::ImpossibleRun) -> Error {
     let (found, cause) = (impossible.found(), impossible.cause_in_file());
     error!(
         Other,
-        "{found}: such an impact cannot be; {cause}. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"
+        "{found}: such an impact is impossible; {cause}. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"
     )
 }
 
-/// What an error of the extraction says of a table, which has no recipe.
+/// The message of an extraction error for a table, which has no recipe.
 fn of_table(error: ExtractError) -> Error {
     match error {
         ExtractError::ImpossibleRun(found) => impossible_table(found),
@@ -37,11 +38,11 @@ fn of_table(error: ExtractError) -> Error {
         ),
         ExtractError::NoContact => error!(
             Other,
-            "the force of the record is never positive, which is not a contact: look at its column"
+            "the force of the record is never positive, which is not a contact: check its column"
         ),
         ExtractError::NoDeflection => error!(
             Other,
-            "the deflection does not grow after contact: look at its column, and whether it is compression"
+            "the deflection does not grow after contact: check its column, and whether it is compression"
         ),
         ExtractError::Curve(error) => error,
         other => Error::below(ErrorCode::Other, other),
@@ -51,7 +52,7 @@ fn of_table(error: ExtractError) -> Error {
 /// The curve of a table under an impact.
 ///
 /// # Errors
-/// It says what cannot be, and what to change.
+/// It names what is impossible, and what to change.
 pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quality), Error> {
     // As many of everything as there are deflections, so that no index is out of bounds.
     let deflection = table.deflection_m.len();
@@ -77,10 +78,10 @@ pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves,
     }
 }
 
-/// Most states at the common interval: 15 s of 0.75 ms.
+/// Maximum number of states at the common interval: 15 s of 0.75 ms.
 const MOST_STATES: usize = 20_000;
 
-/// The motion that the table asks for.
+/// The motion that the table implies.
 fn retraced(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quality), Error> {
     let interval_s = Sampling::default().interval_s;
     let motion = retrace(table, impact, interval_s)?;
@@ -106,7 +107,7 @@ fn retraced(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quali
     let audit = energy::audit(&original, impact.masses, impact.speed);
     if (audit.ratio() - 1.0).abs() > EnergyAudit::TOLERANCE {
         warnings.push(format!(
-            "energy: the curve takes up {:.1} % of the kinetic energy",
+            "energy: the curve absorbs {:.1} % of the kinetic energy",
             audit.ratio() * 100.0
         ));
     }
@@ -150,7 +151,7 @@ fn recorded(
 ) -> Result<(RecordedCurves, Quality), Error> {
     let mut notes = vec!["motion: that of the file's times, not filtered".to_string()];
     let contact = begins_in_contact(time_s, table.force_n).then(|| {
-        notes.push("contact: the record begins with it".into());
+        notes.push("contact: the record starts with it".into());
         StatedContact::Time { s: time_s[0] }
     });
     let common = Sampling::default();
@@ -179,7 +180,7 @@ fn recorded(
     Ok((curves, Quality { audit: quality.audit, notes, warnings }))
 }
 
-/// What is said of a record under an impact: notes and warnings.
+/// Notes and warnings on a record under an impact.
 fn remarks(curves: &RecordedCurves, impact: &Impact) -> Result<(Vec<String>, Vec<String>), Error> {
     let (mut notes, mut warnings) = (Vec::new(), Vec::new());
     if let Some(found) = other_speed(&curves.closing_speed_m_per_s, impact.speed.m_per_s) {
@@ -187,7 +188,7 @@ fn remarks(curves: &RecordedCurves, impact: &Impact) -> Result<(Vec<String>, Vec
             let cause = "the times are in another unit, the speed is that of another run, or the test was slow (--time-column none takes its force over deflection without the times)";
             return Err(error!(
                 Other,
-                "{found}: such an impact cannot be; {cause}. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"
+                "{found}: such an impact is impossible; {cause}. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"
             ));
         }
         warnings.push(format!("accept_energy: {found}"));
@@ -206,21 +207,21 @@ fn other_speed(closing_m_per_s: &[f64], stated_m_per_s: f64) -> Option<String> {
     let begins = closing_m_per_s.iter().take(FIRST_STATES).copied().fold(0.0, f64::max);
     let ratio = begins / stated_m_per_s;
     (!(0.8..=1.25).contains(&ratio)).then(|| {
-        format!("its deflection begins with {begins:.4} m/s, {stated_m_per_s:.4} m/s is stated")
+        format!("its deflection starts at {begins:.4} m/s, but {stated_m_per_s:.4} m/s is stated")
     })
 }
 
 /// States in which the speed of a record's beginning is looked for.
 const FIRST_STATES: usize = 4;
 
-/// What is said of a stated stiffness, in N/m, beside the one that the record holds: a note, or a warning
-/// if it holds none.
+/// Note on a stated stiffness, in N/m, other than that of the record; a warning
+/// if the record has none.
 fn unloading_of_record(found: Option<f64>, stated: f64) -> Result<String, String> {
     match found {
         Some(found) => Ok(format!(
-            "unloading: {:.4} MN/m as the record has it, {:.4} MN/m is stated",
-            found / 1e6,
-            stated / 1e6
+            "unloading: {} in the record, {} is stated",
+            Shown::one_stiffness(found),
+            Shown::one_stiffness(stated)
         )),
         None => Err("unloading: a record over time keeps its own, which it does not hold; the stated one is not used".into()),
     }
@@ -256,7 +257,7 @@ mod tests {
     }
 
     /// A mass on a linear spring: d = d_max sin ωt, stopped after a quarter of the period, and
-    /// thrown back with its own speed by the same stiffness.
+    /// rebounded with its own speed by the same stiffness.
     #[test]
     fn a_linear_spring_gives_a_sine() {
         let (m, v, k): (f64, f64, f64) = (24e3, 10.0, 40e6);
@@ -340,17 +341,17 @@ mod tests {
         let (d, f) = ([0.0, 0.2, 0.4, 0.5], [0.0, 1e6, 2e6, 3e6]);
         let table = Table { deflection_m: &d, force_n: &f, time_s: None, body_force_n: None };
         let error = from_table(&table, &impact(10.0, 24e3)).unwrap_err().to_string();
-        assert!(error.contains("the curve takes up 0.5417 times the kinetic energy"), "{error}");
+        assert!(error.contains("the curve absorbs 0.5417 times the kinetic energy"), "{error}");
         assert!(error.contains("--accept-energy"), "{error}");
         let accepted = Impact { accept_energy: true, ..impact(10.0, 24e3) };
         assert!(from_table(&table, &accepted).unwrap().1.warnings[1].starts_with("accept_energy"));
         let ends = Table { force_n: &[0.0, 1e6, 2e6, 0.0], ..table };
         let error = from_table(&ends, &accepted).unwrap_err().to_string();
-        assert!(error.contains("the force at the largest deflection is 0"), "{error}");
+        assert!(error.contains("the force at the maximum deflection is 0"), "{error}");
         // A force of next to nothing at the end would take for ever.
         let crawls = Table { force_n: &[1e6, 1e-9, 1e-9, 1e-9], ..table };
         let error = from_table(&crawls, &accepted).unwrap_err().to_string();
-        assert!(error.contains("a body hardly moves any more"), "{error}");
+        assert!(error.contains("a body almost stops moving"), "{error}");
         let soft = Impact { unloading_stiffness_n_per_m: Some(1e6), ..accepted };
         let error = from_table(&table, &soft).unwrap_err().to_string();
         assert!(error.contains("1000000 N/m is softer than the line"), "{error}");

@@ -1,4 +1,4 @@
-//! What the cases of one group say of each other: copies, another design, energy or impulse unlike the others'.
+//! Comparison of the cases of one group: copies, another design, energy or impulse unlike the others'.
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -22,10 +22,10 @@ const RATE_POWER: f64 = 0.15;
 /// Correlation of the two curves: of one design 0.74 and more.
 const LEAST_CORRELATION: f64 = 0.5;
 
-/// Something to look at in a case, seen beside the others: its name, a code and words.
+/// Something unusual in a case compared with the others: its name, a code and words.
 pub(crate) type Remark = (String, &'static str, String);
 
-/// What is odd in a group. `cases`: readable, of one group, by speed.
+/// Unusual cases of a group. `cases`: readable, of one group, by speed.
 pub(crate) fn remarks(cases: &[Case]) -> Vec<Remark> {
     let mut all = copies(cases);
     all.extend(titles(cases));
@@ -62,7 +62,7 @@ pub(crate) fn remarks(cases: &[Case]) -> Vec<Remark> {
     all
 }
 
-/// Impulse up to the largest deflection over mass times speed.
+/// Impulse up to the maximum deflection over mass times speed.
 fn impulse_ratio(case: &Case) -> f64 {
     let (t, f) = (case.curves.original.time_s(), case.curves.original.force_n());
     let end = case.loading_end();
@@ -70,7 +70,7 @@ fn impulse_ratio(case: &Case) -> f64 {
     impulse / (case.conditions.masses.effective_kg() * case.conditions.speed.m_per_s)
 }
 
-/// What the others say at the speed of point `i`: by the median slope and level of those nearest
+/// The value of the others at the speed of point `i`: by the median slope and level of those nearest
 /// in speed, or their median where they are few. One wrong run among them does not move it.
 fn expected(points: &[(f64, f64)], i: usize) -> Option<f64> {
     let mut others: Vec<(f64, f64)> =
@@ -115,7 +115,7 @@ fn copies(cases: &[Case]) -> Vec<Remark> {
                 case.id.name.clone(),
                 "copy",
                 format!(
-                    "is a copy of {}: the same values at every state, no repetition of the run; scatter counts them once",
+                    "is a copy of {}: the same values at every state, so not a repeated run; scatter counts them once",
                     one.id.name
                 ),
             )),
@@ -133,7 +133,7 @@ fn wording(title: &str) -> String {
     words.collect::<Vec<_>>().join(" ").to_lowercase()
 }
 
-/// Titles of the solver's files that differ by more than numbers from those of most cases.
+/// Titles of the solver files that differ by more than numbers from those of most cases.
 fn titles(cases: &[Case]) -> Vec<Remark> {
     let title = |case: &Case| case.provenance.sources.iter().find_map(|s| s.title.clone());
     let titled: Vec<(&Case, String)> =

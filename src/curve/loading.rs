@@ -4,25 +4,25 @@ use super::{Curve, Envelope};
 use crate::error::Error;
 
 /// A sample joins the loading branch if its deflection exceeds the running maximum by
-/// this share of the largest deflection.
+/// this share of the maximum deflection.
 const MIN_ADVANCE: f64 = 1e-6;
 
 /// The loading branch of a curve.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loading {
-    /// Force over deflection, from (0, 0) to the largest deflection.
+    /// Force over deflection, from (0, 0) to the maximum deflection.
     pub envelope: Envelope,
     /// Samples left out because the deflection did not advance.
     pub dropped: usize,
 }
 
-/// Index of the largest deflection: the end of the loading branch.
+/// Index of the maximum deflection: the end of the loading branch.
 pub(crate) fn loading_end(curve: &Curve) -> usize {
     let deflection = curve.deflection_m();
     (1..deflection.len()).fold(0, |best, i| if deflection[i] > deflection[best] { i } else { best })
 }
 
-/// The samples up to the largest deflection whose deflection advances, begun at 0. A record
+/// The samples up to the maximum deflection whose deflection advances, begun at 0. A record
 /// that begins with a deflection (an offset) rises to it in a straight line.
 pub(crate) fn loading_branch(curve: &Curve) -> Result<Loading, Error> {
     let end = loading_end(curve);
@@ -44,7 +44,7 @@ pub(crate) fn loading_branch(curve: &Curve) -> Result<Loading, Error> {
     Ok(Loading { envelope, dropped })
 }
 
-/// Secant of the unloading branch between 90 % and 10 % of the force at the largest
+/// Secant of the unloading branch between 90 % and 10 % of the force at the maximum
 /// deflection, in N/m.
 ///
 /// `None` if the record ends before, or the deflection does not fall between the two.

@@ -111,7 +111,7 @@ impl Curve {
 )]
 #[serde(rename_all = "snake_case")]
 pub enum ForceKind {
-    /// What the obstacle feels: wall, contact side, section.
+    /// The force on the obstacle: wall, contact side, section.
     Contact,
     /// Mass times acceleration of the body.
     Body,
@@ -135,9 +135,7 @@ impl ForceKind {
     pub fn drives(self) -> &'static str {
         match self {
             Self::Body => "bodies of one mass",
-            Self::Contact => {
-                "bodies whose crush zone is a mass of its own; one rigid mass does not follow it"
-            }
+            Self::Contact => "bodies whose crush zone is a separate mass, not a single rigid mass",
         }
     }
 }
@@ -187,9 +185,9 @@ pub struct SourceFile {
     pub blake3: String,
     /// Name of the file's format, such as `nodout`.
     pub format: String,
-    /// Solver that wrote it, if the file tells.
+    /// Solver that wrote it, if the file states it.
     pub solver: Option<String>,
-    /// Version of that solver, if the file tells.
+    /// Version of that solver, if the file states it.
     pub version: Option<String>,
     /// Title of the run, if the file has one.
     pub title: Option<String>,
@@ -211,7 +209,7 @@ pub enum Parameter {
 /// Energy of the loading branch against the kinetic energy it stopped.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnergyAudit {
-    /// `W`: integral of force over deflection up to the largest deflection.
+    /// `W`: integral of force over deflection up to the maximum deflection.
     pub work_j: f64,
     /// `E`: kinetic energy of the impact.
     pub kinetic_j: f64,
@@ -221,14 +219,14 @@ impl EnergyAudit {
     /// Imbalance over which a warning is due.
     pub(crate) const TOLERANCE: f64 = 0.05;
 
-    /// `W/E`; 1 where the curve takes up exactly the impact's energy.
+    /// `W/E`; 1 where the curve absorbs exactly the impact's energy.
     pub fn ratio(&self) -> f64 {
         self.work_j / self.kinetic_j
     }
 }
 
 /// What a case was built from, by the names in the manifest at that time: a case that was renamed
-/// since, here or there, is known by it.
+/// since, here or there, is recognised by it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Origin {
     /// Path of the study's manifest from the root on, as given.
@@ -284,13 +282,13 @@ pub struct RecordedCurves {
 pub struct Quality {
     /// Work of the force against the kinetic energy.
     pub audit: EnergyAudit,
-    /// What the extraction did that the manifest does not say.
+    /// What the extraction did beyond the manifest.
     pub notes: Vec<String>,
-    /// What the user should look at before trusting the case.
+    /// What the user should check before trusting the case.
     pub warnings: Vec<String>,
 }
 
-/// Where a case comes from, and the words that users gave it.
+/// Where a case comes from, and its tags and notes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Provenance {
     /// The recipe and the run's entry, as JSON.
@@ -299,16 +297,16 @@ pub struct Provenance {
     pub fingerprint: String,
     /// Files that it was made from.
     pub sources: Vec<SourceFile>,
-    /// Time by the clock that the solver took for the run, in s, if the run's folder has it.
+    /// Wall-clock time of the solver for the run, in s, if the run's folder has it.
     pub solver_wall_time_s: Option<f64>,
-    /// When it was built, in UTC as ISO 8601 has it (`2026-05-04T13:37:00Z`); `None` in databases
+    /// When it was built, in UTC (ISO 8601) (`2026-05-04T13:37:00Z`); `None` in databases
     /// before version 3.
     pub built_utc: Option<String>,
     /// What it was built from; `None` if from a file, and in databases before version 3.
     pub origin: Option<Origin>,
-    /// Words that users gave it, in alphabetical order, each once.
+    /// Users' tags, in alphabetical order, each once.
     pub tags: Vec<String>,
-    /// What users noted of it, in their order.
+    /// Users' notes, in their order.
     pub user_notes: Vec<String>,
 }
 
@@ -333,31 +331,31 @@ impl Case {
         loading::loading_branch(&self.curves.original)
     }
 
-    /// Index of the largest deflection in the original curve.
+    /// Index of the maximum deflection in the original curve.
     pub fn loading_end(&self) -> usize {
         loading::loading_end(&self.curves.original)
     }
 
-    /// Units of the solver's files, as the recipe has them; `None` in databases of earlier
+    /// Units of the solver files, as the recipe has them; `None` in databases of earlier
     /// versions.
     pub(crate) fn units(&self) -> Option<UnitSystem> {
         let recipe: serde_json::Value = serde_json::from_str(&self.provenance.recipe).ok()?;
         UnitSystem::parse(recipe.get("units")?.as_str()?).ok()
     }
 
-    /// Whether its motion was made of its own force, as of an imported table without times: then
+    /// Whether its motion was made of its own force, as for an imported table without times: then
     /// that force is also the one that moves the body.
     pub(crate) fn moves_by_its_force(&self) -> bool {
         let recipe: Option<serde_json::Value> = serde_json::from_str(&self.provenance.recipe).ok();
         recipe.is_some_and(|r| r["imported"]["moves_by_its_force"] == true)
     }
 
-    /// Largest deflection, in m.
+    /// Maximum deflection, in m.
     pub fn max_deflection_m(&self) -> f64 {
         self.curves.original.deflection_m[self.loading_end()]
     }
 
-    /// Largest force of the original states, in N: contact or body force, as the recipe has it.
+    /// Peak force of the original states, in N: contact or body force, as in the recipe.
     pub fn peak_force_n(&self) -> f64 {
         self.curves.original.force_n.iter().copied().fold(0.0, f64::max)
     }
@@ -379,7 +377,7 @@ impl Case {
     }
 }
 
-/// The same of a run's recipe, as JSON, and the hashes of its files.
+/// The same for a run's recipe, as JSON, and the hashes of its files.
 pub(crate) fn source_hash<'a>(
     recipe: &str,
     files: impl Iterator<Item = &'a str>,
@@ -390,7 +388,7 @@ pub(crate) fn source_hash<'a>(
     run.remove("deck");
     let recipe = recipe.as_object_mut()?;
     recipe.remove("study");
-    // Found in the deck where the manifest has none; the files say the same.
+    // Found in the deck where the manifest has none; the files agree.
     recipe.remove("units");
     let mut hash = blake3::Hasher::new();
     hash.update(serde_json::to_string(recipe).ok()?.as_bytes());

@@ -13,11 +13,11 @@ pub struct Recipe {
     pub(crate) deflection: DeflectionSource,
     /// Where the force comes from.
     pub force: ForceSource,
-    /// Contact force that tells when contact begins, where the force is a body force: a body
+    /// Contact force that marks the start of contact, if the force is a body force: a body
     /// slows down some milliseconds after the first touch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact: Option<ForceSource>,
-    /// Share of the largest force above which a record is in contact: 0.005 where it is not given; above 0, below 1.
+    /// Share of the peak force above which a record is in contact: 0.005 where it is not given; above 0, below 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub contact_threshold: Option<f64>,
     /// Filter of the force.
@@ -43,7 +43,7 @@ pub(crate) struct DeflectionSource {
     pub file: String,
     /// Node behind the crush zone, or the centre of gravity.
     pub node: i64,
-    /// Node whose displacement is taken off, on the other body.
+    /// Node on the other body, whose displacement is subtracted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub minus_node: Option<i64>,
     /// `x_displacement`, `y_displacement` or `z_displacement`.
@@ -300,7 +300,7 @@ impl From<Filter> for String {
     }
 }
 
-/// The common times of all cases: `states` from contact on, one each `interval_ms`.
+/// The common times of all cases: `states` from contact on, one every `interval_ms`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "SamplingTable", into = "SamplingTable")]
 #[schemars(with = "SamplingTable")]
@@ -312,10 +312,10 @@ pub struct Sampling {
 }
 
 impl std::fmt::Display for Sampling {
-    /// `400 states, one each 0.75 ms`.
+    /// `400 states, one every 0.75 ms`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let SamplingTable { states, interval_ms } = (*self).into();
-        write!(f, "{states} states, one each {interval_ms} ms")
+        write!(f, "{states} states, one every {interval_ms} ms")
     }
 }
 
@@ -357,7 +357,7 @@ impl From<Sampling> for SamplingTable {
 }
 
 impl Default for Sampling {
-    /// The reference data's: 400 states, one each 0.75 ms.
+    /// The reference data's: 400 states, one every 0.75 ms.
     fn default() -> Self {
         Self { states: 400, interval_s: 0.75e-3 }
     }

@@ -1,7 +1,7 @@
 //! Replicates: runs that are nominally equal, and the one motion that is their mean.
 //!
 //! The mean is taken over time, from contact on, so that deflection, speed, force and what follows from them (body
-//! force, largest crush, rebound) are those of one motion and fit together. A mean of forces over deflection would not:
+//! force, maximum crush, rebound) are those of one motion and fit together. A mean of forces over deflection would not:
 //! each run ends at a crush of its own.
 
 use super::{Case, Curve, EnergyAudit};

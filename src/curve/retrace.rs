@@ -1,12 +1,12 @@
-//! The motion of a body that a table of force over deflection stops and throws back.
+//! The motion of a body that is stopped and thrown back by a table of force over deflection.
 //!
 //! Speeds follow from the work of the piecewise linear force and are exact at every state. Times
 //! are sums of `2 Δd/(v + v')` over short steps, exact for a constant force, also where the body
-//! stands still.
+//! is at rest.
 
 use super::{ForceKind, Masses};
 use crate::error::{Error, error};
-use crate::unit::{Speed, UnitSystem};
+use crate::unit::{Shown, Speed, UnitSystem};
 
 /// A table of force over deflection.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,13 +30,13 @@ pub struct Impact {
     pub speed: Speed,
     /// Of the body, or of both bodies.
     pub masses: Masses,
-    /// From the largest deflection, in N/m, if it is known.
+    /// From the maximum deflection, in N/m, if it is known.
     pub unloading_stiffness_n_per_m: Option<f64>,
-    /// The same of the force that moves the body, where that is another.
+    /// The same for the force that moves the body, where that is another.
     pub body_unloading_stiffness_n_per_m: Option<f64>,
-    /// Units that the table's values were read in, to tell what was mistaken.
+    /// Units in which the table's values were read, to find the cause of errors.
     pub units: UnitSystem,
-    /// Take the table whatever its energy says.
+    /// Accept the table whatever its energy.
     pub accept_energy: bool,
 }
 
@@ -44,7 +44,7 @@ pub struct Impact {
 pub(super) fn endless() -> Error {
     error!(
         Other,
-        "along this curve a body hardly moves any more before it has stopped: remove the points whose force is next to nothing, or give the record with its times"
+        "along this curve a body almost stops moving before it is at rest: remove the points whose force is almost zero, or give the record with its times"
     )
 }
 
@@ -60,18 +60,18 @@ pub(super) struct Motion {
     pub warnings: Vec<String>,
 }
 
-/// Free motion behind the unloading, in s: the speed of the separation is a mean over 20 ms, and
-/// filters need some time behind it.
+/// Free motion after the unloading, in s: the speed of the separation is a mean over 20 ms, and
+/// filters need some time after it.
 const FREE_S: f64 = 0.040;
 /// States between two samples at the common interval.
 const FINER: f64 = 8.0;
 /// The longest of a slow motion's steps is this share of its time.
 const STEPS: f64 = 20_000.0;
-/// Most states beside the points of the table.
+/// Maximum number of states besides the points of the table.
 const MAX_STATES: usize = 200_000;
 /// No step is shorter than this share of its segment, so that a crawl ends.
 const SHORTEST: f64 = 1e-6;
-/// Nor than this share of the largest deflection: states closer than a millionth of it are none of a
+/// Nor than this share of the maximum deflection: states closer than a millionth of it are none of a
 /// loading branch, and its last one shall be the table's.
 const FINEST: f64 = 5e-6;
 
@@ -90,7 +90,7 @@ pub(super) fn retrace(
         let last = moving.iter().zip(f).take(end).rposition(|(g, f)| *g > 0.0 && *f > 0.0);
         return Err(error!(
             Other,
-            "the force at the largest deflection is 0 (from {from_m} m on), so that nothing stops a body there: remove the points behind the end of the force, or give the record with its times",
+            "the force at the maximum deflection is 0 (from {from_m} m on), so that nothing stops a body there: remove the points after the end of the force, or give the record with its times",
             from_m = d[last.map_or(0, |i| i + 1)]
         ));
     }
@@ -100,7 +100,7 @@ pub(super) fn retrace(
     let mut builder =
         MotionBuilder { motion: Motion::default(), step_s, least_m: FINEST * d[end], mass };
     builder.motion.notes.push(
-        "motion: reconstructed, the file has no times: the largest deflection is taken as the largest crush, v² = v0² (1 − W(d)/W(end))"
+        "motion: reconstructed, the file has no times: the maximum deflection is taken as the maximum crush, v² = v0² (1 − W(d)/W(end))"
             .into(),
     );
     if table.body_force_n.is_some() {
@@ -166,7 +166,7 @@ impl MotionBuilder {
         self.motion.closing_m_per_s.push(v);
     }
 
-    /// Adds a state behind the last; an error if the body does not get there.
+    /// Adds a state after the last; an error if the body does not get there.
     fn push(&mut self, d: f64, f: f64, v: f64) -> Result<(), Error> {
         let last = self.motion.time_s.len() - 1;
         let way = (d - self.motion.deflection_m[last]).abs();
@@ -218,7 +218,7 @@ impl MotionBuilder {
         Ok(())
     }
 
-    /// The unloading branch from the largest deflection: the table's own, else a line.
+    /// The unloading branch from the maximum deflection: the table's own, else a line.
     fn unloading(
         &mut self,
         table: &Table<'_>,
@@ -236,8 +236,8 @@ impl MotionBuilder {
         let stiffness = match stated {
             Some(stiffness) => {
                 self.motion.notes.push(format!(
-                    "unloading: a line of {:.4} MN/m from the largest deflection",
-                    stiffness / 1e6
+                    "unloading: a line of {} from the maximum deflection",
+                    Shown::one_stiffness(stiffness)
                 ));
                 stiffness
             }
@@ -250,8 +250,8 @@ impl MotionBuilder {
                     ));
                 }
                 self.motion.warnings.push(format!(
-                    "unloading: neither the file nor --unloading gives it; the steepest rise, {:.4} MN/m, is used: say --unloading …MN/m",
-                    steepest / 1e6
+                    "unloading: neither the file nor --unloading gives it; the steepest rise, {}, is used: give --unloading …MN/m",
+                    Shown::one_stiffness(steepest)
                 ));
                 steepest
             }
@@ -265,7 +265,7 @@ impl MotionBuilder {
             let (stiffness_n_per_m, least_n_per_m) = (stiffness, f / d);
             return Err(error!(
                 Other,
-                "the unloading stiffness {stiffness_n_per_m} N/m is softer than the line from the largest deflection to zero ({least_n_per_m} N/m), which no crash is: give a stiffer one with --unloading"
+                "the unloading stiffness {stiffness_n_per_m} N/m is softer than the line from the maximum deflection to zero ({least_n_per_m} N/m), which is impossible in a crash: give a stiffer one with --unloading"
             ));
         }
         let mut way = vec![0.0, ends.min(moving_ends), ends.max(moving_ends)];
@@ -275,7 +275,7 @@ impl MotionBuilder {
             way.iter().map(|x| (top * (1.0 - x / end)).max(0.0)).collect::<Vec<f64>>()
         };
         let (mut force, mut moving) = (falls(f, ends), falls(moving, moving_ends));
-        // Behind both ends there is no force, whatever rounding leaves of it.
+        // After both ends there is no force, whatever rounding leaves of it.
         for values in [&mut force, &mut moving] {
             values.pop();
             values.push(0.0);

@@ -1,9 +1,9 @@
-//! Stopped mass: how much of the moved mass a crush zone has stopped at each deflection.
+//! Stopped mass: how much of the moving mass a crush zone has stopped at each deflection.
 //!
-//! A crush zone is stopped from its tip on. Contact force and body speed alone tell by their momentum
+//! A crush zone comes to rest from its tip on. Contact force and body speed alone determine by momentum
 //! `m_s = M − (M v₀ − J)/v` with the impulse `J = ∫F dt` at each deflection, as long as `v` is not small.
 //! All runs of a group share one `λ = dm_s/dd`, constant between nodes, by least squares with smoothing. It
-//! is not negative, and nowhere so large that the crush force `F − λv²` would pull.
+//! is not negative, and never so large that the crush force `F − λv²` would become tensile.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ use super::Envelope;
 use crate::piecewise;
 use crate::signal::bounded;
 
-/// Mass that the runs of a group say is stopped, over the deflection.
+/// Stopped mass of the runs of a group, over the deflection.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StoppedMass {
     /// Nodes in m, from 0.
@@ -19,7 +19,7 @@ pub struct StoppedMass {
     /// Stopped mass in kg at each node, never falling: that of the body against a wall; of a pair
     /// the reduced mass, so that of two equal ends half of one's. 0 where the runs do not agree on one.
     pub stopped_kg: Vec<f64>,
-    /// Root mean square of what the runs' momentum says beside it, in kg.
+    /// Root mean square deviation of the runs' momentum from it, in kg.
     pub residual_kg: f64,
 }
 
@@ -43,18 +43,18 @@ impl LoadingRun {
 /// Segments of the stopped mass; they are shorter at the tip, where most happens.
 const SEGMENTS: usize = 64;
 const SHORTER_AT_TIP: f64 = 1.5;
-/// Momentum tells the mass while the body has at least this share of its first speed.
+/// Momentum determines the mass while the body has at least this share of its initial speed.
 const FAST: f64 = 0.25;
-/// Most of the mass that a crush zone may stop: beyond it the runs say something else.
+/// Largest part of the mass that a crush zone may stop: beyond it the runs are inconsistent.
 const MOST_STOPPED: f64 = 0.5;
-/// The runs' momentum must agree on the stopped mass within this share of it; else it tells none.
+/// The runs' momentum must agree on the stopped mass within this share of it; otherwise it is unknown.
 const AGREES: f64 = 0.5;
 /// Points of a segment at which a run's force and speed are averaged.
 const MEAN_POINTS: usize = 9;
 
 impl StoppedMass {
     /// Fits it to the runs of a group; `mass_kg` moves along their deflections. `None` if there are fewer
-    /// than two runs, or they say that more than half of the mass is stopped.
+    /// than two runs, or more than half of the mass would be stopped.
     pub(crate) fn fit(runs: &[LoadingRun], mass_kg: f64) -> Option<Self> {
         if runs.len() < 2 {
             return None;
@@ -171,7 +171,7 @@ fn rates_kg_per_m(nodes_m: &[f64], states: &[Vec<(f64, f64)>], most: &[f64]) -> 
             let sums = [1.0, stopped_kg, way_m, way_m * way_m, way_m * stopped_kg];
             inside[i].iter_mut().zip(sums).for_each(|(sum, x)| *sum += weight * x);
         }
-        // A state has the whole length of each segment behind it, and its way into its own.
+        // A state has the whole length of each segment after it, and its way into its own.
         let (mut beyond, mut beyond_kg) = (0.0, 0.0);
         for i in (0..n).rev() {
             let [number, kg, ways_m, squares_m2, products] = inside[i];

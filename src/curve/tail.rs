@@ -1,22 +1,22 @@
-//! What a curve does beyond the maximal crush of its own impact, in runs and in exports.
+//! Continuation of a curve beyond the maximum crush of its own impact, in runs and in exports.
 //!
-//! A train crushes an end further than the same vehicle alone does, and most tools end a table with an error, with a held
-//! force or with the last slope. The rule, in three steps:
+//! A train crushes an end further than a single vehicle does, and most tools end a table with an error, a constant
+//! force or the last slope. The rule, in three steps:
 //!
-//! 1. Where faster runs tell how the force goes on (the curve comes from a model), it follows them, at the level with
-//!    which the curve ends. Else the force goes within 5 % of the maximal crush to the mean over the curve's last tenth, if
+//! 1. If faster runs show how the force continues (the curve comes from a model), it follows them, at the level with
+//!    which the curve ends. Otherwise the force changes within 5 % of the maximum crush to the mean over the curve's last tenth, if
 //!    that is more than its last force, and stays there.
-//! 2. At 1.5 times the maximal crush, or where the faster runs end, the structure is taken as fully crushed.
-//! 3. From there the force rises with the unloading stiffness (a steeper rise would change how tools unload that take the
-//!    steepest rise for it) to three times the curve's largest force.
+//! 2. At 1.5 times the maximum crush, or where the faster runs end, the structure is assumed to be fully crushed.
+//! 3. From there the force rises with the unloading stiffness (a steeper rise would change the unloading of tools that use the
+//!    steepest rise for it) to three times the curve's peak force.
 
 use super::Envelope;
 use crate::error::Error;
 
-/// How a curve goes on beyond its maximal crush.
+/// How a curve continues beyond its maximum crush.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tail {
-    /// Not at all: the last point is the maximal crush.
+    /// Not at all: the last point is the maximum crush.
     None,
     /// By steps 1 and 2 of the rule: the force never rises by bottoming.
     Hold,
@@ -24,9 +24,9 @@ pub enum Tail {
     Bottom,
 }
 
-/// Where the structure is fully crushed, in maximal crushes.
+/// Deflection at which the structure is fully crushed, as a multiple of the maximum crush.
 const FULLY_CRUSHED: f64 = 1.5;
-/// Over this share of the maximal crush the force goes to its mean over the last tenth.
+/// Over this share of the maximum crush the force goes to its mean over the last tenth.
 const JOIN: f64 = 0.05;
 /// The bottoming ends at so many times the largest force.
 const HIGHEST: f64 = 3.0;
@@ -106,7 +106,7 @@ impl Tail {
     /// The rule in one line, for a file's header.
     pub fn rule(self, follows_faster_runs: bool) -> &'static str {
         match (self, follows_faster_runs) {
-            (Self::None, _) => "none: the last point is the maximal crush",
+            (Self::None, _) => "none: the last point is the maximum crush",
             (Self::Hold, true) => {
                 "beyond max_deflection_m along faster runs, then the force is held"
             }

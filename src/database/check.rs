@@ -1,5 +1,5 @@
-//! Checking a database file: every dataset is read, and what is stored twice or follows from
-//! the curves is held against each other.
+//! Checking a database file: every dataset is read, and values that are stored twice or follow from
+//! the curves are compared with each other.
 
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
@@ -15,7 +15,7 @@ use crate::hdf5::{AttrValue, Group};
 use crate::history::time_gaps;
 use crate::signal::interpolate;
 
-/// Something to look at before a case is trusted.
+/// Something to check before a case is trusted.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Finding {
     /// Group of the case.
@@ -62,7 +62,7 @@ pub(crate) fn check(path: &Path) -> Result<Checked, Error> {
                     findings.body_force(&decoded, case, &found.case);
                     readable.push(found.case);
                 }
-                // Its datasets have said so already, with their indices.
+                // Already reported for its datasets, with their indices.
                 Err(_) if findings.has_damage() => {}
                 Err(error) => {
                     let own = format!("{}: {}/{name}", path.display(), group.name);
@@ -138,7 +138,7 @@ impl Findings<'_> {
         self.list.iter().rev().take_while(own).any(|f| DAMAGE.contains(&f.code))
     }
 
-    /// Looks at every value.
+    /// Checks every value.
     fn datasets(&mut self, opened: &Opened<'_>, case: &Group) {
         let hashes = opened.hashes(case);
         let mut states = 0;
@@ -182,21 +182,24 @@ impl Findings<'_> {
             {
                 let odd = least_like_neighbours(&values);
                 let which = odd.map_or(String::new(), |i| {
-                    format!("; the one least like its neighbours is {path}[{i}] = {}", values[i])
+                    format!(
+                        "; the one that fits its neighbours least is {path}[{i}] = {}",
+                        values[i]
+                    )
                 });
                 let message =
-                    format!("the values of {path} are not those that were written{which}");
+                    format!("the values of {path} differ from those that were written{which}");
                 self.add("altered", Some(path), odd, message);
             }
         }
     }
 
-    /// Holds what is stored against what follows from the curves.
+    /// Compares stored values with those that follow from the curves.
     fn case(&mut self, found: &FoundCase) -> Result<(), Error> {
         let FoundCase { case, attributes, hashes } = found;
         let content = Content::of(case)?;
         if hashes.get(ATTRIBUTES) != content.hashes().get(ATTRIBUTES) {
-            let message = "its attributes are not those that were written".into();
+            let message = "its attributes differ from those that were written".into();
             self.add("altered", None, None, message);
         }
         self.attributes(&content, attributes);
@@ -387,7 +390,7 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
     let (is_listed, is_there): (HashSet<&str>, HashSet<&str>) =
         (in_list.iter().copied().collect(), there.iter().copied().collect());
     for name in in_list.iter().filter(|name| !is_there.contains(*name)) {
-        add(name, "case_list", "is listed in the group's cases, but is not there".into());
+        add(name, "case_list", "is listed in the group's cases, but is missing".into());
     }
     for name in there.iter().filter(|name| !is_listed.contains(*name)) {
         add(name, "case_list", "is not listed in the group's cases".into());
@@ -403,7 +406,7 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
     }
 }
 
-/// What cases show beside the others of their group.
+/// What is unusual in cases compared with their group.
 fn beside_each_other(group: &str, cases: &[Case], list: &mut Vec<Finding>) {
     for (case, code, message) in siblings::remarks(cases) {
         Findings { group, case: &case, list }.add(code, None, None, message);
@@ -422,7 +425,7 @@ fn of_stopped_mass(
     };
     if let Some((attribute, why)) = group::differs(&attributes, name, cases) {
         let message = format!(
-            "the group's {attribute} is not that of its cases ({why}): the next change of the group by crumple writes it anew"
+            "the group's {attribute} is not that of its cases ({why}): crumple rewrites it at the next change of the group"
         );
         Findings { group: name, case: &first.id.name, list }.add(
             "stopped_mass_differs",

@@ -1,5 +1,5 @@
-//! Writing a database over a file into which others have put something: a copy of the file is
-//! edited and, after it was read back and nothing of theirs is missing, renamed into place. So
+//! Rewriting a database file that contains objects of other programs: a copy of the file is
+//! edited, read back to check that none of them is missing, and renamed into place. So
 //! their links, types and attributes stay as they were encoded.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
@@ -15,7 +15,7 @@ use crate::error::{Error, error};
 use crate::file::write_by_path;
 use crate::hdf5::{self, AttrValue, File, FileAccessProperties, FileLocking, Group};
 
-/// Writes a database over the file at `path` with all that others have put into it, which is
+/// Writes a database over the file at `path` with all objects of other programs in it, which is
 /// `before`: into a copy of the file, in which only what differs is changed, and which then takes
 /// its place.
 pub(super) fn write_keeping(
@@ -30,7 +30,7 @@ pub(super) fn write_keeping(
     let would_drop = |what: String| {
         error!(
             Database,
-            "{} holds what crumple has not written and would lose by writing it again: {what}; the database is unchanged: copy that to another file and delete it here, or build into a new database",
+            "{} holds objects that crumple did not write and would lose by rewriting the file: {what}; the database is unchanged: copy them to another file and delete them here, or build into a new database",
             path.display()
         )
     };
@@ -77,7 +77,7 @@ impl From<Error> for EditError {
 }
 
 /// What of a file's cases is not in its place in the new database. What others have put into a case
-/// or group moves with it; a case without such is deleted and written anew.
+/// or group moves with it; a case without such is deleted and written again.
 struct Moves {
     /// Cases that are no longer there.
     gone: HashSet<CasePath>,
@@ -121,7 +121,7 @@ impl Moves {
         Self { gone, groups, cases, all }
     }
 
-    /// Where something of others is afterwards.
+    /// Where objects of other programs are afterwards.
     fn of_item(&self, item: &Item) -> Item {
         let rest = item.place.split_once('/').map_or("", |(_, rest)| rest);
         let place = match (item.case().and_then(|case| self.all.get(&case)), item.group()) {
@@ -311,7 +311,7 @@ fn replace_attributes(case: &Group, content: Content<'_>) -> Result<(), EditErro
     Ok(())
 }
 
-/// Writes the datasets of a case anew, with the attributes that others have given them.
+/// Rewrites the datasets of a case, with the attributes added by other programs.
 fn replace_curves(case: &Group, content: &Content<'_>) -> Result<(), EditError> {
     for (path, values) in &content.datasets {
         // Absent in files of earlier versions.

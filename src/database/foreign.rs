@@ -1,4 +1,4 @@
-//! What others have put into a database file.
+//! Objects of other programs in a database file.
 
 use std::collections::{BTreeSet, HashSet};
 use std::fmt;
@@ -9,7 +9,7 @@ use super::layout::{BODY_FORCE, CASE_ATTRIBUTES, FoundGroup, ORIGINAL, Opened, R
 use crate::error::Error;
 use crate::hdf5::{self, Dataset, Group};
 
-/// Something of others: what it is, and its path in the file.
+/// An object of another program: its kind, and its path in the file.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct Item {
     /// `attribute`, `dataset`, `group` or `type`.

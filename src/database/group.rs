@@ -1,5 +1,5 @@
-//! Attributes of a group: its cases in order, and the mass that its crush zone stops, which follows from
-//! them and is written anew with each change.
+//! Attributes of a group: its cases in order, and the stopped mass of its crush zone, which follows from
+//! them and is rewritten with each change.
 
 use std::collections::HashMap;
 
@@ -13,7 +13,7 @@ const DEFLECTION: &str = "stopped_mass_deflection_m";
 const STOPPED: &str = "stopped_mass_kg";
 const RATE: &str = "stopped_mass_rate_kg_per_m";
 const RESIDUAL: &str = "stopped_mass_residual_kg";
-/// Every attribute that a group can have; what else it has is others'.
+/// Every attribute that a group can have; others belong to other programs.
 pub(super) const GROUP_ATTRIBUTES: [&str; 5] = [CASES, DEFLECTION, STOPPED, RATE, RESIDUAL];
 
 /// The value of a group's attribute `cases`.

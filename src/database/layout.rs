@@ -30,12 +30,12 @@ pub(crate) const OLDEST: i64 = 2;
 pub(crate) const ROOT: [&str; 3] = ["format", "layout_version", "written_by"];
 /// Group of a case with the curve at the solver's rate.
 pub(crate) const ORIGINAL: &str = "original";
-/// Attribute of a case with the BLAKE3 hashes of what it holds.
+/// Attribute of a case with the BLAKE3 hashes of its content.
 pub(crate) const HASHES: &str = "hashes";
 /// Name, among the hashes, of the one over the attributes.
 pub(crate) const ATTRIBUTES: &str = "attributes";
 
-/// Everything that is written of a case, before it is anywhere.
+/// Everything that is written for a case, before it is written.
 pub(crate) struct Content<'a> {
     /// In the order in which they are written and hashed.
     pub attributes: Vec<(&'static str, AttrValue)>,
@@ -46,7 +46,7 @@ pub(crate) struct Content<'a> {
 /// The dataset of the force that moves the body, which follows from the closing speed.
 pub(crate) const BODY_FORCE: &str = "body_force_N";
 
-/// Every attribute that a case can have; what else it has is others'.
+/// Every attribute that a case can have; others belong to other programs.
 pub(crate) const CASE_ATTRIBUTES: [&str; 26] = [
     "study",
     "speed_m_per_s",
@@ -177,7 +177,7 @@ impl<'a> Content<'a> {
     }
 }
 
-/// Attributes that say what the curves of a case are of.
+/// Attributes that identify what the curves of a case describe.
 const RECORD_ATTRIBUTES: [&str; 6] =
     ["speed_m_per_s", "speed_kind", "mass_kg", "other_mass_kg", "parameters", "force_kind"];
 
@@ -326,7 +326,7 @@ impl<'a> Opened<'a> {
         if !(OLDEST..=VERSION).contains(&found) {
             return Err(error!(
                 Database,
-                "{}: its layout has version {found}, this program reads versions {OLDEST} to {VERSION}: build the database anew with crumple build",
+                "{}: its layout has version {found}, this program reads versions {OLDEST} to {VERSION}: build the database again with crumple build",
                 path.display()
             ));
         }
@@ -343,7 +343,7 @@ impl<'a> Opened<'a> {
         result.map_err(|e| self.damaged(place, e))
     }
 
-    /// Groups that hold cases, with these. What other programs put beside them is not a group of ours.
+    /// Groups that hold cases, with these. What other programs put next to them is not a group of ours.
     pub(crate) fn groups(&self) -> Result<Vec<FoundGroup>, Error> {
         let mut groups = Vec::new();
         for (name, group) in self.check("/", self.file.root().iter_groups())? {
@@ -395,7 +395,7 @@ impl<'a> Opened<'a> {
         let root = self.file.root();
         let name = match group {
             Some(name) => name.to_string(),
-            // The only group there is, if others have put none beside it.
+            // The only group there is, if others have put none next to it.
             None => <[String; 1]>::try_from(root.groups().ok()?).ok()?.into_iter().next()?,
         };
         // A name is not a path.
@@ -634,7 +634,7 @@ fn numbers(group: &Group, name: &str, place: &Location<'_>) -> Result<Vec<f64>, 
         ));
     };
     left.set(rest);
-    // A reader that finds no memory ends the process; here it is only asked for.
+    // A reader without memory ends the process; here it is only reserved.
     let mut memory: Vec<u8> = Vec::new();
     if memory.try_reserve_exact(bytes.saturating_mul(2) as usize).is_err() {
         return Err(format!("{name}: {}", file::out_of_memory(bytes)));

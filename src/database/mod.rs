@@ -1,7 +1,7 @@
 //! Curve database: cases in HDF5, by group and impact speed.
 //!
 //! The layout is described in `schemas/curve_database.md`; [`hdf5`](crate::hdf5) reads and
-//! writes what it is made of. A file is always written whole and renamed into place,
+//! writes its parts. A file is always written as a whole and renamed into place,
 //! so an interrupted command leaves the old content readable.
 //!
 //! ```
@@ -16,7 +16,7 @@
 //!
 //! let database = Database::read(&path)?;
 //! for case in database.cases("lead-car-wall") {
-//!     // The curve takes up the impact's energy.
+//!     // The curve absorbs the energy of the impact.
 //!     assert!((case.quality.audit.ratio() - 1.0).abs() < 0.06, "{}", case.id.name);
 //! }
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -47,7 +47,7 @@ pub struct Database {
     groups: BTreeMap<String, Vec<Case>>,
     /// Cases whose content is not what their hashes are of, with these.
     altered: BTreeMap<CasePath, BTreeMap<String, String>>,
-    /// Where cases are that the file has elsewhere: what others put beside them goes along.
+    /// Where cases are that the file has elsewhere: what others put next to them goes along.
     moved: BTreeMap<CasePath, CasePath>,
 }
 
@@ -97,7 +97,7 @@ impl Database {
     /// is.
     ///
     /// # Errors
-    /// As of [`Database::read`] and [`Database::group_or_only`], and if the
+    /// As for [`Database::read`] and [`Database::group_or_only`], and if the
     /// group has no such case.
     pub fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, Error> {
         let opened = layout::open(path)?;
@@ -135,7 +135,7 @@ impl Database {
         self.altered.contains_key(&CasePath { group: group.into(), name: case.into() })
     }
 
-    /// The group that was asked for, or the only one there is, with its cases in order of speed.
+    /// The group that was requested, or the only one there is, with its cases in order of speed.
     ///
     /// # Errors
     /// It lists the groups there are;
@@ -193,7 +193,7 @@ impl Database {
     /// One case by group and name.
     ///
     /// # Errors
-    /// If one of them is not there, with the names there are.
+    /// If one of them is missing, with the names there are.
     pub fn case(&self, path: &Path, group: &str, name: &str) -> Result<&Case, Error> {
         let cases = self.group(path, group)?;
         cases.iter().find(|c| c.id.name == name).ok_or_else(|| {
@@ -337,7 +337,7 @@ impl Database {
     }
 }
 
-/// Lets a case of an earlier version, which does not say what it was built from, remember its names
+/// Lets a case of an earlier version, which does not record what it was built from, keep its names
 /// before it gets others: a build of its study knows it by them.
 pub(crate) fn remember_origin(case: &mut Case) {
     if case.provenance.origin.is_none() && case.id.study != IMPORTED {
@@ -384,7 +384,7 @@ fn changed(path: &Path, case: &CasePath, count: usize) -> Error {
     let more = if count > 1 { format!(" (and {} more)", count - 1) } else { String::new() };
     error!(
         Database,
-        "{}: the values of case {case}{more} are not those that were written, by the fingerprint beside them: crumple db check shows which; build the case anew or remove it (crumple db rm), or go on with --accept-changed",
+        "{}: the values of case {case}{more} do not match their fingerprint: crumple db check shows which; build the case again or remove it (crumple db rm), or use --accept-changed",
         path.display()
     )
 }

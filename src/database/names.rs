@@ -1,4 +1,4 @@
-//! Names of groups and cases: they stand in files, tables and HDF5 paths.
+//! Names of groups and cases: they appear in files, tables and HDF5 paths.
 
 /// Longest name of a case or group, in bytes.
 const MAX_NAME: usize = 200;

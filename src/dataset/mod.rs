@@ -1,4 +1,4 @@
-//! Data sets: the cases of a group, checked and made into tables {v, d, …} → F.
+//! Data sets: the cases of a group, checked and converted into tables {v, d, …} → F.
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
@@ -38,7 +38,7 @@ pub struct TrainingCase {
     pub sampled: Envelope,
     /// The body's motion, and the force that follows from it.
     pub motion: BodyMotion,
-    /// Whether the record ended while loading, so that the largest deflection is not known.
+    /// Whether the record ended while loading, so that the maximum deflection is not known.
     pub truncated: bool,
     /// Measured unloading stiffness, in N/m, if the record reaches so far.
     pub unloading_stiffness_n_per_m: Option<f64>,
@@ -74,7 +74,7 @@ pub struct TrainingSet {
     pub force_kind: ForceKind,
     /// Masses of the first case.
     pub masses: Masses,
-    /// Units of the solver's files, if all cases come from one system.
+    /// Units of the solver files, if all cases come from one system.
     pub units: Option<UnitSystem>,
     /// Further parameters in which the cases differ; what all share is left out.
     pub features: Vec<Feature>,
@@ -152,7 +152,7 @@ fn parameters(case: &Case) -> BTreeMap<String, Parameter> {
     parameters
 }
 
-/// The columns that tell the cases apart: parameters that all share are left out.
+/// The columns that distinguish the cases: parameters that all share are left out.
 fn features(cases: &[&Case]) -> Result<Vec<Feature>, Error> {
     let of: Vec<(&str, BTreeMap<String, Parameter>)> =
         cases.iter().map(|c| (c.id.name.as_str(), parameters(c))).collect();
@@ -409,7 +409,7 @@ impl TrainingCase {
         })
     }
 
-    /// Time by the clock that the solver took for all of its runs, in s.
+    /// Wall-clock time of the solver for all of its runs, in s.
     pub(crate) fn solver_time_s(&self) -> Option<f64> {
         Some(self.case.provenance.solver_wall_time_s? * self.runs.len() as f64)
     }
@@ -437,7 +437,7 @@ impl TrainingCase {
 
 /// Masses of a pair that differ by no more are those of equal bodies, as a share.
 const EVEN: f64 = 0.01;
-/// Fewest steps of a run's curve: short crushes need more than one each 2 mm.
+/// Minimum number of steps of a run's curve: short crushes need more than one every 2 mm.
 pub(crate) const STEPS: usize = 200;
 
 impl TrainingSet {

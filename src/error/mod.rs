@@ -165,7 +165,7 @@ impl Error {
         self
     }
 
-    /// Shows a line of a file beside a text that says by itself what it is about.
+    /// Shows a line of a file with a self-contained text.
     pub(crate) fn showing(mut self, place: Option<Place>) -> Self {
         self.0.place = place;
         self.0.names_place = true;
@@ -231,7 +231,7 @@ impl StdError for Error {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ErrorCode {
-    /// The arguments make no sense, or do not fit together or with the file.
+    /// The arguments are invalid, or fit neither together nor the file.
     Usage,
     /// A file cannot be opened, read or written.
     Io,
@@ -241,39 +241,39 @@ pub enum ErrorCode {
     Toml,
     /// A study contradicts itself, or none of its runs can be used.
     Study,
-    /// A run of a study gives no curve.
+    /// No curve can be extracted from a run of a study.
     Run,
     /// A scenario contradicts itself, or what it names does not fit.
     Scenario,
-    /// A plan of a sweep is wrong, or its results are of another sweep.
+    /// The plan of a sweep is wrong, or its results belong to another sweep.
     Sweep,
     /// A file is not a curve database, is damaged, or has no such group or case.
     Database,
-    /// A solver's file cannot be read, or lacks what is asked of it.
+    /// A solver file cannot be read, or lacks what was selected.
     SolverFile,
-    /// A curve's file cannot be read.
+    /// A curve file cannot be read.
     CurveFile,
-    /// Curves cannot be taken into a database.
+    /// Curves cannot be added to a database.
     Import,
-    /// Cases make no training set.
+    /// Cases do not form a training set.
     Dataset,
     /// A model cannot be fitted or read.
     Model,
-    /// A model gives no curve.
+    /// A model cannot predict a curve.
     Prediction,
     /// Models cannot be validated.
     Validation,
     /// Methods cannot be compared.
     Comparison,
-    /// A multi-body run cannot be made.
+    /// A multi-body run fails.
     Simulation,
-    /// A file for another tool cannot be made.
+    /// A file for another tool cannot be written.
     Export,
     /// Signals cannot be rated.
     Rating,
     /// A chart cannot be drawn.
     Plot,
-    /// There is no report.
+    /// A report cannot be written.
     Report,
     /// Anything else.
     Other,

@@ -40,7 +40,7 @@ impl fmt::Display for Place {
 impl Place {
     /// The place of some bytes of a file's text. Of a part over several lines it is the first one.
     pub(crate) fn new(path: &Path, text: &str, span: Range<usize>) -> Self {
-        // Behind the last line's end there is nothing to show: what is missing is missing there.
+        // After the last line's end there is nothing to show: what is missing is missing there.
         let start = floor(text, span.start.min(text.trim_end().len()));
         let line_start = text[..start].rfind('\n').map_or(0, |at| at + 1);
         let line = text[line_start..].split('\n').next().unwrap_or_default().trim_end();
@@ -259,7 +259,7 @@ mod tests {
         // Of several lines the first.
         t(train().item(1).key("stages"), "10:10 [");
         t(train().item(1).key("stages").item(1), "12:3 2");
-        // What is not there: the table that should have it; the whole file's first character.
+        // What is missing: the table that should have it; the whole file's first character.
         t(KeyPath::of("run.step"), "2:1 [run]");
         t(train().item(1).key("speed"), "8:1 [[train]]");
         t(KeyPath::of("wall"), "1:1 t");
@@ -285,7 +285,7 @@ mod tests {
         }
     }
 
-    /// Spans at the ends of any text, also behind its last line, show a line.
+    /// Spans at the ends of any text, also after its last line, show a line.
     #[test]
     fn any_span_has_a_line() {
         for text in ["", "\n", "a", "µ=\n\n", "a = 1\r\nb = 2\r\n"] {

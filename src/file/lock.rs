@@ -16,7 +16,7 @@ pub struct WriterLock {
 }
 
 impl WriterLock {
-    /// Takes the lock of the file at `target`: one beside it, of its name and `.lock`.
+    /// Takes the lock of the file at `target`: one next to it, of its name and `.lock`.
     ///
     /// # Errors
     /// Of code [`ErrorCode::Locked`](crate::error::ErrorCode::Locked) if another process holds it, and of code

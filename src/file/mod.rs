@@ -1,4 +1,4 @@
-//! Files: read only where they are files, and up to a bound; written so that a reader sees the
+//! Files: only regular files are read, up to a size limit; written so that a reader sees the
 //! old content or the new, never half of it.
 
 mod lock;
@@ -17,7 +17,7 @@ pub use write::write_at;
 pub(crate) use write::write_by_path;
 pub(crate) use write::write_whole;
 
-/// Whether content is read that is not what was written, by the fingerprint beside it. The command line
+/// Whether content is read that is not what was written, by the fingerprint next to it. The command line
 /// sets it once, as it would a level of logging; a library's caller is refused such content.
 static ACCEPTS_CHANGED: AtomicBool = AtomicBool::new(false);
 
@@ -114,8 +114,8 @@ pub(crate) fn out_of_memory(bytes: u64) -> io::Error {
     io::Error::new(io::ErrorKind::OutOfMemory, message)
 }
 
-/// What was asked of a path, or `None` if nothing is there, or not what was asked for. A fault stays an error:
-/// who takes it for an absence starts a database anew, or reads half of a run.
+/// The requested fact about a path, or `None` if nothing is there, or something else. A fault stays an error:
+/// who takes it for an absence starts a database again, or reads half of a run.
 pub(crate) fn if_there<T>(asked: io::Result<T>) -> io::Result<Option<T>> {
     use io::ErrorKind::{InvalidFilename, NotADirectory, NotFound, PermissionDenied};
     match asked {
@@ -145,7 +145,7 @@ pub(crate) fn is_same(a: &Path, b: &Path) -> bool {
     matches!((fs::canonicalize(a), fs::canonicalize(b)), (Ok(a), Ok(b)) if a == b)
 }
 
-/// The folder that `path` stands in.
+/// The folder that `path` is in.
 pub(super) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
@@ -158,30 +158,27 @@ pub(super) fn explained(path: &Path, source: io::Error) -> io::Error {
     let folder = folder_of(path);
     let message = match (source.kind(), fs::metadata(folder)) {
         (io::ErrorKind::FileTooLarge, _) if source.raw_os_error().is_some() => {
-            "the file would be larger than the limit of this session (ulimit -f) or of the disk"
+            "the file would be larger than the limit of this session (ulimit -f) or the disk allows"
                 .into()
         }
         (io::ErrorKind::NotFound | io::ErrorKind::NotADirectory, Err(_)) => {
             match folder.ancestors().find(|part| part.exists()) {
                 Some(part) if !part.is_dir() => {
-                    format!("{} is a file and no folder: name another", part.display())
+                    format!("{} is a file, not a folder: name another", part.display())
                 }
                 _ => format!(
-                    "the folder {} does not exist: make it, or name another",
+                    "the folder {} does not exist: create it, or name another",
                     folder.display()
                 ),
             }
         }
         (io::ErrorKind::NotADirectory, Ok(meta)) if !meta.is_dir() => {
-            format!("{} is a file and no folder: name another", folder.display())
+            format!("{} is a file, not a folder: name another", folder.display())
         }
         (io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem, Ok(meta))
             if meta.is_dir() && source.raw_os_error().is_some() =>
         {
-            format!(
-                "nothing can be written in the folder {} ({source}): name another",
-                folder.display()
-            )
+            format!("cannot write in the folder {} ({source}): name another", folder.display())
         }
         _ => return source,
     };

@@ -1,4 +1,4 @@
-//! Atomic writing: to a draft beside the target, which is then renamed over it.
+//! Atomic writing: to a draft next to the target, which is then renamed over it.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
@@ -12,11 +12,11 @@ use crate::error::{Error, error};
 /// The error of a file that cannot be written; what was there before still is.
 pub(crate) fn not_written(path: &Path, source: io::Error) -> Error {
     let source = explained(path, source);
-    let unchanged = if path.is_file() { "; what was there before is unchanged" } else { "" };
+    let unchanged = if path.is_file() { "; the previous content is unchanged" } else { "" };
     error!(Io, "cannot write {}: {source}{unchanged}", path.display()).caused_by(source)
 }
 
-/// Writes `bytes` to `path` as a whole: to a temporary file beside it, then by renaming.
+/// Writes `bytes` to `path` as a whole: to a temporary file next to it, then by renaming.
 ///
 /// A device or a pipe cannot be renamed over and is written directly.
 pub(crate) fn write_whole(path: &Path, bytes: &[u8]) -> Result<(), Error> {
@@ -81,7 +81,7 @@ pub(crate) fn write_by_path<E: From<Error>>(
     Ok(())
 }
 
-/// Writes the bytes to a draft beside their target; to a device at once.
+/// Writes the bytes to a draft next to their target; to a device at once.
 fn prepare(path: &Path, bytes: &[u8]) -> io::Result<Option<Draft>> {
     if fs::metadata(path).is_ok_and(|meta| !meta.is_file() && !meta.is_dir()) {
         let mut device = OpenOptions::new().write(true).open(path)?;
@@ -98,7 +98,7 @@ fn prepare(path: &Path, bytes: &[u8]) -> io::Result<Option<Draft>> {
 /// Longer names of targets are shortened to their hash: names of files have up to 255 bytes.
 const MAX_NAME_BYTES: usize = 200;
 
-/// A file under work beside its target. Its name is made of the target's, so that what a killed
+/// A file under work next to its target. Its name is made of the target's, so that what a killed
 /// process left is taken up and emptied by the next; it is locked, so that of two processes that
 /// write one target the second gets an error.
 struct Draft {
@@ -115,7 +115,7 @@ impl Draft {
                 return Err(io::Error::new(io::ErrorKind::IsADirectory, message));
             }
             Some(meta) if !meta.is_file() => {
-                let message = "this is a device or a pipe, which takes no file of this kind";
+                let message = "this is a device or a pipe, which cannot hold a file of this kind";
                 return Err(io::Error::new(io::ErrorKind::Unsupported, message));
             }
             there => there.map(|meta| meta.permissions()),
@@ -180,7 +180,7 @@ mod tests {
         let error = write_whole(Path::new("/no/such/folder/a.txt"), b"x").unwrap_err();
         assert_eq!(
             error.to_string(),
-            "cannot write /no/such/folder/a.txt: the folder /no/such/folder does not exist: make it, or name another"
+            "cannot write /no/such/folder/a.txt: the folder /no/such/folder does not exist: create it, or name another"
         );
     }
 
@@ -212,7 +212,7 @@ mod tests {
             file.write_all(b"first")?;
             let error = write_whole(&path, b"second").unwrap_err().to_string();
             assert!(error.contains("a.csv: another process is writing it: try again"), "{error}");
-            assert!(error.ends_with("what was there before is unchanged"), "{error}");
+            assert!(error.ends_with("the previous content is unchanged"), "{error}");
             assert_eq!(fs::read(&path).unwrap(), b"old");
             Ok(Some(()))
         })

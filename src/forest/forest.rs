@@ -57,7 +57,7 @@ impl<F: Float> RegressionForest<F> {
         &self.params
     }
 
-    /// Out-of-bag error, if it was asked for.
+    /// Out-of-bag error, if it was requested.
     pub fn out_of_bag(&self) -> Option<OutOfBag> {
         self.out_of_bag
     }

@@ -1,7 +1,7 @@
 //! Growing one tree over ranges of samples that stay sorted by every feature.
 //!
 //! Samples are sorted by every feature once, for all trees. A tree keeps its drawn samples in an order per feature and
-//! partitions each order, stably, at every split. So a node is a range of all orders, and nothing is sorted again. An entry of
+//! partitions each order, stably, at every split. A node is therefore a range of all orders, and nothing is sorted again. An entry of
 //! an order carries value, target and number of draws: a scan reads memory in one direction, where access by sample would miss
 //! the cache at every step. What needs the sample is one flag, left or right; samples are numbered along the first feature, and
 //! again in nodes of 4 096, so that the flags stay in the cache.
@@ -189,7 +189,7 @@ impl<F: Float> Grower<'_, F> {
         }
     }
 
-    /// Moves the samples of every order that stand before `middle` in that of `feature` to
+    /// Moves the samples of every order that are before `middle` in that of `feature` to
     /// the front of `start..end`; both sides stay sorted.
     fn partition(&mut self, feature: usize, start: usize, middle: usize, end: usize) {
         let goes_left = &mut self.goes_left[..];

@@ -3,7 +3,7 @@
 //! Knows arrays, never curves. The algorithm is that of the reference method (domain
 //! terms: variance reduction, bootstrap, mean over trees) and of Breiman, "Random
 //! Forests", Machine Learning 45 (2001); with random thresholds that of Geurts, Ernst and
-//! Wehenkel, "Extremely randomized trees", Machine Learning 63 (2006). Beside predictions it
+//! Wehenkel, "Extremely randomized trees", Machine Learning 63 (2006). Besides predictions it
 //! gives feature importance, out-of-bag error, quantiles and an ONNX model.
 //!
 //! ```

@@ -72,7 +72,7 @@ pub enum ForestError {
         /// The threshold.
         threshold: f64,
     },
-    /// An out-of-bag error is asked for, but every tree sees all samples.
+    /// An out-of-bag error is requested, but every tree sees all samples.
     #[error("out-of-bag error needs bootstrap samples: set bootstrap(true)")]
     OutOfBagWithoutBootstrap,
     /// More features are to be tried at a split than there are.
@@ -121,7 +121,7 @@ pub enum ForestError {
         /// The value.
         value: f64,
     },
-    /// Quantiles are asked of a forest that has not kept the members of its leaves.
+    /// Quantiles are requested from a forest that has not kept the members of its leaves.
     #[error("the forest has not kept the samples of its leaves: fit it with quantiles(true)")]
     NoMembers,
     /// The level of the quantiles is not between 0 and 1.
@@ -194,7 +194,7 @@ impl<F: Float> ForestParams<F> {
         })
     }
 
-    /// Seed of all random draws. The same seed gives the same forest on any number of threads.
+    /// Random seed. The same seed gives the same forest on any number of threads.
     pub fn seed(mut self, seed: u64) -> Self {
         self.0.seed = seed;
         self
@@ -218,7 +218,7 @@ impl<F: Float> ForestParams<F> {
         self
     }
 
-    /// Fewest samples of a leaf; samples drawn twice count twice.
+    /// Minimum samples per leaf; samples drawn twice count twice.
     pub fn min_samples_leaf(mut self, samples: usize) -> Self {
         self.0.min_samples_leaf = samples;
         self
@@ -230,7 +230,7 @@ impl<F: Float> ForestParams<F> {
         self
     }
 
-    /// How many features are looked at for each split.
+    /// How many features are examined for each split.
     pub fn features_per_split(mut self, features: FeaturesPerSplit) -> Self {
         self.0.features_per_split = features;
         self

@@ -1,7 +1,7 @@
-//! Trees, and many rows through them: nodes packed, several rows in step.
+//! Trees, and the evaluation of many rows: packed nodes, several rows in step.
 //!
-//! Predictions of many rows go tree by tree, packed into 16 bytes a node. Rows walk in the order of the first tree's leaves,
-//! because neighbours take nearly the same ways in every tree: 32 of them go as one while their ranges lie on one side of the
+//! Many rows are predicted tree by tree, packed into 16 bytes per node. Rows walk in the order of the first tree's leaves,
+//! because neighbours take nearly the same paths in every tree: 32 of them go as one while their ranges lie on one side of the
 //! thresholds, then eight in step. Sums are taken in the order of the trees, so the bits are those of one row by itself.
 
 use linfa::Float;
@@ -44,7 +44,7 @@ impl<'a, F: Float> Rows<'a, F> {
     }
 }
 
-/// A node in as few bytes as a walk needs. The right child stands behind the left, and a leaf
+/// A node in as few bytes as a walk needs. The right child is after the left, and a leaf
 /// is its own right child: nothing is below NaN, so a walk that arrives stays, without a branch.
 #[derive(Clone, Copy)]
 struct Node<F> {
@@ -241,7 +241,7 @@ impl<F: Float> Tree<F> {
         self.value.len() - 1
     }
 
-    /// Splits a leaf; its children are `left` and the node behind it.
+    /// Splits a leaf; its children are `left` and the node after it.
     pub(super) fn split(&mut self, node: usize, feature: usize, threshold: F, left: usize) {
         self.feature[node] = feature as i32;
         self.threshold[node] = threshold;

@@ -1,7 +1,7 @@
 //! Adams: a spline as View command (`.cmd`), Solver statement (`.adm`) or spring property file (`.spr`).
 //!
 //! Adams interpolates by Akima's or cubic splines, so kinks are fenced with points; beyond the ends linear extrapolation is
-//! asked for. Elastic: a spline has no memory. The `.spr` file is that of Adams/Car, which MotionView reads too.
+//! requested. Elastic: a spline has no memory. The `.spr` file is that of Adams/Car, which MotionView reads too.
 
 use super::text::{Lines, nine_digits, title};
 use super::thin::for_splines;
@@ -77,7 +77,7 @@ impl<'a> Spline<'a> {
         [('x', x), ('y', y)]
     }
 
-    /// `data_element create spline`: a line ends in `&` where the command goes on.
+    /// `data_element create spline`: a line ends in `&` where the command continues.
     fn view_command(&self, lines: &mut Lines) {
         self.comments(lines, "!");
         lines.add(format_args!(
@@ -96,7 +96,7 @@ impl<'a> Spline<'a> {
         lines.add(format_args!("  linear_extrapolate=yes"));
     }
 
-    /// `SPLINE/id`: a line begins with a comma where the statement goes on.
+    /// `SPLINE/id`: a line begins with a comma where the statement continues.
     fn solver_statement(&self, lines: &mut Lines) {
         self.comments(lines, "!");
         lines.add(format_args!("SPLINE/{}, LINEAR_EXTRAPOLATE", self.id));
@@ -109,7 +109,7 @@ impl<'a> Spline<'a> {
         }
     }
 
-    /// The units stand in it, with names of their own.
+    /// The units are in it, with names of their own.
     fn property_file(&self) -> Result<Vec<u8>, Error> {
         let names = LENGTH.name_of(self.units.length_m).zip(FORCE.name_of(self.units.force()));
         let words = |(length, force): (&str, &str)| {
@@ -124,7 +124,14 @@ impl<'a> Spline<'a> {
             };
             Some((length.to_string(), force))
         };
-        let (length, force) = names.and_then(words).ok_or_else(|| error!(Export, "columns need units with names of their own: lengths in {lengths}, forces in {forces}", forces = "N, kN", lengths = LENGTH.known_units()))?;
+        let (length, force) = names.and_then(words).ok_or_else(|| {
+            error!(
+                Export,
+                "columns need units that have a name: lengths in {lengths}, forces in {forces}",
+                forces = "N, kN",
+                lengths = LENGTH.known_units()
+            )
+        })?;
         let mut lines = Lines::default();
         self.comments(&mut lines, "$");
         lines.add(format_args!("[MDI_HEADER]"));

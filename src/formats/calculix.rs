@@ -1,6 +1,6 @@
 //! CalculiX and Abaqus: `*SPRING, NONLINEAR`, elastic, alone or in an input of one mass on the spring.
 //!
-//! CalculiX 2.20 takes at most 200 rows and is silently wrong with more, so the curve is thinned to that at equal energy.
+//! CalculiX 2.20 accepts at most 200 rows and is silently wrong with more, so the curve is thinned to that at equal energy.
 
 use super::lsdyna::InUnits;
 use super::text::{Lines, nine_digits};
@@ -9,7 +9,7 @@ use super::{ExportCurve, Exported, NUMBER_OF_STATES, Options, TargetUnloading, r
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
-/// Rows that CalculiX takes; one of them is that of tension.
+/// Rows that CalculiX accepts, one of them for tension.
 const MOST_ROWS: usize = 200;
 /// Time steps of the deck per state.
 const STEPS: f64 = 10.0;
@@ -29,7 +29,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
         let loading = thinned(&curve.loading, MOST_ROWS - 1, curve.end)?;
         if loading.deflection_m().len() < given {
             notes.push(format!(
-                "{}: {} of {given} points are kept (CalculiX takes {MOST_ROWS} rows), with the same energy to the maximal crush",
+                "{}: {} of {given} points are kept (CalculiX takes {MOST_ROWS} rows), with the same energy up to the maximum crush",
                 curve.headline(),
                 loading.deflection_m().len()
             ));
@@ -76,7 +76,7 @@ fn nodes(lines: &mut Lines, curve: &ExportCurve, units: InUnits, id: u32) {
     let mass = |kg: f64| nine_digits(kg / units.0.mass_kg);
     lines.add(format_args!("*NODE, NSET=NALL"));
     lines.add(format_args!("1, 0.0, 0.0, 0.0"));
-    // Longer than any crush: CalculiX turns the spring round otherwise.
+    // Longer than any crush: otherwise CalculiX reverses the spring.
     lines.add(format_args!("2, {}, 0.0, 0.0", units.length(1.2 * curve.loading.end_m())));
     lines.add(format_args!("*ELEMENT, TYPE=SPRINGA, ELSET=IF{id}"));
     lines.add(format_args!("1, 1, 2"));

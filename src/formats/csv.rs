@@ -9,7 +9,12 @@ pub(crate) fn write(curve: &ExportCurve, options: &Options) -> Result<Exported, 
     let units = options.units.unwrap_or(UnitSystem::SI);
     let (length, force) =
         LENGTH.name_of(units.length_m).zip(FORCE.name_of(units.force())).ok_or_else(|| {
-            error!(Export, "columns need units with names of their own: lengths in {lengths}, forces in {forces}", forces = FORCE.known_units(), lengths = LENGTH.known_units())
+            error!(
+                Export,
+                "columns need units that have a name: lengths in {lengths}, forces in {forces}",
+                forces = FORCE.known_units(),
+                lengths = LENGTH.known_units()
+            )
         })?;
     let mut lines = Lines::default();
     for (key, value) in curve.facts() {

@@ -1,4 +1,4 @@
-//! A curve made ready for another tool's file: one force, its unloading, its tail, what must be said of it.
+//! A curve prepared for another tool's file: one force, its unloading, its tail, its notes.
 
 use super::Options;
 use super::text::nine_digits;
@@ -8,7 +8,7 @@ use crate::curve::{Envelope, ForceCurve, ForceKind, Tail};
 use crate::error::{Error, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
 use crate::surrogate::PredictedCurve;
-use crate::unit::km_per_h;
+use crate::unit::{Shown, km_per_h};
 
 /// One curve of one force, as writers take it; SI.
 #[derive(Clone, Debug)]
@@ -17,27 +17,27 @@ pub struct ExportCurve {
     pub predicted: PredictedCurve,
     /// Loading branch with its tail.
     pub loading: Envelope,
-    /// Index of the maximal crush among the points of `loading`.
+    /// Index of the maximum crush among the points of `loading`.
     pub end: usize,
     /// Lower and upper edge of the band at the points of `loading`, in N.
     pub band: Option<(Vec<f64>, Vec<f64>)>,
     /// Why a predicted curve has none.
     pub no_band: Option<&'static str>,
-    /// How the target goes on beyond the maximal crush.
+    /// How the target continues beyond the maximum crush.
     pub tail: Tail,
     follows_faster_runs: bool,
-    /// Largest force before and after, in N, where a steep flank was made less steep.
+    /// Largest force before and after, in N, where a steep rise was made less steep.
     pub softening: Option<(f64, f64)>,
     /// Ordinal among the curves of the same group and speed of one export, counted from 1.
     pub ordinal: usize,
 }
 
-/// How a target lets go of the energy that it has stored at the maximal crush.
+/// How a target releases the energy stored at the maximum crush.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum TargetUnloading {
     /// On a straight line of this stiffness in N/m.
     Line(f64),
-    /// Along the loading branch: everything comes back.
+    /// Along the loading branch: all energy is returned.
     Elastic,
 }
 
@@ -46,7 +46,7 @@ impl ExportCurve {
     ///
     /// # Errors
     /// If the curve does not have that force or is damaged,
-    /// If its tail makes no curve.
+    /// If the tail does not form a valid curve.
     pub fn new(
         curve: &PredictedCurve,
         force: ForceKind,
@@ -69,8 +69,8 @@ impl ExportCurve {
                 Softened::ImpossibleRun => {
                     return Err(error!(
                         Export,
-                        "no flank can be made as soft as {:.1} MN/m at equal energy without changing the curve's end, or forces by more than a quarter: remove --soften",
-                        stiffness / 1e6
+                        "no steep rise can be reduced to {} at equal energy without changing the curve's end, or forces by more than a quarter: remove --soften",
+                        Shown::one_stiffness(stiffness)
                     ));
                 }
             }
@@ -90,7 +90,7 @@ impl ExportCurve {
         let no_band = match (band.is_some(), curve.force_low_n.is_some()) {
             (true, _) => softening.map(|_| "it is not that of a softened curve"),
             (false, true) => Some(
-                "only that of the contact force is known (--force contact), until the model is trained anew",
+                "only that of the contact force is known (--force contact), until the model is trained again",
             ),
             (false, false) => Some("the model gives none here"),
         };
@@ -112,16 +112,16 @@ impl ExportCurve {
         })
     }
 
-    /// The same curve through other points; `end` is the index of the maximal crush among them.
+    /// The same curve through other points; `end` is the index of the maximum crush among them.
     pub fn through(self, loading: Envelope, end: usize) -> Self {
         Self { loading, end, band: None, ..self }
     }
 
     /// The same curve for tools that need the origin: a force at contact is reached over a
-    /// thousandth of the maximal crush, with the same energy.
+    /// thousandth of the maximum crush, with the same energy.
     ///
     /// # Errors
-    /// If that makes no curve.
+    /// If the result is not a valid curve.
     pub fn begun_at_origin(&self) -> Result<Self, Error> {
         Ok(match from_origin(&self.loading, self.end)? {
             Some((loading, end)) => self.clone().through(loading, end),
@@ -133,15 +133,15 @@ impl ExportCurve {
     pub fn softening_note(&self) -> Option<String> {
         let (before, after) = self.softening?;
         Some(format!(
-            "{}: flanks steeper than {:.1} MN/m have been made less steep, with the same energy to the maximal crush; the largest force goes from {:.3} to {:.3} MN",
+            "{}: rises steeper than {} have been made less steep, with the same energy up to the maximum crush; the peak force changes from {} to {}",
             self.headline(),
-            self.stiffness_n_per_m() / 1e6,
-            before / 1e6,
-            after / 1e6
+            Shown::one_stiffness(self.stiffness_n_per_m()),
+            Shown::one_force(before),
+            Shown::one_force(after)
         ))
     }
 
-    /// Why there is no band, in one line; nothing of a recorded curve, which needs none.
+    /// Why there is no band, in one line; nothing for a recorded curve, which needs none.
     pub fn no_band_note(&self) -> Option<String> {
         Some(format!("{}: written without a band: {}", self.headline(), self.no_band?))
     }
@@ -156,17 +156,17 @@ impl ExportCurve {
         self.loading.force_n()
     }
 
-    /// Maximal crush of the curve's own impact, in m.
+    /// Maximum crush of the curve's own impact, in m.
     pub fn max_crush_m(&self) -> f64 {
         self.deflection_m()[self.end]
     }
 
-    /// Force at the maximal crush, in N.
+    /// Force at the maximum crush, in N.
     pub fn end_n(&self) -> f64 {
         self.force_n()[self.end]
     }
 
-    /// Unloading stiffness from the maximal crush, in N/m.
+    /// Unloading stiffness from the maximum crush, in N/m.
     pub fn stiffness_n_per_m(&self) -> f64 {
         self.predicted.unloading_stiffness_n_per_m
     }
@@ -193,7 +193,7 @@ impl ExportCurve {
         self.other_mass_kg().map_or(mass, |other| mass * other / (mass + other))
     }
 
-    /// Speed of separation over impact speed, as the target unloads from the maximal crush.
+    /// Separation speed over impact speed, as the target unloads from the maximum crush.
     pub(crate) fn restitution(&self, unloading: TargetUnloading) -> f64 {
         let stored_j = match unloading {
             TargetUnloading::Line(stiffness) => 0.5 * self.end_n() * self.end_n() / stiffness,
@@ -203,7 +203,7 @@ impl ExportCurve {
     }
 
     /// The law of crumple's own runs: it unloads with its stiffness. Beyond the last point the force
-    /// goes on rising if it bottoms, else it is held.
+    /// continues rising if it bottoms, else it is held.
     pub fn law(&self) -> ForceLaw {
         let end = match self.tail {
             Tail::Bottom => EnvelopeEnd::Bottom,
@@ -212,25 +212,25 @@ impl ExportCurve {
         ForceLaw::of_curve(&self.driving(), UnloadingChoice::Own, end)
     }
 
-    /// Speed of separation over impact speed in crumple's own runs, whose curve is not softened.
+    /// Separation speed over impact speed in crumple's own runs, whose curve is not softened.
     pub fn own_restitution(&self) -> f64 {
         let end_n = self.predicted.force_n.last().copied().unwrap_or_default();
         let stored_j = 0.5 * end_n * end_n / self.stiffness_n_per_m();
         self.restitution_of(stored_j)
     }
 
-    /// Speed of separation over impact speed, from the energy in J that comes back.
+    /// Separation speed over impact speed, from the energy in J that is returned.
     fn restitution_of(&self, stored_j: f64) -> f64 {
         (2.0 * stored_j / self.effective_mass_kg()).sqrt() / self.predicted.speed_m_per_s
     }
 
-    /// What the target's unloading gives beside ours, in one line.
+    /// The target's restitution compared with ours, in one line.
     pub(crate) fn restitution_note(&self, target: &str, unloading: TargetUnloading) -> String {
         let ours = self.own_restitution();
         let theirs = self.restitution(unloading);
         let how = match unloading {
             TargetUnloading::Elastic => "it has no memory: all energy comes back".into(),
-            TargetUnloading::Line(k) => format!("it unloads with {:.1} MN/m", k / 1e6),
+            TargetUnloading::Line(k) => format!("it unloads with {}", Shown::one_stiffness(k)),
         };
         format!(
             "{}: restitution {theirs:.3} in {target} ({how}), {ours:.3} in crumple's own runs",
@@ -238,7 +238,7 @@ impl ExportCurve {
         )
     }
 
-    /// What to say of a target that unloads with the steepest rise where that is more than the
+    /// Notes for a target that unloads with the steepest rise if that is more than the
     /// curve's own stiffness.
     pub fn steepest_notes(&self, target: &str, other: &str) -> Vec<String> {
         let (own, steepest) = (self.stiffness_n_per_m(), self.loading.max_slope());
@@ -246,15 +246,15 @@ impl ExportCurve {
         let mut notes = vec![self.restitution_note(target, unloading)];
         if steepest > own * 1.01 {
             notes.push(format!(
-                "{target} unloads with the steepest rise, {:.1} MN/m, which is more than the curve's own {:.1} MN/m: --soften makes the steep flank less steep at equal energy{other}",
-                steepest / 1e6,
-                own / 1e6
+                "{target} unloads with the steepest rise, {}, which is more than the curve's own {}: --soften makes the steep rise less steep at equal energy{other}",
+                Shown::one_stiffness(steepest),
+                Shown::one_stiffness(own)
             ));
         }
         notes
     }
 
-    /// What the curve is, in one line, for headers and titles.
+    /// Description of the curve in one line, for headers and titles.
     pub fn headline(&self) -> String {
         let group = self.predicted.provenance.group.replace(char::is_control, " ");
         let run = own_name(&self.predicted).map_or(String::new(), |name| format!(", {name}"));
@@ -276,7 +276,7 @@ impl ExportCurve {
         identifier(&self.file_stem())
     }
 
-    /// What a curve is and what it may drive, as keys and values of a file's header; SI.
+    /// Description of a curve and its use, as keys and values of a file's header; SI.
     pub fn facts(&self) -> Vec<(&'static str, String)> {
         let curve = &self.predicted;
         let kind = curve.provenance.force_kind;
@@ -313,13 +313,13 @@ impl ExportCurve {
         facts
     }
 
-    /// What the unloading stiffness gives.
+    /// Effect of the unloading stiffness.
     fn unloading(&self, steepest_n_per_m: f64) -> &'static str {
         let softer = self.stiffness_n_per_m() < steepest_n_per_m * (1.0 - 1e-9);
         match (self.predicted.rebound.is_some(), softer) {
-            (true, false) => "along this stiffness from the maximal crush it gives the rebound",
+            (true, false) => "along this stiffness from the maximum crush it gives the rebound",
             (true, true) => {
-                "along this stiffness from the maximal crush it gives the rebound; from a point of the steepest rise it would give energy"
+                "along this stiffness from the maximum crush it gives the rebound; from a point of the steepest rise it would give energy"
             }
             (false, _) => {
                 "no run shows the rebound: at least the steepest rise, so that it gives no energy"
@@ -327,7 +327,7 @@ impl ExportCurve {
         }
     }
 
-    /// What hits what.
+    /// Kind of impact.
     fn impact(&self) -> String {
         match self.other_mass_kg() {
             None => "one body of this mass against a rigid wall".into(),
@@ -355,15 +355,15 @@ fn speed_name(curve: &PredictedCurve) -> String {
     km_per_h(curve.speed_m_per_s).replace([' ', '/'], "")
 }
 
-/// The name of a recorded case, where it says more than the speed: one of several runs.
+/// The name of a recorded case if it distinguishes one of several runs at a speed.
 fn own_name(curve: &PredictedCurve) -> Option<&str> {
     curve.provenance.case.as_deref().filter(|name| *name != speed_name(curve))
 }
 
-/// Most characters of a line of a header.
+/// Maximum number of characters of a line of a header.
 const LINE: usize = 180;
 
-/// A warning as lines of a header, which some tools read up to a width only.
+/// A warning as lines of a header, which some tools read only up to a certain width.
 pub(super) fn in_lines(warning: &str) -> Vec<(&'static str, String)> {
     let mut lines = vec![String::new()];
     for word in warning.split(|c: char| c.is_control() || c == ' ').filter(|w| !w.is_empty()) {
@@ -386,18 +386,18 @@ pub(super) fn identifier(name: &str) -> String {
     if text.starts_with(|c: char| c.is_ascii_alphabetic()) { text } else { format!("curve_{text}") }
 }
 
-/// A name that is told apart from earlier ones of the same kind.
+/// A name that is distinguished from earlier ones of the same kind.
 fn numbered(name: String, ordinal: usize) -> String {
     if ordinal > 1 { format!("{name}-{ordinal}") } else { name }
 }
 
-/// A character that every file system takes in a name.
+/// A character that every file system accepts in a name.
 pub(super) fn plain(c: char) -> char {
     if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }
 }
 
 impl Options {
-    /// The curves made ready for a target whose own tail is `usual`.
+    /// The curves prepared for a target whose own tail is `usual`.
     pub(super) fn ready(
         &self,
         inputs: &[PredictedCurve],

@@ -38,7 +38,7 @@ fn write(
         thin = curve.clone().through(loading, end);
         curve = &thin;
         notes.push(format!(
-            "{}: {MOST_POINTS} of {points} points are kept, with the same energy to the maximal crush",
+            "{}: {MOST_POINTS} of {points} points are kept, with the same energy up to the maximum crush",
             curve.headline()
         ));
     }

@@ -1,7 +1,7 @@
 //! ISO-MME: a folder of channels over time, of a recorded case or of a multi-body run; SI.
 //!
 //! Layout: ISO/TS 13499, version 1.6. `NAME.mme` describes the test, `Channel/NAME.chn` lists the channels, and
-//! `Channel/NAME.001` and so on hold one channel each: `key :value` lines, then one value a line.
+//! `Channel/NAME.001` and so on hold one channel each: `key :value` lines, then one value per line.
 
 use super::text::nine_digits;
 use super::{Exported, Options};
@@ -14,7 +14,7 @@ use crate::unit::km_per_h;
 pub(crate) struct Channel {
     /// Sixteen characters: test object, position, location, dimension, direction, filter class.
     pub code: String,
-    /// What it is, in words.
+    /// Its description.
     pub name: String,
     /// Its SI unit.
     pub unit: &'static str,
@@ -22,12 +22,12 @@ pub(crate) struct Channel {
     pub values: Vec<f64>,
 }
 
-/// What a folder of channels is of.
+/// Description of a folder of channels.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Test<'a> {
     /// Name of its files.
     pub name: &'a str,
-    /// What happened, in one line.
+    /// Description of the event in one line.
     pub title: &'a str,
     /// Mass and speed of each body, in kg and m/s.
     pub bodies: Vec<(f64, f64)>,

@@ -21,7 +21,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
         // The first curve has the plain names, which the others number.
         let named = |name: &str| if k == 0 { name.into() } else { format!("{name}_{}", k + 1) };
         let reach = curve.loading.end_m();
-        // A guard point: tools that extrapolate go on without force before the contact.
+        // A guard point: tools that extrapolate continue without force before the contact.
         let guarded = |force_n: &[f64]| -> Vec<(f64, f64)> {
             let points = curve.deflection_m().iter().copied().zip(force_n.iter().copied());
             std::iter::once((-0.01 * reach, 0.0)).chain(points).collect()
@@ -54,7 +54,7 @@ fn columns(rows: &[(f64, f64)]) -> Vec<Vec<f64>> {
     vec![rows.iter().map(|r| r.0).collect(), rows.iter().map(|r| r.1).collect()]
 }
 
-/// What stands in front of the values: `kind` is 0 for numbers and 1 for text.
+/// Header of a matrix: `kind` is 0 for numbers and 1 for text.
 fn head(bytes: &mut Vec<u8>, kind: i32, name: &str, rows: usize, columns: usize) {
     let name = [name.as_bytes(), &[0]].concat();
     for field in [kind, rows as i32, columns as i32, 0, name.len() as i32] {

@@ -1,7 +1,7 @@
-//! Curves to files of other tools: one file per format, one line in [`FORMATS`]. [`read`] takes them
+//! Curves to files of other tools: one file per format, one line in [`FORMATS`]. [`read`] reads them
 //! back.
 //!
-//! What all targets share stands once: the curve made ready ([`ExportCurve`]), its tail, thinning, softening, numbers and
+//! Shared by all targets: the prepared curve ([`ExportCurve`]), its tail, thinning, softening, numbers and
 //! titles as text.
 
 mod adams;
@@ -37,7 +37,7 @@ pub use read::curve::{Metadata, Place, ReadFile};
 pub(crate) use read::history;
 pub use read::{ColumnNames, READERS, ReadCurve, ReadOptions, Reader, read};
 
-/// One target: its name, its file extensions, what it can hold, how it is written.
+/// One target: its name, file extensions, capabilities and writer.
 pub struct Format {
     /// As `--to` takes it.
     pub name: &'static str,
@@ -45,8 +45,8 @@ pub struct Format {
     pub extensions: &'static [&'static str],
     /// One line for `export --list`.
     pub description: &'static str,
-    /// What its curves do beyond the maximal crush if nothing else is asked for; `Tail::None` of
-    /// files whose curves cannot go on.
+    /// Default continuation of its curves beyond the maximum crush; `Tail::None` for
+    /// files whose curves cannot continue.
     pub tail: Tail,
     /// Whether it can be a complete input of one mass on the spring (`--deck`).
     pub deck: bool,
@@ -54,14 +54,14 @@ pub struct Format {
     pub materials: bool,
     /// Whether curves have numbers in it (`--curve-id`).
     pub ids: bool,
-    /// Whether a band stands beside its curves.
+    /// Whether it holds a band with its curves.
     pub band: bool,
-    /// Whether it holds a model at several speeds, so that it takes what is asked of a model.
+    /// Whether it holds a model at several speeds, so that it accepts the options of a model.
     pub(crate) over_speeds: bool,
     writer: Writer,
 }
 
-/// What a target is made of.
+/// The input of a target.
 enum Writer {
     /// Curves, each with a file of its own.
     Each(fn(&ExportCurve, &Options) -> Result<Exported, Error>),
@@ -74,12 +74,12 @@ enum Writer {
     Case(fn(&Case, &Options) -> Result<Exported, Error>),
 }
 
-/// Every format we write. To add one: write its module, add its line here with what it can hold.
+/// Every format we write. To add one: write its module, add its line here with its capabilities.
 pub const FORMATS: &[Format] = &[
     Format::new(
         "json",
         &["json"],
-        "predicted curve with everything known of it, SI (master format)",
+        "predicted curve with all its data, SI (master format)",
         Tail::None,
         Writer::Whole(json::write),
     ),
@@ -140,14 +140,14 @@ pub const FORMATS: &[Format] = &[
     Format::new(
         "fmi2",
         &["fmu"],
-        "FMU of FMI 2.0, model exchange and co-simulation, whole law with memory, SI",
+        "FMU of FMI 2.0, model exchange and co-simulation, complete law with memory, SI",
         Tail::Bottom,
         Writer::Each(fmu_export::write_fmi2),
     ),
     Format::new(
         "fmi3",
         &["fmu"],
-        "the same of FMI 3.0",
+        "the same for FMI 3.0",
         Tail::Bottom,
         Writer::Each(fmu_export::write_fmi3),
     ),
@@ -194,7 +194,7 @@ pub const FORMATS: &[Format] = &[
     ),
 ];
 
-/// Choices that some targets take.
+/// Options of some targets.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Units of the file; the target's usual ones if absent.
@@ -203,9 +203,9 @@ pub struct Options {
     pub id: u32,
     /// Which force.
     pub force: ForceKind,
-    /// What curves do beyond the maximal crush; the target's usual way if absent.
+    /// Continuation beyond the maximum crush; the target's default if absent.
     pub tail: Option<Tail>,
-    /// Make a flank that is steeper than the unloading stiffness less steep, at equal energy.
+    /// Reduce rises steeper than the unloading stiffness, at equal energy.
     pub soften: bool,
     /// Which spring material of LS-DYNA.
     pub material: Material,
@@ -239,29 +239,29 @@ impl Default for Options {
     }
 }
 
-/// What an export gives: one file, or several in a folder.
+/// The result of an export: one file, or several in a folder.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Exported {
     /// Name and bytes of each file. A single file takes the name that the user gives; several
     /// take theirs within the folder that the user names. Names may hold `/`.
     pub files: Vec<(String, Vec<u8>)>,
-    /// What the user should know of what the target makes of the curves.
+    /// Notes on the curves in the target.
     pub notes: Vec<String>,
     /// Warnings of the curves that were made for it.
     pub warnings: Vec<String>,
 }
 
 impl Exported {
-    /// One file and nothing to say.
+    /// One file without notes.
     pub(crate) fn file(name: impl Into<String>, bytes: Vec<u8>) -> Self {
         Self { files: vec![(name.into(), bytes)], ..Self::default() }
     }
 }
 
-/// Most bytes of a file that holds a curve: a predicted one has some ten thousand.
+/// Maximum number of bytes of a file that holds a curve: a predicted one has some ten thousand.
 pub(crate) const MAX_CURVE_BYTES: u64 = 64 << 20;
 
-/// Fewest points that every target takes.
+/// Minimum number of points that every target accepts.
 pub(crate) const MIN_POINTS: usize = 4;
 
 impl Format {
@@ -287,12 +287,12 @@ impl Format {
         }
     }
 
-    /// Whether it is made of a whole model, not of its curves.
+    /// Whether it takes a whole model, not its curves.
     pub fn takes_model(&self) -> bool {
         matches!(self.writer, Writer::Model(_))
     }
 
-    /// Whether it is made of recorded cases, not of curves.
+    /// Whether it takes recorded cases, not curves.
     pub fn takes_case(&self) -> bool {
         matches!(self.writer, Writer::Case(_))
     }
@@ -302,7 +302,7 @@ impl Format {
         matches!(self.writer, Writer::Whole(_))
     }
 
-    /// Whether its curves can go on beyond the maximal crush.
+    /// Whether its curves can continue beyond the maximum crush.
     pub(crate) fn takes_tail(&self) -> bool {
         self.tail != Tail::None
     }
@@ -375,12 +375,12 @@ impl Format {
         };
         let mut exported = with_names_of_their_own(exported);
         if options.deck && options.force == ForceKind::Contact {
-            exported.notes.push("the deck's one mass moves by the contact force, which one rigid mass does not follow (mass that the crush zone stops early is in it): its crush and rebound are not the run's; the body force is for that".into());
+            exported.notes.push("the deck's single mass is driven by the contact force, which includes mass that the crush zone stops early: its crush and rebound differ from the run's; use the body force".into());
         }
         Ok(exported)
     }
 
-    /// What has been done to the curves, and what is not written, behind the target's own notes.
+    /// Changes to the curves, and omissions, after the target's own notes.
     fn with_notes(&self, mut exported: Exported, curves: &[ExportCurve]) -> Exported {
         exported.notes.extend(curves.iter().filter_map(ExportCurve::softening_note));
         if self.band {
@@ -397,7 +397,7 @@ impl Format {
 /// States that a deck's histories shall have, as in the reference data.
 const NUMBER_OF_STATES: f64 = 400.0;
 
-/// Time in s until a body on this curve has rebounded: a force that is even takes 2 d/v to stop it.
+/// Time in s until a body on this curve has rebounded: a constant force takes 2 d/v to stop it.
 fn run_time_s(curve: &ExportCurve) -> f64 {
     4.0 * curve.max_crush_m() / curve.predicted.speed_m_per_s
 }
@@ -430,7 +430,7 @@ fn with_names_of_their_own(mut exported: Exported) -> Exported {
 /// The format of that name.
 ///
 /// # Errors
-/// It lists the names there are.
+/// It lists the existing names.
 pub fn by_name(name: &str) -> Result<&'static Format, Error> {
     // "--to spr" names one of the kinds of file of a format.
     let by_kind = || FORMATS.iter().find(|f| f.extensions.contains(&name));

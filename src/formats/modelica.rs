@@ -1,8 +1,8 @@
 //! Modelica: a self-contained package with the spring and its memory (`.mo`), or a CombiTable text (`.txt`); SI.
 //!
 //! The package needs no library: the law is the one of [`ForceLaw`](crate::multibody::ForceLaw) with a straight unloading
-//! line, its tables are constants of the package. Memory: the largest deflection is a discrete variable that moves while
-//! the deflection falls (`when v < 0`); on the way up the force is that of the loading branch.
+//! line, its tables are constants of the package. Memory: the maximum deflection is a discrete variable that is updated while
+//! the deflection decreases (`when v < 0`); during loading the force is that of the loading branch.
 
 use crate::error::{Error, error};
 use std::fmt::Write;
@@ -14,9 +14,9 @@ use super::{ExportCurve, Exported, Options, TargetUnloading};
 use crate::curve::Tail;
 
 const COMMENT_WIDTH: usize = 200;
-/// Most points of the package's table: a translator unrolls the search through them.
+/// Maximum number of points of the package's table: a translator unrolls the search through them.
 const MOST_POINTS: usize = 200;
-/// Words that no package can have for a name (Modelica 3.6, 2.3.3), as far as files are called so.
+/// Reserved words that cannot be package names (Modelica 3.6, 2.3.3), as far as they are likely file names.
 const KEYWORDS: &str = "algorithm and block class connect connector constant discrete each else end equation \
     extends external false final flow for function if import initial inner input model \
     operator outer output package record true type";
@@ -42,7 +42,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
         let end = loading.deflection_m().partition_point(|&d| d < curve.max_crush_m());
         if loading.deflection_m().len() < points {
             exported.notes.push(format!(
-                "{}: {} of {points} points are kept in the package, with the same energy to the maximal crush",
+                "{}: {} of {points} points are kept in the package, with the same energy up to the maximum crush",
                 curve.headline(),
                 loading.deflection_m().len()
             ));

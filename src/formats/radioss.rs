@@ -2,7 +2,7 @@
 //!
 //! Layout: Radioss reference guide. TYPE4 takes compression in the third quadrant. Hardening flag 2
 //! (uncoupled): after the crush the spring unloads with K1 and has no force in tension, where isotropic
-//! hardening (1) would pull. The solver takes the smaller of the curve and a line of K1 (OpenRadioss,
+//! hardening (1) would cause tension. The solver takes the smaller of the curve and a line of K1 (OpenRadioss,
 //! `redef3.F`), so K1 is at least the steepest rise.
 
 use super::lsdyna::InUnits;
@@ -102,9 +102,9 @@ fn function(lines: &mut Lines, curve: &ExportCurve, units: InUnits, id: u32) {
 fn property(lines: &mut Lines, curve: &ExportCurve, units: InUnits, id: u32) {
     let zero = nine_digits(0.0);
     let one = nine_digits(1.0);
-    // A spring needs a mass of its own: a millionth of the body's.
+    // A spring needs its own mass: a millionth of the body's.
     let mass = 1e-6 * curve.predicted.mass_kg / units.0.mass_kg;
-    // With a softer K1 the solver would cut the flanks that are steeper, and their energy.
+    // With a softer K1 the solver would cut the rises that are steeper, and their energy.
     let stiffness = curve.stiffness_n_per_m().max(curve.loading.max_slope());
     let stiffness = units.stiffness(stiffness);
     lines.add(format_args!("/PROP/TYPE4/{id}"));

@@ -1,6 +1,6 @@
 //! Table of a model: force over speed and deflection, for tools that interpolate in both; SI.
 //!
-//! Each speed's curve goes on beyond its maximal crush as a tail that is held, so that the table is a full rectangle.
+//! Each speed's curve continues beyond its maximum crush as a tail that is held, so that the table is a full rectangle.
 
 use super::export_curve::in_lines;
 use super::text::{Lines, nine_digits};
@@ -16,7 +16,7 @@ use crate::unit::km_per_h;
 const EDGES: [&str; 2] = ["force_low_N", "force_high_N"];
 /// Value of the HDF5 root's `format`.
 const FORMAT: &str = "crumple force table";
-/// Speeds of a table if none are asked for.
+/// Speeds of a table if none are requested.
 const SPEEDS: usize = 25;
 /// Intervals of the deflection. They grow with its square root: a crush of 10 mm at a low speed has as
 /// sharp a spike as one of 2 m, in the same row of columns.
@@ -30,7 +30,7 @@ struct Table {
     force_n: Vec<f64>,
     /// Lower and upper edge of the band, likewise; NaN at a speed without one.
     band: Option<[Vec<f64>; 2]>,
-    /// What the band is, in words.
+    /// Description of the band.
     band_meaning: Option<String>,
     max_deflection_m: Vec<f64>,
     unloading_stiffness_n_per_m: Vec<f64>,
@@ -169,7 +169,7 @@ impl Table {
     }
 }
 
-/// The forces of a curve at these deflections, with its own energy to its maximal crush, and the edges of its
+/// The forces of a curve at these deflections, with its own energy to its maximum crush, and the edges of its
 /// band, which go with them.
 fn rows(curve: &ExportCurve, deflection_m: &[f64]) -> Result<(Vec<f64>, [Vec<f64>; 2]), Error> {
     let at = |curve: &Envelope| deflection_m.iter().map(|&d| curve.force_at(d)).collect::<Vec<_>>();
@@ -208,7 +208,7 @@ fn no_band_note(curves: &[ExportCurve]) -> Option<String> {
 }
 
 impl Table {
-    /// What the table is, as keys and values.
+    /// Description of the table, as keys and values.
     fn facts(&self, model: &Model, force: ForceKind) -> Vec<(&'static str, String)> {
         let mut facts = facts(model, force);
         facts.extend(self.band_meaning.clone().map(|meaning| ("band", meaning)));
@@ -225,7 +225,7 @@ fn facts(model: &Model, force: ForceKind) -> Vec<(&'static str, String)> {
         ("speed_kind", model.speed_kind.name().into()),
         ("mass_kg", model.mass_kg.to_string()),
         ("fitted_between", format!("{low} and {high} m/s")),
-        ("beyond", "each curve goes on beyond its maximal crush, along faster runs".into()),
+        ("beyond", "each curve goes on beyond its maximum crush, along faster runs".into()),
         ("model", model.name().into()),
         ("training_hash", model.training_hash.clone()),
         ("written_by", concat!("crumple ", env!("CARGO_PKG_VERSION")).into()),

@@ -9,7 +9,7 @@ use crate::curve::Envelope;
 /// The envelope with at most `most` points (two or more): those are removed first whose removal
 /// changes the energy least (the area of the triangle with both neighbours; Visvalingam and
 /// Whyatt, Cartographic Journal 30, 1993). The forces at the others are then those of the least squares
-/// over the whole curve. `kept` is the index of a point that stays, such as the maximal crush; the forces up
+/// over the whole curve. `kept` is the index of a point that stays, such as the maximum crush; the forces up
 /// to it are scaled so that the energy to it is the same. A curve of so few points stays as it is.
 pub(crate) fn thinned(curve: &Envelope, most: usize, kept: usize) -> Result<Envelope, Error> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
@@ -66,7 +66,7 @@ fn least_squares(d: &[f64], f: &[f64], left: &[usize], kept: usize) -> Vec<f64> 
     right.iter().zip(left).map(|(force, &i)| force.max(f[i].min(0.0))).collect()
 }
 
-/// What a triangle beyond the maximal crush counts: the force there is less certain.
+/// What a triangle beyond the maximum crush counts: the force there is less certain.
 const TAIL_WEIGHT: f64 = 0.05;
 
 /// Indices of the points that are left when the one with the smallest triangle is removed again and
@@ -107,7 +107,7 @@ fn kept_points(d: &[f64], f: &[f64], most: usize, kept: usize) -> Vec<usize> {
     (0..n).filter(|&i| is_left[i]).collect()
 }
 
-/// Fewest points of a table that splines go through.
+/// Minimum number of points of a table that splines go through.
 const FEWEST: usize = 200;
 /// A kink is fenced by two points at this share of the intervals beside it.
 const FENCE: f64 = 0.05;
@@ -144,10 +144,10 @@ pub(crate) fn for_splines(curve: &Envelope) -> Result<Envelope, Error> {
     Envelope::new(deflection_m, force_n)
 }
 
-/// What came of making steep flanks less steep.
+/// Result of softening.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Softened {
-    /// There is none that steep.
+    /// No rise is that steep.
     Nothing,
     Curve(Envelope),
     /// The energy could only be kept by changing the curve's end, or forces by more than a quarter.
@@ -155,8 +155,8 @@ pub(crate) enum Softened {
 }
 
 /// The envelope with no rise steeper than `stiffness_n_per_m` and the same energy to its point
-/// `end`: a too steep flank begins earlier on its line, and the forces around it are raised for what
-/// the flank has lost, by a quarter at most and not in the last twentieth of the deflection.
+/// `end`: a too steep rise begins earlier on its line, and the forces around it are raised for what
+/// the rise has lost, by a quarter at most and not in the last twentieth of the deflection.
 pub(crate) fn softened(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Softened {
     if curve.max_slope() <= stiffness_n_per_m * (1.0 + 1e-9) {
         return Softened::Nothing;
@@ -208,9 +208,9 @@ fn soften(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Option<Envelo
     }
 }
 
-/// Share by which the force at the maximal crush may change.
+/// Share by which the force at the maximum crush may change.
 const SAME_END: f64 = 0.01;
-/// Up to this share of the maximal crush forces may be raised: the end, from which a body rebounds,
+/// Up to this share of the maximum crush forces may be raised: the end, from which a body rebounds,
 /// stays.
 const REACH: f64 = 0.95;
 /// Forces are raised by at most this factor.
@@ -239,14 +239,14 @@ pub(crate) fn from_origin(
     Ok(Some((Envelope::new(deflection_m, force_n)?, end + 1)))
 }
 
-/// A force at contact is reached over this share of the maximal crush.
+/// A force at contact is reached over this share of the maximum crush.
 const RAMP: f64 = 1e-3;
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// A sharp peak at 10 mm and folds behind it.
+    /// A sharp peak at 10 mm and folds after it.
     fn curve() -> Envelope {
         let d: Vec<f64> = (0..=400).map(|i| f64::from(i) * 2.5e-3).collect();
         let f = d

@@ -1,6 +1,6 @@
-//! HDF5: the one room that names the crate hdf5-pure, and what is built on it for all others.
+//! HDF5: the only module that uses the crate hdf5-pure, with everything built on it for the others.
 //!
-//! The names below are all that the program uses of that crate: a replacement has to offer
+//! The names below are all that the program uses of that crate: a replacement has to provide
 //! these.
 
 pub(crate) mod skeleton;
@@ -40,7 +40,7 @@ pub(crate) enum OpenError {
 }
 
 /// The first read of an open file that the operating system failed. The library leaves out the attributes that
-/// it cannot read, without a word: who has asked for some asks here whether they are all.
+/// it cannot read, silently: callers check here that they got all.
 #[derive(Clone, Default)]
 pub(crate) struct Fault(Arc<OnceLock<String>>);
 

@@ -1,15 +1,15 @@
 //! An HDF5 file whose large datasets get their values later, in any order and from any thread.
 //!
 //! The library encodes a file in memory, data included. Here each large dataset is given
-//! zeros that nothing ever touched, so that they take no memory, behind a mark; where the
-//! encoder hands over the marked bytes, their place in the file is noted and nothing is
+//! untouched zeros, which take no memory, after a mark; where the
+//! encoder passes on the marked bytes, their place in the file is noted and nothing is
 //! written.
 //!
-//! This rests on something that hdf5-pure does and does not promise: it hands the raw values of
+//! This relies on behaviour that hdf5-pure does not guarantee: it passes the raw values of
 //! a dataset to its writer in one piece, as they were given to it, if they have 8 KiB or more
 //! (fewer it gathers with others in the buffer of a `BufWriter`). The crate's version is pinned
 //! exactly, and the test below fails when that changes. [`Skeleton::write`] notices it too, and
-//! its callers then say so or write in another way.
+//! its callers then report it or write in another way.
 
 use std::fs::File;
 use std::io::{self, Write};

@@ -81,7 +81,7 @@ const SMALL_BYTES: u64 = 1 << 16;
 
 /// Writes a table to `path` as a whole; `fill` puts the values of all columns, in any order.
 ///
-/// A column is a dataset of its name, in which `_` stands for `/`; the dataset `columns` lists
+/// A column is a dataset of its name, in which `_` replaces `/`; the dataset `columns` lists
 /// the names in their order. Nothing is held but what `fill` holds and columns up to 64 KiB,
 /// and the same values give the same bytes in whatever pieces they are put.
 pub(crate) fn write_table(

@@ -21,7 +21,7 @@ use crate::solver::{self, Blocks, Selection, SolverFile, decks};
 use crate::unit::UnitSystem;
 use units::unit_of;
 
-/// What is known of a file's histories beside the file.
+/// What is known about a file's histories next to the file.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Beside<'a> {
     /// Units of the values; the deck's if absent, and if that has none they stay unknown.
@@ -81,7 +81,7 @@ pub(crate) fn is_other_hdf5(path: &Path) -> bool {
 ///
 /// Beside `time` a dataset that is called by the word for the entities, such as `node`, holds the
 /// ids and has the attributes `ids`, `sides` and `titles`, where there are any (of more than 4 000
-/// entities the dataset `/titles/node`). Other entities have one of their own, `node_2`. Where the units are known, every dataset whose name tells what it is of
+/// entities the dataset `/titles/node`). Other entities have one of their own, `node_2`. Where the units are known, every dataset whose name determines its quantity
 /// has the attribute `units`.
 ///
 /// # Errors
@@ -125,7 +125,7 @@ fn not_encoded(error: impl std::fmt::Display) -> Error {
 struct Layout {
     out: FileBuilder,
     names: Names,
-    /// Section of the solver's file.
+    /// Section of the solver file.
     section: String,
     units: Option<UnitSystem>,
     titles: HashMap<EntityId, String>,

@@ -1,4 +1,4 @@
-//! Units of components, by their names as binout has them.
+//! Units of components, by their names as in binout.
 
 use crate::unit::{UnitSystem, named_or};
 
@@ -62,7 +62,7 @@ const ENDINGS: [(&str, Quantity); 30] = [
 const PARTS: [(&str, Quantity); 3] =
     [("sig_", Quantity::Stress), ("sigma_", Quantity::Stress), ("eps", Quantity::Pure)];
 
-/// Names that say by themselves what a component of one section is of.
+/// Names that alone determine the quantity of a component of one section.
 const OF_SECTION: [(&str, &[&str], Quantity); 5] = [
     ("spcforc", &["x_resultant", "y_resultant", "z_resultant"], Quantity::Force),
     ("bndout", &["x_total", "y_total", "z_total"], Quantity::Force),
@@ -84,7 +84,7 @@ fn quantity(section: &str, component: &str) -> Option<Quantity> {
     ending.or_else(part).map(|(_, quantity)| *quantity)
 }
 
-/// The unit of a component's values, such as `mm/s^2`; `None` if its name does not tell.
+/// The unit of a component's values, such as `mm/s^2`; `None` if its name does not determine it.
 pub(super) fn unit_of(section: &str, component: &str, system: UnitSystem) -> Option<String> {
     let (length, mass, time) = system.names();
     let force =

@@ -1,4 +1,4 @@
-//! From a file to its case: read, said, made, and traced.
+//! From a file to its case: reading, metadata, extraction, provenance.
 
 use std::path::Path;
 
@@ -103,7 +103,7 @@ fn absolute(path: &Path) -> Option<String> {
     Some(std::path::absolute(path).ok()?.display().to_string())
 }
 
-/// Everything beside the file that decides the case's numbers.
+/// Everything besides the file that determines the case's numbers.
 #[derive(Serialize)]
 struct Recipe<'a> {
     study: &'a str,

@@ -1,7 +1,7 @@
 //! Adding curves of files to a database: each becomes a case of the study `IMPORTED`.
 //!
 //! All files are read, and all cases made, before anything is written; the database is locked
-//! meanwhile, and written whole.
+//! meanwhile, and written as a whole.
 
 mod case;
 mod said;
@@ -18,7 +18,7 @@ use crate::file::WriterLock;
 use crate::formats::read::ReadOptions;
 use crate::unit::SpeedKind;
 
-/// One file that is to become a case, and what is said of it.
+/// One file that is to become a case, with its metadata.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Item {
     /// The file, or an ISO-MME test's folder.
@@ -29,7 +29,7 @@ pub(crate) struct Item {
     pub speed_m_per_s: Option<f64>,
 }
 
-/// What is said of all files that are added at once.
+/// Metadata of all files that are added at once.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Settings {
     /// Group of the database.
@@ -42,17 +42,17 @@ pub(crate) struct Settings {
     pub other_mass_kg: Option<f64>,
     /// Unloading stiffness in N/m; the file's if absent.
     pub unloading_stiffness_n_per_m: Option<f64>,
-    /// How the files are read; its force is also which force a curve is, if its file does not say.
+    /// How the files are read; its force is also the kind of a curve whose file does not state it.
     pub read: ReadOptions,
     /// Further parameters of the cases.
     pub parameters: BTreeMap<String, Parameter>,
     /// Replace cases of these names that were added before.
     pub replace: bool,
-    /// Take curves whose energy cannot be the impact's.
+    /// Accept curves whose energy is impossible for the impact.
     pub accept_energy: bool,
 }
 
-/// Adds the curves of `items` to the database at `path`, which is made if it is not there; returns
+/// Adds the curves of `items` to the database at `path`, which is created if it does not exist; returns
 /// their cases in the order of the items.
 pub(crate) fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Vec<Case>, Error> {
     let _lock = WriterLock::take(path)?;
@@ -81,7 +81,7 @@ pub(crate) fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Ve
             check_kinds(item, &case, first)?;
         }
         if let Some(before) = there(&database, &case) {
-            // What users said of it is of the one that takes its place, too.
+            // Tags and notes are kept for the case that replaces it.
             (case.provenance.tags, case.provenance.user_notes) =
                 (before.provenance.tags.clone(), before.provenance.user_notes.clone());
         }
@@ -92,7 +92,7 @@ pub(crate) fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Ve
     Ok(cases)
 }
 
-/// The case that the curve of one file makes, without a database.
+/// The case of the curve of one file, without a database.
 pub(crate) fn case_of_file(item: &Item, settings: &Settings) -> Result<Case, Error> {
     case::of(item, settings, None)
 }
@@ -109,7 +109,7 @@ fn check_place(database: &Database, item: &Item, case: &Case, replace: bool) -> 
         Some(other) if other.id.study != IMPORTED => {
             return Err(error!(
                 Import,
-                "{path}: case \"{name}\" of group \"{group}\" is of the study \"{study}\", which builds it: give another name with --case",
+                "{path}: case \"{name}\" of group \"{group}\" belongs to the study \"{study}\", which builds it: give another name with --case",
                 path = path.display(),
                 study = other.id.study
             ));
@@ -123,7 +123,7 @@ fn check_place(database: &Database, item: &Item, case: &Case, replace: bool) -> 
         }
         _ => {}
     }
-    // A case that is replaced binds nobody.
+    // A case that is replaced imposes no restriction.
     match database.cases(&case.id.group).iter().find(|c| c.id.name != case.id.name) {
         Some(other) => check_kinds(item, case, other),
         None => Ok(()),

@@ -1,10 +1,10 @@
-//! What is said beside a file and what the file says, put together.
+//! Metadata given by the user combined with those of the file.
 
 use super::{Item, Settings};
 use crate::curve::{Case, ForceKind, Masses};
 use crate::error::{Error, error};
 use crate::formats::read::{Metadata, ReadCurve};
-use crate::unit::{Speed, SpeedKind, km_per_h};
+use crate::unit::{Shown, Speed, SpeedKind, km_per_h};
 
 /// The impact of a curve, and which force it is.
 pub(super) struct Said {
@@ -16,8 +16,8 @@ pub(super) struct Said {
 }
 
 impl Said {
-    /// What is stated wins, and a warning says where the file differs. `group`: a case that is
-    /// there, whose kind of speed holds where nothing else says it.
+    /// Given values take precedence, and a warning says where the file differs. `group`: a case that is
+    /// there, whose kind of speed is the default.
     pub(super) fn of(
         item: &Item,
         settings: &Settings,
@@ -57,7 +57,7 @@ impl StatedAndFound<'_> {
     fn missing(&self, what: &'static str, option: &'static str) -> Error {
         error!(
             Usage,
-            "{path}: the file does not say {what}: give {option}",
+            "{path}: the file does not state {what}: give {option}",
             path = self.item.path.display()
         )
     }
@@ -73,7 +73,7 @@ impl StatedAndFound<'_> {
             && (stated / found - 1.0).abs() > SAME
         {
             let (stated, found) = (shown(stated), shown(found));
-            self.warnings.push(format!("{what}: the file says {found}, {stated} is used"));
+            self.warnings.push(format!("{what}: the file states {found}; {stated} is used"));
         }
         let value = stated.or(found);
         match value.filter(|v| !(*v > 0.0 && v.is_finite())) {
@@ -91,7 +91,7 @@ impl StatedAndFound<'_> {
             && stated != found
         {
             let (stated, found) = (stated.name(), found.name());
-            self.warnings.push(format!("speed: the file says {found}, {stated} is used"));
+            self.warnings.push(format!("speed: the file states {found}; {stated} is used"));
         }
         match (self.settings.kind, self.facts.speed_kind, group) {
             (Some(kind), ..) | (None, Some(kind), _) => Ok(kind),
@@ -114,17 +114,19 @@ impl StatedAndFound<'_> {
     }
 
     fn masses(&mut self, kind: SpeedKind) -> Result<Masses, Error> {
-        let tonnes = |kg: f64| format!("{} t", kg / 1e3);
-        let mass = self.either("mass", (self.settings.mass_kg, self.facts.mass_kg), tonnes)?;
+        let shown = |kg: f64| {
+            if kg < 1e3 { format!("{kg} kg") } else { format!("{} t", kg / 1e3) }
+        };
+        let mass = self.either("mass", (self.settings.mass_kg, self.facts.mass_kg), shown)?;
         let others = (self.settings.other_mass_kg, self.facts.other_mass_kg);
-        let other = self.either("other mass", others, tonnes)?;
+        let other = self.either("other mass", others, shown)?;
         let body_kg =
             mass.ok_or_else(|| self.missing("the mass of the body", "--mass, such as --mass 24t"))?;
         let other_kg = match (kind, other) {
             (SpeedKind::Wall, _) if self.settings.other_mass_kg.is_some() => {
                 return Err(error!(
                     Usage,
-                    "{path}: a wall has no mass: remove --other-mass, or say --kind closing",
+                    "{path}: a wall has no mass: remove --other-mass, or use --kind closing",
                     path = self.item.path.display()
                 ));
             }
@@ -138,12 +140,11 @@ impl StatedAndFound<'_> {
         Ok(Masses { body_kg, other_kg })
     }
 
-    /// Says where the stated unloading stiffness is not the file's; which is used is decided elsewhere.
+    /// Reports a stated unloading stiffness that differs from the file's; the choice is made elsewhere.
     fn unloading(&mut self) -> Result<(), Error> {
         let stated = self.settings.unloading_stiffness_n_per_m;
         let both = (stated, stated.and(self.facts.unloading_stiffness_n_per_m));
-        let shown = |k: f64| format!("{:.4} MN/m", k / 1e6);
-        self.either("unloading stiffness", both, shown).map(|_| ())
+        self.either("unloading stiffness", both, Shown::one_stiffness).map(|_| ())
     }
 
     fn force(&mut self) -> Result<ForceKind, Error> {
@@ -157,8 +158,9 @@ impl StatedAndFound<'_> {
             )),
             (Some(force), _) | (None, Some(force)) => Ok(force),
             (None, None) => {
-                self.notes
-                    .push("force: taken as the contact force, as nothing says which it is".into());
+                self.notes.push(
+                    "force: taken as the contact force, because nothing states which it is".into(),
+                );
                 Ok(ForceKind::Contact)
             }
         }

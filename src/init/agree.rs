@@ -1,5 +1,5 @@
 //! The recipe that most runs agree on: kind, direction, force and nodes; runs that need another
-//! one are told apart, never merged.
+//! one are distinguished, never merged.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use crate::curve::recipe::DisplacementComponent;
 use crate::history::Side;
 use crate::study::StudyKind;
 
-/// A node stands for its body if it leaves at most this much more of the impulse than the best
+/// A node represents its body if it leaves at most this much more of the impulse than the best
 /// one: as a factor and as a share of the impulse.
 const AS_GOOD: (f64, f64) = (1.5, 0.01);
 /// The same for a node whose title says that it is the centre of gravity.
@@ -26,11 +26,11 @@ pub(super) struct Agreed {
     pub kind: StudyKind,
     pub direction: DisplacementComponent,
     pub nodes: Vec<ChosenNode>,
-    /// `None` if no force moves the bodies: then mass times acceleration stands for it.
+    /// `None` if no force moves the bodies: then mass times acceleration is used.
     pub force: Option<ChosenForce>,
     /// What the chosen nodes leave of the impulse in the run where they follow it worst.
     pub residual: f64,
-    /// The same of what one body of a pair leaves of the other's change of velocity, if no force
+    /// The same for what one body of a pair leaves of the other's change of velocity, if no force
     /// moves them.
     pub opposed: Option<f64>,
     /// Bodies that move in the run with most of them.
@@ -39,7 +39,7 @@ pub(super) struct Agreed {
     pub(crate) members: Vec<Result<(), Reason>>,
 }
 
-/// A node and those that could stand for the same body.
+/// A node and those that could represent the same body.
 #[derive(Clone, Debug)]
 pub(super) struct ChosenNode {
     pub id: i64,
@@ -77,7 +77,7 @@ type Key = (bool, &'static str, Option<(&'static str, i64)>);
 struct RunView<'a> {
     survey: &'a Survey,
     best: Option<Explanation>,
-    /// Whether it has a say: the record holds the crash up to its end, or no run's does.
+    /// Whether it counts: the record covers the crash up to its end, or no run's does.
     counts: bool,
 }
 
@@ -122,7 +122,7 @@ impl Agreed {
         Some(agreed)
     }
 
-    /// Chooses a node for each body, and tells the runs that do not have it.
+    /// Chooses a node for each body, and names the runs that do not have it.
     fn choose_nodes(
         &mut self,
         views: &[RunView<'_>],
@@ -328,10 +328,10 @@ fn judged<'a>(
         .collect()
 }
 
-/// What all runs say of a node.
+/// The verdicts of all runs on a node.
 struct NodeTally<'a> {
     node: &'a NodeCandidate,
-    /// In which it can stand for the body.
+    /// In which it can represent the body.
     runs: usize,
     /// The largest of all runs.
     residual: f64,
@@ -340,7 +340,7 @@ struct NodeTally<'a> {
     seen: f64,
 }
 
-/// The node that can stand for the body in most runs: a centre of gravity first, then the one
+/// The node that can represent the body in most runs: a centre of gravity first, then the one
 /// with the smoothest velocity.
 fn choose(
     of_runs: &[Vec<NodeVerdict<'_>>],

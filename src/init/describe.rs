@@ -1,4 +1,4 @@
-//! What was found put into words: each value of a proposal with where it is from.
+//! The findings in words: each value of a proposal with its source.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -43,7 +43,7 @@ pub(super) fn proposal(
     let (filter, truncated) = filter(measured);
     let runs = runs(measured, given, &truncated, seen, warnings);
     let times: Vec<measure::Times> = measured.runs.iter().map(|run| run.times).collect();
-    let no_units = || Proposed::missing("without units the times are not known");
+    let no_units = || Proposed::missing("the times are unknown without units");
     doubts(measured, warnings);
     Proposal {
         group,
@@ -84,11 +84,11 @@ fn kind(measured: &Measured<'_>, given: &UserHints) -> Proposed<StudyKind> {
             force.file, force.id
         )),
         (StudyKind::Pair, None) => Evidence::Guessed(format!(
-            "two bodies move, and their velocities change against each other within {} %; no force says whether they meet",
+            "two bodies move, and their changes of momentum balance within {} %; no force shows whether they meet",
             percent(measured.agreed.opposed.unwrap_or(1.0))
         )),
         (StudyKind::Wall, None) if measured.agreed.bodies > 1 => Evidence::Guessed(
-            "several bodies move, no force says which of them meet, and no two change their velocities against each other: taken is the fastest, as if it met a wall".into(),
+            "several bodies move, no force shows which of them meet, and no two changes of momentum balance: the fastest is taken, as if it hit a wall".into(),
         ),
         (StudyKind::Wall, Some(force)) if force.file == "rwforc" => Evidence::Guessed(
             "one body moves, and a rigid wall stops it (which may be the symmetry plane of a pair: see half_model)".into(),
@@ -123,7 +123,7 @@ fn deflection(measured: &Measured<'_>, given: &UserHints) -> Proposed<Deflection
     };
     if agreed.force.is_some() {
         because.push(format!(
-            "velocity and impulse of the force go together within {} % in {of_runs}",
+            "change of velocity and impulse of the force agree within {} % in {of_runs}",
             percent(agreed.residual)
         ));
     }
@@ -151,7 +151,7 @@ fn force(measured: &Measured<'_>, given: &UserHints) -> Proposed<ForceSource> {
             motion: RecordedMotion::Velocity,
             component: component.into(),
         };
-        let from = "no wall, contact or section of the runs moves the body, so its mass times its acceleration stands for the force".into();
+        let from = "no wall, contact or section of the runs moves the body, so its mass times its acceleration is taken as the force".into();
         return Proposed::found(source, Evidence::Guessed(from));
     };
     let named = given.force.as_ref();
@@ -175,7 +175,7 @@ fn force(measured: &Measured<'_>, given: &UserHints) -> Proposed<ForceSource> {
 }
 
 /// The filter, and for each run a state that has to be cut for it: a solver's last state often
-/// comes right behind the one before.
+/// comes right after the one before.
 fn filter(measured: &Measured<'_>) -> (Proposed<Filter>, Vec<Option<f64>>) {
     let runs = measured.runs;
     let none = vec![None; runs.len()];
@@ -202,12 +202,12 @@ fn filter(measured: &Measured<'_>) -> (Proposed<Filter>, Vec<Option<f64>>) {
     (proposed, cut)
 }
 
-/// What the user should look at.
+/// What the user should check.
 fn doubts(measured: &Measured<'_>, warnings: &mut Vec<String>) {
     let agreed = measured.agreed;
     if agreed.force.is_some() && agreed.residual > FOLLOWS {
         warnings.push(format!(
-            "no node's velocity goes closely with the impulse of a force ({} % are left): several bodies behind one another, or a force on part of the body? Look at node and force",
+            "no node's velocity follows the impulse of a force closely (residual {} %): several bodies in a row, or a force on part of the body? Check node and force",
             percent(agreed.residual)
         ));
     }
@@ -220,7 +220,7 @@ fn doubts(measured: &Measured<'_>, warnings: &mut Vec<String>) {
     let oblique = measured.recorded.iter().find(|run| run.run.survey.aligned < ALONG);
     if let Some(run) = oblique {
         warnings.push(format!(
-            "run {}: only {:.0} % of the first speed lie along {}: deflection and speed of a recipe are along an axis",
+            "run {}: only {:.0} % of the initial speed lie along {}: deflection and speed of a recipe are along an axis",
             run.run.name,
             run.run.survey.aligned * 100.0,
             agreed.direction.axis()
@@ -289,7 +289,7 @@ pub(super) fn entries_of_left_out(proposal: &mut Proposal, seen: Seen<'_>) {
     }
 }
 
-/// Masses of a pair whose velocities say that they differ by more are not one.
+/// Masses of a pair that differ by more, according to their velocities, are not equal.
 const UNEQUAL: f64 = 0.1;
 
 /// The runs by speed, then by name.
@@ -303,7 +303,7 @@ pub(super) fn runs(
     let (bodies, others) = masses(measured, given, warnings);
     let is_half = names_say_half(measured, given);
     if is_half {
-        warnings.push("the folders' names say twice the recorded speeds: closing speeds of half models? Then say --half-model".into());
+        warnings.push("the folders' names state twice the recorded speeds: closing speeds of half models? Then use --half-model".into());
     }
     let mut runs: Vec<ProposedRun> = measured
         .recorded
@@ -312,7 +312,7 @@ pub(super) fn runs(
         .map(|(k, recorded)| {
             let run = measured.runs.get(k);
             let folder = recorded.run.path.clone();
-            let no_units = || Proposed::missing("without units it is not known");
+            let no_units = || Proposed::missing("it is unknown without units");
             ProposedRun {
                 path: seen(&folder).unwrap_or_default(),
                 folder,
@@ -321,7 +321,7 @@ pub(super) fn runs(
                 mass_kg: bodies.get(k).cloned().unwrap_or_else(no_units),
                 other_mass_kg: others.as_ref().and_then(|others| others.get(k)).cloned(),
                 truncate_s: truncated.get(k).copied().flatten().map(|s| {
-                    let from = "the last state comes too soon behind the one before for the filter";
+                    let from = "the last state follows the previous one too soon for the filter";
                     Proposed::found(s, Evidence::Computed(from.into()))
                 }),
                 crush_m: run.map(|run| run.crush_m),
@@ -368,7 +368,7 @@ fn speed(run: &SiRun<'_>, measured: &Measured<'_>, given: &UserHints) -> Propose
     Proposed::found(run.speed_m_per_s, evidence)
 }
 
-/// Whether the folders' names say twice the recorded speeds, of all runs whose name says one.
+/// Whether the folders' names state twice the recorded speeds, for all runs whose name contains one.
 fn names_say_half(measured: &Measured<'_>, given: &UserHints) -> bool {
     let said: Vec<bool> = measured
         .runs
@@ -380,7 +380,7 @@ fn names_say_half(measured: &Measured<'_>, given: &UserHints) -> bool {
     is_single && !said.is_empty() && said.into_iter().all(|is_twice| is_twice)
 }
 
-/// What a folder's name and the run's own deck say of its speed, where they say something else.
+/// Speeds in a folder's name and the run's own deck that contradict the record.
 fn doubts_of_speed(run: &SiRun<'_>) -> Vec<String> {
     let Recorded { run: of, record } = run.recorded;
     let first = record.closing(run.state.0);
@@ -388,7 +388,7 @@ fn doubts_of_speed(run: &SiRun<'_>) -> Vec<String> {
     let said = speed_in(&of.name);
     if let Some(said) = said.filter(|said| !is_near(*said, run.speed_m_per_s, SAME_SPEED)) {
         notes.push(format!(
-            "the folder's name says {}, the record {}",
+            "the folder's name states {}, the record {}",
             km_per_h(said),
             km_per_h(run.speed_m_per_s)
         ));
@@ -399,7 +399,7 @@ fn doubts_of_speed(run: &SiRun<'_>) -> Vec<String> {
             deck.impact_speed().filter(|said| !is_near(said.speed, first, SAME_SPEED))
     {
         notes.push(format!(
-            "the deck {}, line {}, says {} in its units, the record {first}",
+            "the deck {}, line {}, states {} in its units, the record {first}",
             shown_name(path),
             said.at.line,
             said.speed
@@ -419,13 +419,13 @@ fn masses(
     let is_part = agreed.force.as_ref().is_some_and(|force| force.file == "secforc");
     let why = match &agreed.force {
         Some(_) if is_weak => format!(
-            "impulse and change of velocity differ by {} %, so no mass follows from momentum; say --mass",
+            "impulse and change of velocity differ by {} %, so momentum gives no mass: use --mass",
             percent(agreed.residual)
         ),
         Some(_) if is_part => {
-            "a section may carry only part of what stops the body, so no mass follows from momentum; say --mass".into()
+            "a section may carry only part of what stops the body, so momentum gives no mass: use --mass".into()
         }
-        _ => "it follows from no force and no energy; say --mass".into(),
+        _ => "no force and no energy give it: use --mass".into(),
     };
     let of =
         |weighed: fn(&SiRun<'_>) -> Option<MassEstimates>| -> Option<Vec<(String, MassEstimates)>> {
@@ -467,7 +467,7 @@ fn masses(
     }
 }
 
-/// Where nothing weighs the bodies, what the velocities say of the other ones: nothing, if they are
+/// If nothing determines the masses, what the velocities show of the other body: nothing, if they are
 /// as heavy as the first ones.
 fn by_ratio(
     bodies: &[Proposed<f64>],
@@ -478,11 +478,11 @@ fn by_ratio(
     let times = digits(unequal(measured)?);
     if given.mass_kg.is_some() {
         warnings.push(format!(
-            "mass: by their velocities the other body is {times} times as heavy, and --mass alone stands for both: say --other-mass"
+            "mass: by their velocities the other body is {times} times as heavy, and --mass alone would apply to both: use --other-mass"
         ));
         return None;
     }
-    let why = format!("by their velocities {times} times the mass; say --other-mass");
+    let why = format!("by their velocities {times} times the mass: use --other-mass");
     Some(vec![Proposed::missing(why); bodies.len()])
 }
 

@@ -77,15 +77,15 @@ pub(super) fn best_of(survey: &Survey, kind: Option<StudyKind>) -> Option<Explan
         let equal = of_kind().filter(|(force, _)| size(force) >= (1.0 - EQUAL) * most);
         equal.min_by_key(|(force, _)| rank(force)).map(|(_, e)| e.clone())
     };
-    // A section carries only what passes through it, and a rigid body may be the one that is stopped: neither stands for
+    // A section carries only what passes through it, and a rigid body may be the one that is stopped: neither represents
     // a contact that is there.
     let [contacts, bodies, sections] = [&["rwforc", "rcforc"][..], &["rbdout"], &["secforc"]];
     largest(contacts).or_else(|| largest(bodies)).or_else(|| largest(sections))
 }
 
-/// What can be said where no force explains a run: two bodies whose velocities change against each
+/// The choice if no force explains a run: two bodies whose velocities change against each
 /// other at one ratio all along, as m₁Δv₁ = −m₂Δv₂ has it for two that meet only each other; else
-/// the fastest one. A pair that is asked for is the two that come closest to it.
+/// the fastest one. A pair that is requested is the two that come closest to it.
 pub(super) fn without_force(survey: &Survey, kind: Option<StudyKind>) -> Option<Explanation> {
     let explanation = |kind, bodies, residual| Explanation { kind, force: None, bodies, residual };
     let bodies = 0..survey.bodies.len();

@@ -1,4 +1,4 @@
-//! The folders of a proposal: which hold runs, how they are called, where they are seen from the
+//! The folders of a proposal: which contain runs, their names, and their paths relative to the
 //! study.
 
 use std::collections::{BTreeMap, HashSet};
@@ -82,7 +82,7 @@ impl Folders {
             0 | 1 => Ok(()),
             _ => Err(error!(
                 Study,
-                "the runs stand in {} folders of several runs, which look like different groups: {listed}. Give one of them (crumple init {}), or say with --group NAME that all are one group",
+                "the runs are in {} folders of several runs each, which look like different groups: {listed}. Give one of them (crumple init {}), or use --group NAME if all belong to one group",
                 groups.len(),
                 groups.keys().next().map_or(String::new(), |path| path.display().to_string()),
                 listed = groups
@@ -113,7 +113,7 @@ impl Folders {
     }
 }
 
-/// The folder beside a missing one whose name is most like its name.
+/// The folder next to a missing one whose name is most like its name.
 fn is_there_instead(missing: &Path) -> Option<PathBuf> {
     let parent = missing.parent().filter(|p| !p.as_os_str().is_empty());
     let entries = parent.unwrap_or(Path::new(".")).read_dir().ok()?;
@@ -143,12 +143,12 @@ fn real(path: &Path) -> PathBuf {
     fs::canonicalize(path).unwrap_or_else(|_| path.into())
 }
 
-/// A name that can stand in a study: without control characters.
+/// A name that can be in a study: without control characters.
 fn clean(name: &str) -> String {
     name.chars().map(|c| if c.is_control() { '_' } else { c }).collect()
 }
 
-/// Names of the runs: that of the folder, with as many of the folders above as tell them apart.
+/// Names of the runs: that of the folder, with as many of the folders above as distinguish them.
 pub(super) fn names(runs: &[PathBuf]) -> Vec<String> {
     let parts: Vec<Vec<String>> = runs
         .iter()
@@ -232,15 +232,17 @@ pub(crate) enum Reason {
     Empty,
     #[error("it holds no solver files")]
     NoSolverFiles,
-    /// A solver's file has another name than the solver gave it.
-    #[error("it holds no file with a solver's name, but {file} looks like a {format}: name it so")]
+    /// A solver file has another name than the solver gave it.
+    #[error(
+        "it holds no file with a solver's name, but {file} looks like a {format}: rename it accordingly"
+    )]
     Renamed {
         file: String,
         /// What it looks like.
         format: String,
     },
     /// There is a deck and nothing that a solver wrote.
-    #[error("it holds a deck and nothing that a solver wrote: it has not run")]
+    #[error("it holds a deck but no solver output: it has not been run")]
     OnlyDeck,
     /// A folder or file cannot be read.
     #[error("{why}")]
@@ -252,17 +254,17 @@ pub(crate) enum Reason {
         found: String,
     },
     /// The record has hardly begun.
-    #[error("it died: {file} holds {states} whole {}{damage}", if *.states == 1 { "state" } else { "states" })]
+    #[error("it terminated early: {file} holds {states} complete {}{damage}", if *.states == 1 { "state" } else { "states" })]
     FewStates {
         file: String,
-        /// How many whole states it holds.
+        /// How many complete states it holds.
         states: usize,
         /// What is damaged, in brackets; empty if nothing is.
         damage: String,
     },
     /// The record ends before the crash does.
     #[error(
-        "it died: the record ends at {end}, while the bodies still close at {} % of their first speed{damage}", (share * 100.0).round()
+        "it terminated early: the record ends at {end}, while the bodies still close at {} % of their first speed{damage}", (share * 100.0).round()
     )]
     EndsWhileLoading {
         /// Last time that motion and force share, with its unit if that is known.
@@ -281,25 +283,25 @@ pub(crate) enum Reason {
     #[error("{why}")]
     Unusable { why: String },
     /// Its files are those of another run.
-    #[error("its files hold the same bytes as those of {of}")]
+    #[error("its files are identical to those of {of}")]
     SameBytes {
         /// The other run's folder.
         of: PathBuf,
     },
     /// Its histories are those of another run, in other files.
-    #[error("its histories are those of {of}")]
+    #[error("its histories are identical to those of {of}")]
     SameHistories {
         /// The other run's folder.
         of: PathBuf,
     },
     /// The study's recipe does not fit it.
-    #[error("it needs another recipe than the other runs: {why}")]
+    #[error("it needs a different recipe from the other runs: {why}")]
     OtherRecipe {
         /// What differs.
         why: String,
     },
     /// It is of another model than the other runs.
-    #[error("it seems to be of another model: {why}")]
+    #[error("it seems to be a different model: {why}")]
     OtherModel {
         /// What differs.
         why: String,

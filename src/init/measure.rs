@@ -1,4 +1,4 @@
-//! What the chosen histories of a run say in SI: speed, crush, times, masses.
+//! Results of the chosen histories of a run in SI: speed, crush, times, masses.
 
 use super::UserHints;
 use super::agree::Agreed;
@@ -111,7 +111,7 @@ const SAME_MASS: f64 = 0.03;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct MassEstimates {
     pub by_momentum: Option<f64>,
-    /// Whether that was taken behind the contact.
+    /// Whether that was taken after the contact.
     pub in_free_flight: bool,
     pub by_energy: Option<f64>,
 }
@@ -138,11 +138,11 @@ impl MassEstimates {
                 other(self.by_momentum, "momentum gives")
             ),
             _ if self.in_free_flight => format!(
-                "impulse of the force over the change of velocity, behind the contact{}",
+                "impulse of the force over the change of velocity, after the contact{}",
                 other(self.by_energy, "kinetic energy at the start gives")
             ),
             _ => format!(
-                "impulse of the force over the change of velocity, while loading (good to a few per cent){}",
+                "impulse of the force over the change of velocity, while loading (accurate to a few per cent){}",
                 other(self.by_energy, "kinetic energy at the start gives")
             ),
         }
@@ -187,7 +187,7 @@ fn doubt(name: &str, weighed: &MassEstimates) -> Option<String> {
     let (momentum, energy) = (weighed.by_momentum?, weighed.by_energy?);
     (!is_near(momentum, energy, SAME_BY_ENERGY)).then(|| {
         format!(
-            "mass: in {name} momentum gives {}, the kinetic energy at the start {}: the force acts on part of what moves, or more moves than the bodies",
+            "mass: in {name} momentum gives {}, the kinetic energy at the start {}: the force acts on only part of the moving mass, or more than the bodies moves",
             shown_mass(momentum),
             shown_mass(energy)
         )
@@ -203,7 +203,7 @@ fn rounded(kg: f64) -> f64 {
     format!("{kg:.3e}").parse().unwrap_or(kg)
 }
 
-/// A mass as a study has it.
+/// A mass as in a study.
 pub(super) fn text(kg: f64) -> String {
     if kg >= 1e3 { format!("{}t", kg / 1e3) } else { format!("{kg}kg") }
 }
@@ -247,7 +247,7 @@ pub(super) struct Times {
 const JITTER: f64 = 0.5;
 
 /// The usual interval of rising times: the mean of those near the median, since solvers write the
-/// first cycle behind each multiple. 0 for fewer than two times.
+/// first cycle after each multiple. 0 for fewer than two times.
 pub(super) fn interval(time: &[f64]) -> f64 {
     let mut steps: Vec<f64> = time.windows(2).map(|pair| pair[1] - pair[0]).collect();
     steps.sort_by(f64::total_cmp);
@@ -265,12 +265,12 @@ pub(super) fn filter(means: Option<&str>, interval_s: f64) -> Proposed<Filter> {
         Some(why) => Proposed::found(Filter::None, Evidence::Read(why.into())),
         None if interval_s <= longest_s => Proposed::found(
             Filter::Cfc(CFC),
-            Evidence::Guessed(format!("the usual class; one force each {ms} ms allows it")),
+            Evidence::Guessed(format!("the usual class; one force every {ms} ms allows it")),
         ),
         None => Proposed::found(
             Filter::None,
             Evidence::Computed(format!(
-                "one force each {ms} ms is too coarse for CFC {CFC}, which needs one each {} ms",
+                "one force every {ms} ms is too coarse for CFC {CFC}, which needs one every {} ms",
                 digits(longest_s * 1e3)
             )),
         ),
@@ -291,7 +291,7 @@ pub(super) fn sampling(runs: &[Times]) -> Option<Proposed<Sampling>> {
     let ms = |s: f64| digits(s * 1e3);
     let from = match (alike, least > 1.01 * coarsest) {
         (_, true) => format!(
-            "the records have a state each {} ms at the coarsest; {} ms is enough",
+            "the coarsest record has a state every {} ms; {} ms is enough",
             ms(coarsest),
             ms(interval_s)
         ),
@@ -309,7 +309,7 @@ fn most(runs: &[Times]) -> usize {
 }
 
 /// The shortest decimal that is off by less than half an interval at the end of the record:
-/// solvers write the first cycle behind each multiple.
+/// solvers write the first cycle after each multiple.
 fn rounded_interval(interval_s: f64, longest_s: f64) -> f64 {
     let ms = interval_s * 1e3;
     let states = longest_s / interval_s;
@@ -338,7 +338,7 @@ mod tests {
         assert_eq!(values, [24_000.0, 24_000.0, 24_000.0, 20_240.0]);
         assert_eq!(
             found[0].to_string(),
-            "computed: impulse of the force over the change of velocity, behind the contact; median of 3 runs, 23990 to 24010 kg"
+            "computed: impulse of the force over the change of velocity, after the contact; median of 3 runs, 23990 to 24010 kg"
         );
         assert_eq!(warnings, [""; 0]);
         assert!(differ(&found).unwrap().contains("(20.2, 24 t)"));

@@ -1,7 +1,7 @@
-//! Proposals: a study from run folders, and a scenario from models, with where each value is from.
+//! Proposals: a study from run folders, and a scenario from models, with the source of each value.
 //!
-//! Nothing is made up: a value is read, computed from what was read, or the likely one of several,
-//! and says so; what cannot be found is left to fill in.
+//! Nothing is invented: a value is read, computed from what was read, or the most likely of several,
+//! and says so; unknown values are left to fill in.
 
 mod agree;
 mod describe;
@@ -31,14 +31,14 @@ pub(crate) use proposal::{Proposed, ProposedRun};
 pub use propose::{Request, propose};
 pub(crate) use scenario::{ScenarioProposal, propose_scenario};
 
-/// Refuses a file that is there already.
+/// Refuses a file that exists already.
 pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
     let is_there = std::fs::symlink_metadata(path)
         .is_ok_and(|meta| meta.is_file() || meta.is_dir() || meta.is_symlink());
     if is_there {
         Err(error!(
             Study,
-            "{path} is there already, and nothing is written over it: name another with -o, or remove it",
+            "{path} exists already and is not overwritten: name another with -o, or remove it",
             path = path.display()
         ))
     } else {
@@ -46,14 +46,14 @@ pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
     }
 }
 
-/// What the caller already knows: it stands above what is found.
+/// What the caller already knows; it overrides what is found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct UserHints {
-    /// Units of the solver's files.
+    /// Units of the solver files.
     pub units: Option<UnitSystem>,
-    /// What hits what.
+    /// Kind of impact.
     pub(crate) kind: Option<StudyKind>,
-    /// The runs are of one body against the symmetry plane of a pair.
+    /// The runs model one body of a pair, cut at the symmetry plane.
     pub half_model: bool,
     /// Node of the (moving) body.
     pub node: Option<i64>,

@@ -1,4 +1,4 @@
-//! A proposed study: every value with where it is from.
+//! A proposed study: every value with its source.
 
 use std::path::PathBuf;
 
@@ -15,9 +15,9 @@ use crate::unit::UnitSystem;
 pub struct Proposal {
     /// Group of the curve database, and name of the study.
     pub(crate) group: Proposed<String>,
-    /// Units of the solver's files.
+    /// Units of the solver files.
     pub(crate) units: Proposed<UnitSystem>,
-    /// What hits what.
+    /// Kind of impact.
     pub(crate) kind: Proposed<StudyKind>,
     /// Whether the runs are of one body against the symmetry plane of a pair: only known if the
     /// caller says so.
@@ -25,7 +25,7 @@ pub struct Proposal {
     pub(crate) deflection: Proposed<DeflectionSource>,
     /// Title of the node, then of the other body's.
     pub(crate) node_titles: Vec<Option<String>>,
-    /// Nodes that could stand for the same bodies, a list for each.
+    /// Nodes that could represent the same bodies, a list for each.
     pub(crate) other_nodes: Vec<Vec<Alternative>>,
     pub(crate) force: Proposed<ForceSource>,
     /// Title of the wall or interface.
@@ -42,7 +42,7 @@ pub struct Proposal {
     pub(crate) left_out: Vec<LeftOut>,
     /// What was chosen on the way.
     pub(crate) notes: Vec<String>,
-    /// What the user should look at.
+    /// What the user should check.
     pub(crate) warnings: Vec<String>,
 }
 
@@ -60,10 +60,10 @@ pub(crate) struct ProposedRun {
     /// Mass of the other body in kg, where it is another.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) other_mass_kg: Option<Proposed<f64>>,
-    /// Solver's time behind which the record is not used, in s.
+    /// Solver's time after which the record is not used, in s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(crate) truncate_s: Option<Proposed<f64>>,
-    /// Largest crush in m, if the units are known: doubled for half a model.
+    /// Maximum crush in m, if the units are known: doubled for half a model.
     pub(crate) crush_m: Option<f64>,
     /// Whole states that motion and force both have.
     pub(crate) states: usize,
@@ -108,7 +108,7 @@ fn why<T>(proposed: &Proposed<T>) -> Option<&str> {
 pub(crate) enum Evidence {
     /// The caller gave it.
     UserHints(String),
-    /// It stands in a file.
+    /// Found in a file.
     Read(String),
     /// It follows from what was read.
     Computed(String),
@@ -117,7 +117,7 @@ pub(crate) enum Evidence {
 }
 
 impl Evidence {
-    /// `read`, `computed`, …: the word that stands for it in a proposal.
+    /// `read`, `computed`, …: its word in a proposal.
     pub(crate) fn word(&self) -> &'static str {
         match self {
             Self::UserHints(_) => "given",

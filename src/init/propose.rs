@@ -1,8 +1,8 @@
 //! From run folders to a proposed study.
 //!
-//! Each run is looked over by itself; then the runs agree on a recipe, and each is measured by it.
-//! What does not fit is left out with its reason. A study that is complete is tried before it is
-//! given: what a build would refuse is left out as well.
+//! Each run is examined separately; then the runs agree on a recipe, and each is evaluated with it.
+//! Runs that do not fit are left out with the reason. A complete study is tried before it is
+//! returned: runs that a build would refuse are left out as well.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -36,7 +36,7 @@ pub struct Request {
 
 /// Proposes a study for run folders.
 ///
-/// `progress` is called with the name of each run when it was looked at, from any thread.
+/// `progress` is called with the name of each run when it was examined, from any thread.
 ///
 /// # Errors
 /// If there is no run, none can be used, or they are several groups.
@@ -210,7 +210,7 @@ fn is_twin(a: &Record, b: &Record) -> bool {
         && is_alike(&force(a), &force(b))
 }
 
-/// Runs whose paths can stand in a study.
+/// Runs whose paths can be in a study.
 fn with_paths(
     recorded: Vec<Recorded>,
     seen: &dyn Fn(&PathBuf) -> Option<String>,

@@ -26,8 +26,8 @@ pub(super) struct Recorded {
 
 /// A force below this share of its largest is none.
 const NO_FORCE: f64 = 0.01;
-/// A flight behind the contact that is shorter than this, in states and as a share of the record,
-/// tells no mass.
+/// A flight after the contact that is shorter than this, in states and as a share of the record,
+/// gives no mass.
 const FREE: (usize, f64) = (5, 0.03);
 
 /// What the recipe names of a run, up to the last time that motion and force share.
@@ -42,7 +42,7 @@ pub(super) struct Record {
     pub force: Option<(Vec<f64>, Vec<f64>)>,
     /// Its impulse at the motion's times.
     pub impulse: Option<Vec<f64>>,
-    /// Kinetic energy of the whole model in its first state, where a file tells it.
+    /// Kinetic energy of the whole model in its first state, if a file states it.
     pub kinetic: Option<f64>,
     /// Damage of the files, for messages.
     pub damage: Vec<String>,
@@ -55,7 +55,7 @@ pub(super) struct Record {
 pub(super) struct RawMasses {
     pub body: f64,
     pub other: Option<f64>,
-    /// Whether they are taken behind the contact, where impulse and velocities rest.
+    /// Whether they are taken after the contact, where impulse and velocities rest.
     pub in_free_flight: bool,
 }
 
@@ -189,12 +189,12 @@ impl Record {
         self.time.partition_point(|&t| t < begins).saturating_sub(1)
     }
 
-    /// Damage behind a sentence.
+    /// Damage after a sentence.
     pub(super) fn damage(&self) -> String {
         bracketed(self.damage.first().map(String::as_str))
     }
 
-    /// The bodies' masses by momentum, `∫F dt / Δv`: behind the contact, where both rest; while
+    /// The bodies' masses by momentum, `∫F dt / Δv`: after the contact, where both rest; while
     /// it never ends, by all states of the loading together.
     pub(super) fn masses(&self) -> Option<RawMasses> {
         let impulse = self.impulse.as_ref()?;
@@ -224,7 +224,7 @@ impl Record {
         Some(RawMasses { body: body(&self.velocities[0])?, other, in_free_flight: free.is_some() })
     }
 
-    /// The first state behind the contact from which no force acts, if that lasts.
+    /// The first state after the contact from which no force acts, if that lasts.
     fn free_flight(&self, loading_end: usize) -> Option<usize> {
         let (time, force) = self.force.as_ref()?;
         let least = NO_FORCE * force.iter().map(|f| f.abs()).fold(0.0, f64::max);

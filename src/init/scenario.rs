@@ -1,5 +1,5 @@
-//! From models to a proposed scenario: vehicles with the models' masses meet at a speed that the
-//! models were trained for.
+//! From models to a proposed scenario: vehicles with the models' masses meet at a speed for which the
+//! models were trained.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -91,7 +91,7 @@ pub(crate) fn propose_scenario(models: &[PathBuf], path: &Path) -> Result<Scenar
     if inner.is_some_and(|inner| inner.speed_kind == SpeedKind::Wall) {
         return Err(error!(
             Study,
-            "{path}: its speeds are wall speeds, and between the vehicles of a train stands a curve of closing speeds: name such a model second",
+            "{path}: its speeds are wall speeds, and the curve between the vehicles of a train is one of closing speeds: name such a model second",
             path = (models[1]).display()
         ));
     }
@@ -109,7 +109,7 @@ pub(crate) fn propose_scenario(models: &[PathBuf], path: &Path) -> Result<Scenar
     let speed = speed(nose);
     let mut trains = vec![train("A", speed, nose.mass_kg, nose, inner)];
     if !wall {
-        let from = "the other train stands, so the first one's speed is the closing speed";
+        let from = "the other train is at rest, so the first one's speed is the closing speed";
         let stands = Proposed::found(0.0, Evidence::Guessed(from.into()));
         let mass_kg = nose.other_mass_kg.unwrap_or(nose.mass_kg);
         trains.push(train("B", stands, mass_kg, nose, inner));
@@ -197,7 +197,7 @@ fn duration(nose: &Model, inner: Option<&Model>) -> Proposed<f64> {
     let vehicles = if inner.is_some() { VEHICLES } else { 1 };
     let all_s = 2.5 * loading_s * (1.0 + 0.5 * (vehicles - 1) as f64);
     let rounded_s = (all_s / 0.05).ceil().max(1.0) * 0.05;
-    let from = "a few times what the crush takes at this speed";
+    let from = "a few times the duration of the crush at this speed";
     Proposed::found(rounded_s, Evidence::Guessed(from.into()))
 }
 

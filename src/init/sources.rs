@@ -80,8 +80,9 @@ impl Sources {
         }
         let motion = Source::choose(folder, MOTION, &listed).ok_or_else(|| {
             let mut found: Vec<String> = files.iter().map(|path| shown_name(path)).collect();
-            let hint = misnamed(folder)
-                .map_or(String::new(), |name| format!("; if {name} is the {MOTION}, name it so"));
+            let hint = misnamed(folder).map_or(String::new(), |name| {
+                format!("; if {name} is the {MOTION}, rename it accordingly")
+            });
             found.extend(unread.iter().map(|why| format!("({why})")));
             Reason::NoMotion { found: found.join(", ") + &hint }
         })?;
@@ -202,7 +203,7 @@ fn means(file: &SolverFile, is_text: bool) -> Option<String> {
         return Some("a T01 holds impulses, so each force is a mean over two intervals".into());
     }
     version.contains(MADE_OF_T01).then(|| {
-        let says = if is_text { "its second line says" } else { "its version is" };
+        let says = if is_text { "its second line reads" } else { "its version is" };
         format!("{says} \"{version}\": a mean over two intervals of a T01's impulse")
     })
 }
@@ -261,7 +262,7 @@ pub(super) fn velocity(
     (time.len() > 1).then(|| derivative(&time, &picked(&displacement.values, states)))
 }
 
-/// Impulse of a force at other times, held before its first and behind its last.
+/// Impulse of a force at other times, held before its first and after its last.
 ///
 /// `None` if the force holds a value that is not a number, or has fewer than two states.
 pub(super) fn impulse(force: &History, times: &[f64]) -> Option<Vec<f64>> {

@@ -1,8 +1,8 @@
-//! A run looked over: in which direction it moves, which bodies it has, which nodes could stand
-//! for them, and which forces could have moved them.
+//! Survey of a run: in which direction it moves, which bodies it has, which nodes could represent
+//! them, and which forces could have moved them.
 //!
-//! A node stands for a body if its velocity follows the force's impulse, `∫F dt = m Δv`: what lies
-//! in the crush zone is stopped first and then shakes, and what is not part of the body does not
+//! A node represents a body if its velocity follows the impulse of the force, `∫F dt = m Δv`: nodes
+//! in the crush zone are stopped first and then vibrate, and nodes outside the body do not
 //! follow at all. A force is the one between two bodies if some node follows it; a contact within
 //! a body is followed as well, but has a smaller impulse than what acts on the body from outside.
 
@@ -19,7 +19,7 @@ use crate::solver::{SolverFile, WantedId};
 /// Bodies that still close at more than this share of their first speed have not been stopped.
 pub(super) const STOPPED: f64 = 0.05;
 
-/// Fewest states of a record that can be judged.
+/// Minimum number of states of a record that can be judged.
 const FEWEST_STATES: usize = 8;
 /// First velocities that differ by less than this share of the largest belong to one body; a
 /// change smaller than this share is none.
@@ -49,8 +49,8 @@ pub(super) struct Body {
     /// In the file's units, with its sign.
     pub first_velocity: f64,
     pub nodes: Vec<NodeCandidate>,
-    /// Change of its smoothest node's velocity over time: how the body moves where no force tells
-    /// which node stands for it.
+    /// Change of its smoothest node's velocity over time: how the body moves if no force shows
+    /// which node represents it.
     pub change: Vec<f64>,
 }
 
@@ -133,7 +133,7 @@ fn few_states(source: &Source, states: usize) -> Reason {
     Reason::FewStates { file: source.shown(), states, damage }
 }
 
-/// Damage behind a sentence.
+/// Damage after a sentence.
 pub(super) fn bracketed(damage: Option<&str>) -> String {
     damage.map_or(String::new(), |damage| format!(" ({damage})"))
 }

@@ -1,7 +1,7 @@
 //! The unit system of a run: what its deck states, or the one in which its impact is possible.
 //!
-//! Momentum and energy balance in every consistent system, so only magnitudes tell: an impact
-//! has a speed, a crush, a time to the largest crush, a mean deceleration and a mass that vehicles
+//! Momentum and energy balance in every consistent system, so only magnitudes help: an impact
+//! has a speed, a crush, a time to the maximum crush, a mean deceleration and a mass that vehicles
 //! have.
 
 use super::proposal::{Evidence, Proposed};
@@ -29,7 +29,7 @@ struct Range {
 const SPEED_M_PER_S: Range = Range { low: 0.05, high: 200.0, usual: 10.0, spread: 3.0 };
 const CRUSH_M: Range = Range { low: 3e-4, high: 30.0, usual: 0.3, spread: 4.0 };
 const LOADING_S: Range = Range { low: 5e-4, high: 5.0, usual: 0.08, spread: 3.0 };
-/// First closing speed over the time to the largest crush: from a train against soft buffers to
+/// First closing speed over the time to the maximum crush: from a train against soft buffers to
 /// some hundred g. Speed and time may each be possible and what they make together not: the mean
 /// force is mass times deceleration, and no crush zone stops its own vehicle with hundreds of its
 /// weights. A shunting impact at 0.5 km/h, recorded in mm and s, is not an impact at 139 m/s that
@@ -51,7 +51,7 @@ impl Range {
 }
 
 impl Magnitudes {
-    /// The quantities in SI, each with its range and how it is said.
+    /// The quantities in SI, each with its range and its text.
     fn in_si(&self, units: &UnitSystem) -> Vec<(f64, &'static Range, String)> {
         let speed = self.speed * units.speed();
         let crush = self.crush * units.length_m;
@@ -85,7 +85,7 @@ impl Magnitudes {
     }
 }
 
-/// The units of all runs, as far as they can be told.
+/// The units of all runs, as far as they can be determined.
 ///
 /// `stated`: what a deck says, with its place.
 pub(super) fn choose(
@@ -119,7 +119,7 @@ pub(super) fn choose(
                 return Proposed::found(units, Evidence::Read(from));
             }
             Some(why) => warnings.push(format!(
-                "units: {place} states {units}, which would make {why}; it is not taken"
+                "units: {place} states {units}, which would make {why}; it is not used"
             )),
         }
     }
@@ -133,7 +133,7 @@ pub(super) fn choose(
                 digits(first.crush),
                 digits(first.loading_time)
             ),
-            None => "they follow from no run".into(),
+            None => "no run determines them".into(),
         }),
     }
 }
@@ -184,7 +184,7 @@ fn guessed(runs: &[Magnitudes]) -> Option<(UnitSystem, Evidence)> {
         .map(|(_, units)| format!("{units} ({})", runs[0].unusual(units).1))
         .collect();
     let from = format!(
-        "the most usual impacts in it; also possible, but less usual: {}; impossible: {others}",
+        "the impacts are the most usual ones in it; also possible, but less usual: {}; impossible: {others}",
         less.join(", ")
     );
     Some((units, Evidence::Guessed(from)))
@@ -299,7 +299,7 @@ mod tests {
         assert_eq!(
             warnings,
             [
-                "units: main.k, line 3 states SI, which would make an impact at 13900 m/s; it is not taken"
+                "units: main.k, line 3 states SI, which would make an impact at 13900 m/s; it is not used"
             ]
         );
         let found = choose(&[car(&UnitSystem::SI)], None, stated, &mut Vec::new());

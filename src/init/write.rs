@@ -1,4 +1,4 @@
-//! A proposed study as TOML, every value with a comment that says where it is from.
+//! A proposed study as TOML, every value with a comment that states its source.
 
 use serde::Serialize;
 
@@ -9,12 +9,12 @@ use crate::curve::recipe::ForceSource;
 use crate::history::Side;
 
 const HEAD: &str = "\
-Proposed by crumple init. Of every value the comment above it says where it is from:
-  read      it stands in the runs' files
-  computed  it follows from what stands there
-  guessed   it is the likely one of several: look at it
+Proposed by crumple init. The comment above each value says where it is from:
+  read      found in the runs' files
+  computed  derived from them
+  guessed   the most likely of several: check it
   given     by an option of crumple init
-Change what you know better.";
+Change whatever you know better.";
 
 impl Proposal {
     /// The proposal as the text of a study manifest.
@@ -56,7 +56,7 @@ impl Proposal {
                 text.line("half_model = true");
             }
             false if self.node_titles.len() < 2 => {
-                text.comment("CANNOT BE SEEN: is this one body of a pair, cut at the symmetry plane between the two? Then take the two lines below instead of kind = \"wall\", and write the closing speeds, twice the speeds below (crumple init --half-model does both).");
+                text.comment("CANNOT BE DETERMINED: is this one body of a pair, cut at the symmetry plane between the two? Then take the two lines below instead of kind = \"wall\", and write the closing speeds, twice the speeds below (crumple init --half-model does both).");
                 text.line("# kind = \"pair\"");
                 text.line("# half_model = true");
             }
@@ -103,7 +103,7 @@ impl Proposal {
         }
     }
 
-    /// What holds for all runs is said once, above them.
+    /// What applies to all runs is stated once, above them.
     fn shared(&self, text: &mut Text) -> Vec<String> {
         let first = self.runs.first();
         let masses = first.map(|run| ("mass", run.mass_kg.to_string()));

@@ -91,7 +91,7 @@ pub struct Interface {
     pub stopping: Option<Stopping>,
 }
 
-/// A law on the extension beyond the distance at which the bodies stand at first.
+/// A law on the extension beyond the initial distance of the bodies.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tension {
     /// Force over the extension.
@@ -231,7 +231,7 @@ impl Chain {
         Ok(())
     }
 
-    /// What is wrong with the rate or the crush zone of an interface.
+    /// Error in the rate or the crush zone of an interface.
     fn crush_fault(&self, interface: &Interface) -> Option<&'static str> {
         let bodies = self.bodies.len();
         if let Some(rate) = &interface.rate {
@@ -240,7 +240,7 @@ impl Chain {
                 return Some("a rate whose sensitivity or share is not 0 or more");
             }
             if rate.behind >= bodies || rate.ahead.is_some_and(|ahead| ahead >= bodies) {
-                return Some("a rate that follows a body which is not there");
+                return Some("a rate that follows a body that does not exist");
             }
             if interface.tension.is_some() {
                 return Some("a rate and a coupling: a rate is that of compression");
@@ -250,7 +250,7 @@ impl Chain {
         let (Some(body), Some(zone)) =
             (self.bodies.get(stopping.body), self.bodies.get(stopping.zone))
         else {
-            return Some("a crush zone which is not there");
+            return Some("a crush zone that does not exist");
         };
         let is_sound = stopping.is_sound(body.mass_kg + zone.mass_kg);
         (!is_sound).then_some(

@@ -1,4 +1,4 @@
-//! Ledger: where the initial kinetic energy and the momentum are.
+//! Ledger: the balance of the initial kinetic energy and the momentum.
 
 use serde::Serialize;
 

@@ -8,7 +8,7 @@
 //! use crumple::curve::Envelope;
 //! use crumple::multibody::{Body, Chain, EnvelopeEnd, ForceLaw, Interface, RunSettings, Unloading, simulate};
 //!
-//! // 24 t at 10 m/s against a wall, on a spring of 40 MN/m that gives all back: crush v √(m/k).
+//! // 24 t at 10 m/s against a wall, on an elastic spring of 40 MN/m: crush v √(m/k).
 //! let curve = Envelope::new(vec![0.0, 1.0], vec![0.0, 40e6])?;
 //! let law = ForceLaw::new(curve, Unloading::Elastic, EnvelopeEnd::Hold);
 //! let bodies = vec![Body::new("car", 24e3, 10.0)];
@@ -47,7 +47,7 @@ const AT_END_M: f64 = 1e-4;
 
 /// Runs the chain from the first contact (t = 0) for `duration_s`.
 ///
-/// x counts from where each body stands before gaps close; bodies move freely up to the
+/// x counts from where each body is before gaps close; bodies move freely up to the
 /// first contact.
 ///
 /// # Errors
@@ -92,11 +92,11 @@ fn refuse_rates(chain: &Chain) -> Result<(), Error> {
         .unwrap_or_else(|| "running or braking resistance".into());
     Err(error!(
         Simulation at "run.method",
-        "{what} depends on the speed, which the fourth-order method does not take: use method = \"verlet\""
+        "{what} depends on the speed, which the fourth-order method does not support: use method = \"verlet\""
     ))
 }
 
-/// Of a step that was asked for and is too long. Nobody has asked for the default one.
+/// For a requested step that is too long; the default step is not reported.
 fn shortened_step(chain: &Chain, settings: &RunSettings, used_s: f64) -> Option<String> {
     let RunSettings { step_s: asked_s, method, .. } = *settings;
     let (shortest_s, k) = chain.shortest_time_s();
@@ -166,7 +166,7 @@ fn free_travel(chain: &Chain, run: &Run) -> Vec<String> {
         let travel_m = gone_m + interface.gap_m + tension.slack_m;
         if gone_m > FREE_TRAVEL_M && history.restitution.is_some() {
             warnings.push(format!(
-                "interface {}: after a crush of {largest_m:.3} m its coupling pulls only from the length at first on, after {travel_m:.3} m of free travel; a real one would pull sooner, or be broken",
+                "interface {}: after a crush of {largest_m:.3} m its coupling carries tension only beyond its initial length, after {travel_m:.3} m of free travel; a real one would engage sooner, or be broken",
                 interface.name
             ));
         }
@@ -184,7 +184,7 @@ fn still_loaded(chain: &Chain, run: &Run, end_s: f64) -> Option<String> {
     // Without the rounding of a product.
     let end_s = (end_s * 1e9).round() / 1e9;
     Some(format!(
-        "the run ends at {end_s} s while the contact still loads {}: the mean deceleration is that up to there, and what comes may be more; lengthen duration",
+        "the run ends at {end_s} s while the contact still loads {}: the mean deceleration covers the time up to then and may still grow; lengthen duration",
         bodies.join(", ")
     ))
 }

@@ -1,4 +1,4 @@
-//! Forces that follow speeds: dampers, the rate of crush zones, and mass that is stopped on the way.
+//! Forces that follow speeds: dampers, the rate effect of crush zones, and stopped mass.
 
 use std::sync::Arc;
 
@@ -101,7 +101,7 @@ impl RateFactor {
 }
 
 /// A crush zone that stops part of its body's mass while it is crushed: one side of an interface
-/// takes mass from the other, `m(δ) = max(m₀, m_s(δ))` at the largest deflection δ so far, with
+/// takes mass from the other, `m(δ) = max(m₀, m_s(δ))` at the maximum deflection δ so far, with
 /// `m₀` its mass at first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stopping {
@@ -115,7 +115,7 @@ pub struct Stopping {
 }
 
 impl Stopping {
-    /// Mass of the zone in kg once its largest deflection was `largest_m`; `least_kg` at first.
+    /// Mass of the zone in kg once its maximum deflection was `largest_m`; `least_kg` at first.
     pub(super) fn zone_kg(&self, largest_m: f64, least_kg: f64) -> f64 {
         self.stopped_kg.force_at(largest_m.max(0.0)).max(least_kg)
     }

@@ -1,6 +1,6 @@
 //! Rows: values of a chain's bodies or interfaces, laid out for vectors.
 //!
-//! Lane `j` holds the `j`-th stretch of the chain. The neighbour of each value then stands in
+//! Lane `j` holds the `j`-th stretch of the chain. The neighbour of each value then is in
 //! the next row and the same lane, and a pass over the chain loads no vector that overlaps two
 //! others; only the ends of the stretches have their neighbours in another lane.
 

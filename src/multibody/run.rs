@@ -1,4 +1,4 @@
-//! What a run is asked for and what it gives: method, times, histories, warnings, errors.
+//! Settings and results of a run: method, times, histories, warnings, errors.
 
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -130,9 +130,9 @@ pub struct InterfaceHistory {
     pub deflection_m: Vec<f64>,
     /// Net force in N, below 0 where a coupling pulls.
     pub force_n: Vec<f64>,
-    /// Largest deflection so far, in m.
+    /// Maximum deflection so far, in m.
     pub largest_deflection_m: Vec<f64>,
-    /// Energy that would come back, in J.
+    /// Energy that is returned, in J.
     pub stored_j: Vec<f64>,
     /// Energy that is lost, in J.
     pub dissipated_j: Vec<f64>,
@@ -142,15 +142,15 @@ pub struct InterfaceHistory {
     pub peak_tension_n: f64,
     /// Largest extension of the coupling in m; 0 without one.
     pub max_extension_m: f64,
-    /// Largest deflection in m.
+    /// Maximum deflection in m.
     pub max_deflection_m: f64,
     /// Deflection up to which the curve has data, in m: beyond it the force is an assumption.
     pub data_end_m: f64,
-    /// Time of the largest deflection in s.
+    /// Time of the maximum deflection in s.
     pub max_deflection_time_s: f64,
     /// When both sides first had the same velocity, in s.
     pub common_velocity_time_s: Option<f64>,
-    /// Speed of separation over speed of approach at the interface, once it has opened again.
+    /// Separation speed over speed of approach at the interface, once it has opened again.
     /// `None` below 0.1 m/s of approach, and above 1: where contacts repeat or neighbours push.
     pub restitution: Option<f64>,
 }
@@ -218,7 +218,7 @@ impl Grid {
             let interface = chain.interfaces().get(k).map_or("none", |i| i.name.as_str());
             return Err(error!(
                 Simulation at "run.duration",
-                "the run would take {steps:.3e} steps of {step_s:.3e} s for {outputs:.3e} outputs: shorten the duration or lengthen step and output interval; the shortest step is asked for by interface {interface}"
+                "the run would take {steps:.3e} steps of {step_s:.3e} s for {outputs:.3e} outputs: shorten the duration or lengthen step and output interval; the shortest step is needed by interface {interface}"
             ));
         }
         let (bodies, interfaces) = (chain.bodies().len(), chain.interfaces().len());
@@ -325,6 +325,6 @@ pub(super) fn diverged(body: &Body, time_s: f64) -> Error {
     let body = &body.name;
     error!(
         Simulation at "train",
-        "the motion is not finite any more at {time_s:.6} s, first at {body}: check masses, speeds, curves and resistance"
+        "the motion is no longer finite at {time_s:.6} s, first at {body}: check masses, speeds, curves and resistance"
     )
 }

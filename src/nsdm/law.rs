@@ -89,7 +89,7 @@ pub struct Nsdm {
     pub damping: PiecewiseLinear,
 }
 
-/// The law as a file has it.
+/// The law as in a file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Columns {
@@ -138,7 +138,7 @@ impl Nsdm {
     /// The spring alone as an envelope, within 1e-4 of its peak force.
     ///
     /// Between two nodes the force is a parabola, so each segment is cut as finely as its
-    /// curvature asks for. The table goes to twice the last node: there the force is a straight
+    /// curvature requires. The table goes to twice the last node: there the force is a straight
     /// line through the origin, which an interface continues by `EnvelopeEnd::Slope`.
     ///
     /// # Errors

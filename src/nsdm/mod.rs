@@ -1,12 +1,12 @@
 //! NSDM: a nonlinear spring and damper, fitted to a recorded motion.
 //!
-//! The reference method of the literature on train crashes beside prescribed curves: one mass with
+//! The reference method of the literature on train crashes, besides prescribed curves: one mass with
 //! `m x'' + c(|x'|) x' + k(|x|) x = 0`, `x(0) = 0`, `x'(0) = v₀`. `k` is continuous and
-//! piecewise linear with 10 segments up to the reference's largest displacement, `c` with 5
+//! piecewise linear with 10 segments up to the reference's maximum displacement, `c` with 5
 //! segments up to its impact speed. The 30 node values and positions are found by a genetic
-//! algorithm and a simplex search behind it; see [`fit`]. What the law gives at another speed
-//! is [`Nsdm::run`]; as spring and damper stand in for each other, fit with several seeds
-//! and look at their [`Identifiability`].
+//! algorithm followed by a simplex search; see [`fit`]. The motion at another speed
+//! is [`Nsdm::run`]; since spring and damper can replace each other, fit with several seeds
+//! and check their [`Identifiability`].
 //!
 //! ```
 //! use crumple::nsdm::{FitSettings, Target, fit};
@@ -49,7 +49,7 @@ pub const STIFFNESS_N_PER_M: [f64; 2] = [1e5, 1e8];
 pub const DAMPING_N_S_PER_M: [f64; 2] = [0.0, 5e5];
 /// Objective of a law that diverges: larger than any other, and comparable.
 const PENALTY: f64 = f64::MAX;
-/// One in this many of the first population begins at least squares, if asked for.
+/// One in this many of the first population begins at least squares, if requested.
 const LEAST_SQUARES_SHARE: usize = 4;
 /// More would be a mistyped number.
 const MAX_POPULATION: usize = 1_000_000;
@@ -156,7 +156,7 @@ impl Target {
 /// Where the search begins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Start {
-    /// Drawn evenly, as the reference method has it.
+    /// Drawn evenly, as in the reference method.
     #[default]
     Random,
     /// A quarter of the first population takes the node values that fit the accelerations best
@@ -202,7 +202,7 @@ pub struct Fit {
     pub objective: f64,
     /// `Σ|p − r|/Σ|r|` of the velocity against the target.
     pub velocity_l1: f64,
-    /// The same of the acceleration, the law's own at each time, not filtered.
+    /// The same for the acceleration, the law's own at each time, not filtered.
     pub acceleration_l1: f64,
     /// Motions computed.
     pub evaluations: usize,
@@ -269,7 +269,7 @@ pub fn fit(target: &Target, settings: &FitSettings, seed: u64) -> Result<Fit, Er
     })
 }
 
-/// Fits with several seeds, in their order; see [`Identifiability::of`] for what they tell.
+/// Fits with several seeds, in their order; see [`Identifiability::of`] for their spread.
 ///
 /// # Errors
 /// As [`fit`].

@@ -1,8 +1,8 @@
 //! The motion of one mass on spring and damper, by Runge–Kutta steps.
 //!
-//! Nearly all time of a fit goes into motions. A step of Runge–Kutta is as long as the reference's interval; only one that
-//! passes a node of either law is taken again in eight parts, because between nodes the laws are smooth and one step is exact
-//! to far more digits than a fit. A test holds the errors of random laws against steps 64 times shorter.
+//! Nearly all the time of a fit is spent on motions. A Runge–Kutta step is as long as the reference's interval; only one that
+//! crosses a node of either law is repeated in eight parts, because between nodes the laws are smooth and one step is exact
+//! to far more digits than a fit. A test compares random laws with steps 64 times shorter.
 
 use super::check_times;
 use super::law::Nsdm;
@@ -112,7 +112,7 @@ impl Table {
         Self(segments)
     }
 
-    /// Value at `u ≥ 0`. Neighbouring calls ask for neighbouring values, so the search goes on
+    /// Value at `u ≥ 0`. Neighbouring calls ask for neighbouring values, so the search continues
     /// from the segment of the last one.
     #[inline(always)]
     fn at(&self, u: f64, segment: &mut usize) -> f64 {
@@ -199,7 +199,7 @@ impl Laws {
     }
 }
 
-/// Segments of the last values asked for.
+/// Segments of the last values looked up.
 #[derive(Clone, Copy, Default, PartialEq)]
 struct Segments {
     spring: usize,

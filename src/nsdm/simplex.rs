@@ -2,8 +2,8 @@
 //!
 //! Nelder and Mead, The Computer Journal 7 (1965); coefficients of Gao and Han,
 //! Computational Optimization and Applications 51 (2012), eq. 4.1: with the usual ones the
-//! simplex of 30 variables soon loses its shape. Own code, because argmin 0.11, which is kept
-//! well otherwise, refuses contractions above 1/2 (these ask for 0.73 at 30 variables), knows
+//! simplex of 30 variables soon loses its shape. Own code, because argmin 0.11, although well
+//! maintained, rejects contractions above 1/2 (0.73 is needed for 30 variables), has
 //! no bounds, and counts iterations instead of evaluations.
 
 use super::genetic::Individual;

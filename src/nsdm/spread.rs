@@ -1,4 +1,4 @@
-//! How far fits of several seeds lie apart: whether their parameters mean anything.
+//! Spread of fits with several seeds: whether their parameters are meaningful.
 
 use serde::Serialize;
 
@@ -6,7 +6,7 @@ use super::Fit;
 use super::law::PiecewiseLinear;
 use crate::error::{Error, error};
 
-/// Fewest fits that show a spread.
+/// Minimum number of fits that show a spread.
 const FEWEST: usize = 3;
 /// Places along an axis at which laws are compared.
 const PLACES: usize = 200;
@@ -67,8 +67,8 @@ impl LawSpread {
 
 /// Spread of errors and of parameters over the seeds.
 ///
-/// Errors that agree beside laws that do not say that the parameters are not unique: spring
-/// and damper stand in for each other, and what the law does at another speed is chance.
+/// Equal errors with different laws mean that the parameters are not unique: spring
+/// and damper can replace each other, and what the law does at another speed is chance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Identifiability {
     /// Number of fits.
@@ -77,7 +77,7 @@ pub struct Identifiability {
     pub objective: Range,
     /// `Σ|p − r|/Σ|r|` of the velocity at the fitted speed.
     pub velocity_l1: Range,
-    /// The same of the acceleration.
+    /// The same for the acceleration.
     pub acceleration_l1: Range,
     /// Spread of the springs.
     pub stiffness: LawSpread,

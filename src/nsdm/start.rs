@@ -6,7 +6,7 @@ use super::genetic::{DAMPING_NODES, Genes, STIFFNESS_NODES, Scales};
 use super::{DAMPING_N_S_PER_M, STIFFNESS_N_PER_M, Target};
 
 const COLUMNS: usize = STIFFNESS_NODES + DAMPING_NODES;
-/// Rounds over all values; the start need not be exact, because the search goes on from it.
+/// Rounds over all values; the start need not be exact, because the search continues from it.
 const ROUNDS: usize = 500;
 
 /// Replaces the node values in `genes` by those that fit the reference best; the positions
@@ -37,7 +37,7 @@ pub(super) fn least_squares(genes: &mut Genes, target: &Target) {
         }
     }
     let bounds = |j: usize| if j < STIFFNESS_NODES { STIFFNESS_N_PER_M } else { DAMPING_N_S_PER_M };
-    // A value that no sample asks for stays in the middle of what the search covers.
+    // A value that no sample determines stays in the middle of the search range.
     let (mut values, middle) = ([0.0; COLUMNS], Scales::middle());
     values[..STIFFNESS_NODES].fill(middle.0);
     values[STIFFNESS_NODES..].fill(middle.1);
@@ -74,7 +74,7 @@ mod tests {
     use crate::stream::Stream;
 
     /// A reference made by a law with the same nodes: the squares are nearly zero, and the law's
-    /// own values give back its acceleration.
+    /// own values return its acceleration.
     #[test]
     fn finds_the_law_that_made_the_reference() {
         let scales = Scales { displacement_m: 0.6, speed_m_per_s: 12.0 };

@@ -1,4 +1,4 @@
-//! Draws by counter: the share of item `k` and its quantile, without any that came before.
+//! Draws by counter: the uniform value of item `k` and its quantile, independent of earlier items.
 //!
 //! Exponential, logarithm and error function are those of `libm`, so that the values do not
 //! depend on the machine's C library.

@@ -1,6 +1,6 @@
 //! Plan of a sweep (TOML): what is varied, over which values or distribution.
 //!
-//! What the names in it refer to is the scenario's business; here numbers get their units and
+//! The names in it are resolved by the scenario; here numbers get their units and
 //! item `k` its values.
 
 pub(crate) mod draw;

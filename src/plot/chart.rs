@@ -160,7 +160,7 @@ pub struct Band {
 /// An upright line with a word at its top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
-    /// Stands beside its top.
+    /// Placed next to its top.
     pub name: String,
     /// Where, in SI.
     pub x: f64,

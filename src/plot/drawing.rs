@@ -1,4 +1,4 @@
-//! A placed chart: lines, areas and texts in pixels, y downwards. What the writers spell.
+//! A laid-out chart: lines, areas and texts in pixels, y downwards; the input of the writers.
 
 use super::{font, thin};
 

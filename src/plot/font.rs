@@ -37,7 +37,7 @@ pub(super) fn units_per_em() -> f64 {
 pub(super) const ASCENT: f64 = 0.77;
 pub(super) const DESCENT: f64 = 0.24;
 
-/// The characters of a text one behind the other. A character that the font lacks is a box.
+/// The characters of a text one after the other. A character that the font lacks is a box.
 pub(super) fn place(text: &str) -> (Vec<Placed>, i64) {
     let mut x = 0;
     let placed = text.chars().map(|c| {

@@ -113,7 +113,7 @@ fn x_ticks(panel: &Panel, place: &PanelPlace) -> Ticks {
     }
 }
 
-/// What stands below axes: numbers, label, some room.
+/// What is below axes: numbers, label, some room.
 fn below_axes() -> f64 {
     8.0 + LINE * TICK + LINE * LABEL + 8.0
 }

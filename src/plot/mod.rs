@@ -1,8 +1,8 @@
 //! Charts: axes, series, bands and a legend, as SVG and PNG of one drawing.
 //!
-//! A [`Chart`] says what is shown. [`Chart::drawing`] places it: every line, and every text with the size that its
-//! font gives it. The two writers only spell that drawing, so both pictures show the same. The font is part of the
-//! program; no font of the system and no function of the platform has a say, and the bytes are the same everywhere.
+//! A [`Chart`] defines the content. [`Chart::drawing`] lays it out: every line, and every text with the size that its
+//! font gives it. Both writers only output that drawing, so both pictures show the same. The font is part of the
+//! program; system fonts and platform functions are not used, so the bytes are the same everywhere.
 //!
 //! ```
 //! use crumple::plot::{Axis, Chart, Panel, Series};

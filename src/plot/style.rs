@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 
-/// Colours that people with any colour vision tell apart (Okabe and Ito, "Color Universal Design", 2008), the
+/// Colours that people with any colour vision distinguish (Okabe and Ito, "Color Universal Design", 2008), the
 /// palest last.
 const COLOURS: [&str; 8] =
     ["#0072b2", "#d55e00", "#009e73", "#000000", "#cc79a7", "#56b4e9", "#e69f00", "#f0e442"];
@@ -140,7 +140,7 @@ mod tests {
                 assert_ne!(one, other, "looks {a} and {b}");
                 // The first eight differ in colour, and in their markers as well.
                 assert!(a >= 8 || (one.0 != other.0 && one.1 != other.1), "looks {a} and {b}");
-                // Where colours repeat, the marker or the dash tells.
+                // Where colours repeat, marker or dash distinguishes.
                 assert!(colour(a) != colour(b) || marker(a) != marker(b) || dash(a) != dash(b));
             }
         }

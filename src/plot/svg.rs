@@ -7,7 +7,7 @@ use super::drawing::{Drawing, Paint, Shape, Shows, Stroke, Text};
 use super::font::{self, Piece};
 use super::style;
 
-/// Size of texts that say no other, in pixels: that of the numbers at ticks.
+/// Default size of texts, in pixels: that of the numbers at ticks.
 const SIZE: f64 = 12.0;
 
 /// Where an SVG is shown.
@@ -94,7 +94,7 @@ impl Drawing {
     }
 }
 
-/// Digits behind the point: a tenth of a pixel.
+/// Digits after the point: a tenth of a pixel.
 fn number(value: f64) -> String {
     let text = format!("{value:.1}");
     let text = text.strip_suffix(".0").unwrap_or(&text);

@@ -17,7 +17,7 @@ pub(super) fn kept(points: &[Point]) -> Vec<usize> {
     simplified(points, &columns(points))
 }
 
-/// Of points one behind the other in a narrow column: the first, lowest, highest and last. It bounds the number of
+/// Of points one after the other in a narrow column: the first, lowest, highest and last. It bounds the number of
 /// points by the size of the picture wherever a line runs to one side.
 fn columns(points: &[Point]) -> Vec<usize> {
     let column = |i: &usize| (points[*i].0 / COLUMN).floor();

@@ -1,6 +1,6 @@
 //! Round numbers along an axis, and how they are written.
 
-/// Positions of ticks with the digits that they need behind the point.
+/// Positions of ticks with the digits that they need after the point.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Ticks {
     pub(super) values: Vec<f64>,
@@ -74,7 +74,7 @@ impl Ticks {
             return "0".into();
         }
         if self.decimals > 6 || value.abs() >= 1e7 {
-            // As many digits as tell neighbours apart.
+            // As many digits as distinguish neighbours.
             let digits = magnitude(value.abs()) - magnitude(self.step);
             let digits = usize::try_from(digits).unwrap_or_default();
             return format!("{value:.digits$e}").replace('-', "−");

@@ -31,7 +31,7 @@ impl Deceleration {
     /// Of an acceleration `a` over `time_s` (s, increasing, equal intervals, at least two).
     ///
     /// Between samples −a is linear. EN 15227 limits the mean while the net contact force is
-    /// above zero; of a signal without its force the deceleration itself tells begin and end.
+    /// above zero; of a signal without its force the deceleration itself gives start and end.
     pub(crate) fn of(time_s: &[f64], acceleration: &[f64]) -> Self {
         let deceleration: Vec<f64> = acceleration.iter().map(|a| -a).collect();
         let phase = phase(time_s, &deceleration);
@@ -125,7 +125,7 @@ mod tests {
 
     #[test]
     fn a_triangle_by_hand() {
-        // 0, 2, 4, 2, −2: above 0 from the first 2 to half way behind the last: 2.5 steps.
+        // 0, 2, 4, 2, −2: above 0 from the first 2 to half way after the last: 2.5 steps.
         let of = Deceleration::of(&times(5), &[0.0, -2.0, -4.0, -2.0, 2.0]);
         assert!((of.mean.unwrap() - (3.0 + 3.0 + 0.5) / 2.5).abs() < 1e-12);
         assert!((of.to_s.unwrap() - 3.5e-3).abs() < 1e-12);

@@ -18,7 +18,7 @@ const WINDOW: usize = 10;
 /// Slopes are means over this many samples.
 const SMOOTHED: usize = 9;
 
-/// Fewest samples: what a shift leaves must hold a mean of nine.
+/// Minimum number of samples: what a shift leaves must hold a mean of nine.
 pub(crate) const LEAST_SAMPLES: usize = 12;
 /// Most samples: the warping takes a fifth of their square in bytes, here 80 MB, and the
 /// search for the shift as many steps.
@@ -87,7 +87,7 @@ impl Grade {
 ///
 /// A relative error over zeros counts as none if the prediction is zero there as well, else as
 /// the worst. Correlations that differ by less than 1e-12 count as equal, and the smaller shift
-/// is taken, as the standard has it for equal ones.
+/// is taken, as in the standard for equal ones.
 pub(crate) fn iso18571(reference: &[f64], prediction: &[f64], interval_s: f64) -> Option<Iso18571> {
     let n = reference.len();
     if !(LEAST_SAMPLES..=MOST_SAMPLES).contains(&n) || prediction.len() != n {

@@ -1,6 +1,6 @@
-//! Rating: every measure of how far a prediction is from its reference.
+//! Rating: all measures of the difference between a prediction and its reference.
 //!
-//! Two signals over time are filtered if asked, brought to common times at 10 kHz, and rated by
+//! Two signals over time are filtered on request, brought to common times at 10 kHz, and rated by
 //! all measures at once. Whatever the unit of the values, both have the same.
 //!
 //! The rate of 10 kHz is that of ISO/TS 18571, so that all measures see the same samples. The basic measures (`l1_ratio`,
@@ -162,7 +162,7 @@ pub struct Peak {
     pub time_s: f64,
     /// Value of the reference, in the unit of the signals.
     pub value: f64,
-    /// Prediction over reference, less 1; null if the prediction has no peak within a tenth of the
+    /// Prediction over reference, minus 1; null if the prediction has no peak within a tenth of the
     /// common times: it is missing.
     pub error: Option<f64>,
     /// By how much the prediction's peak is later, in s.
@@ -254,17 +254,16 @@ fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Ve
         (settings.from_s.unwrap_or(rating.from_s), settings.to_s.unwrap_or(rating.to_s));
     if from_s < rating.from_s - INTERVAL_S || to_s > rating.to_s + INTERVAL_S {
         warnings.push(format!(
-            "{from_s} s to {to_s} s was asked for, but the signals have in common only {} s to {} s",
+            "{from_s} s to {to_s} s was requested, but the signals have in common only {} s to {} s",
             rating.from_s, rating.to_s
         ));
     }
     if reference.iter().all(|&r| r == 0.0) {
-        warnings
-            .push("the reference is zero throughout: there is nothing to be relative to".into());
+        warnings.push("the reference is zero throughout: relative measures are undefined".into());
     }
     if rating.iso18571.is_none() {
         warnings.push(format!(
-            "{} samples at 10 kHz are too many for ISO/TS 18571 and CORA, which take up to {}: ask for a shorter interval, or check the units of time",
+            "{} samples at 10 kHz are too many for ISO/TS 18571 and CORA, which take up to {}: choose a shorter interval, or check the units of time",
             rating.samples,
             iso18571::MOST_SAMPLES
         ));
@@ -281,7 +280,7 @@ fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Ve
         }
         if of.is_cut {
             warnings.push(format!(
-                "the {who} is still decelerated at {} s, where the interval ends: its mean deceleration is that up to there",
+                "the {who} is still decelerated at {} s, where the interval ends: its mean deceleration covers the time up to then",
                 rating.to_s
             ));
         }
@@ -379,14 +378,14 @@ mod tests {
         let step = signal((0..200).map(|i| f64::from(i >= 50)).collect());
         let beyond = RatingSettings { to_s: Some(5.0), ..RatingSettings::default() };
         let beyond = rate(&step, &step, &beyond).unwrap().warnings;
-        assert!(beyond.iter().any(|w| w.contains("to 5 s was asked for")), "{beyond:?}");
+        assert!(beyond.iter().any(|w| w.contains("to 5 s was requested")), "{beyond:?}");
         let window =
             RatingSettings { from_s: Some(0.052), cfc: Some(60), ..RatingSettings::default() };
         let whole = RatingSettings { from_s: None, ..window };
         let zero = signal(vec![0.0; 200]);
         let cut = rate(&zero, &step, &window).unwrap();
         assert_eq!(cut.from_s, 0.052);
-        // The filter's overshoot behind the step is the largest value either way.
+        // The filter's overshoot after the step is the largest value either way.
         assert_eq!(cut.max_abs.value, rate(&zero, &step, &whole).unwrap().max_abs.value);
         assert!(cut.max_abs.value > 1.01);
     }
@@ -404,7 +403,7 @@ mod tests {
         assert_eq!(
             of.warnings,
             [
-                "100000 samples at 10 kHz are too many for ISO/TS 18571 and CORA, which take up to 20000: ask for a shorter interval, or check the units of time"
+                "100000 samples at 10 kHz are too many for ISO/TS 18571 and CORA, which take up to 20000: choose a shorter interval, or check the units of time"
             ]
         );
         assert!((of.sprague_geers.unwrap().phase - 0.1 / std::f64::consts::PI).abs() < 1e-4);
@@ -426,7 +425,7 @@ mod tests {
         assert_eq!((of.l1_ratio, of.rms_ratio, of.sprague_geers), (None, None, None));
         assert_eq!(
             of.warnings,
-            ["the reference is zero throughout: there is nothing to be relative to"]
+            ["the reference is zero throughout: relative measures are undefined"]
         );
         assert_eq!(plain(&zero, &zero).l1_ratio, Some(0.0));
     }

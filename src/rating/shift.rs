@@ -1,4 +1,4 @@
-//! Shift: by how many samples a prediction must be moved to look most like its reference.
+//! Shift: by how many samples a prediction must be moved to match its reference best.
 
 use std::ops::Range;
 

@@ -5,7 +5,7 @@ use crate::signal::{CfcError, cfc, interpolate};
 
 /// Interval of ISO/TS 18571: 10 kHz.
 pub(crate) const INTERVAL_S: f64 = 1e-4;
-/// Fewest samples of a signal: fewer are points, not a history.
+/// Minimum number of samples of a signal: fewer are points, not a history.
 const LEAST_SAMPLES: usize = 5;
 /// Most common samples: 500 s, far beyond any collision.
 const MOST_COMMON: f64 = 5e6;
@@ -33,22 +33,22 @@ fn too_much(error: &CfcError, length_s: f64) -> String {
             let unit = [("ms", 1e-3), ("us", 1e-6)].into_iter().find(fits);
             let unit = match unit.filter(|_| length_s > LONG_S) {
                 Some((unit, _)) => format!(
-                    "it lasts {length_s} s, so its times may be in {unit}: then write ,time={unit} behind the file's name; else "
+                    "it lasts {length_s} s, so its times may be in {unit}: then write ,time={unit} after the file's name; else "
                 ),
                 None => String::new(),
             };
             format!(
-                "its samples are {interval_s:.2e} s apart, too far for CFC {class}: at most {longest_s:.2e} s; {unit}filter with a lower class or not at all"
+                "its samples are {interval_s:.2e} s apart, too far for CFC {class}: at most {longest_s:.2e} s; {unit}use a lower class or no filter"
             )
         }
         CfcError::Uneven { spread_percent } => format!(
-            "its intervals differ by up to {spread_percent:.0} % of their mean, too much for a CFC filter: filter not at all"
+            "its intervals differ by up to {spread_percent:.0} % of their mean, too much for a CFC filter: use no filter"
         ),
     }
 }
 
 impl Signal {
-    /// `name` stands in messages and results; `time_s` in s.
+    /// `name` appears in messages and results; `time_s` in s.
     ///
     /// # Errors
     /// With the number of the first wrong sample, counted from 1.
@@ -83,7 +83,7 @@ impl Signal {
             let (before_s, time_s) = (time_s[i], time_s[i + 1]);
             return Err(error!(
                 Rating,
-                "sample {sample}: time {time_s} s does not come after {before_s} s: times must rise strictly, so cut or sort the file first",
+                "sample {sample}: time {time_s} s does not come after {before_s} s: times must increase strictly, so cut or sort the file first",
                 sample = i + 2
             ));
         }
@@ -103,7 +103,7 @@ impl Signal {
         (self.time_s[0], self.time_s[self.time_s.len() - 1])
     }
 
-    /// The signal behind a CFC filter without phase shift, at its own times.
+    /// The signal after a CFC filter without phase shift, at its own times.
     pub(crate) fn filtered(&self, class: u32) -> Result<Self, Error> {
         let (first_s, last_s) = self.range_s();
         let filtered = cfc::filter(class, &self.time_s, &self.values).map_err(|source| {
@@ -150,7 +150,7 @@ impl Pair {
         if from_s >= to_s {
             return Err(error!(
                 Rating,
-                "what is asked for, from {} s to {} s, lies outside the common times from {} s to {} s",
+                "the requested interval, from {} s to {} s, lies outside the common times from {} s to {} s",
                 asked.0,
                 asked.1,
                 common.0,
@@ -162,14 +162,14 @@ impl Pair {
         if samples > MOST_COMMON {
             return Err(error!(
                 Rating,
-                "the common times from {from_s} s to {to_s} s hold {samples:.0} samples at 10 kHz, {MOST_COMMON:.0} at most; check the units of time, or ask for a shorter interval"
+                "the common times from {from_s} s to {to_s} s hold {samples:.0} samples at 10 kHz, {MOST_COMMON:.0} at most; check the units of time, or choose a shorter interval"
             ));
         }
         let samples = samples as usize;
         if samples < least {
             return Err(error!(
                 Rating,
-                "the common times from {from_s} s to {to_s} s hold {samples} samples at 10 kHz: at least {least} are needed; check the units of time and the asked interval"
+                "the common times from {from_s} s to {to_s} s hold {samples} samples at 10 kHz: at least {least} are needed; check the units of time and the requested interval"
             ));
         }
         let time_s: Vec<f64> =
@@ -214,7 +214,7 @@ mod tests {
         };
         assert_eq!(
             error(&[0.0, 1.0, 2.0, 2.0, 3.0], &[0.0; 5]),
-            "sample 4: time 2 s does not come after 2 s: times must rise strictly, so cut or sort the file first"
+            "sample 4: time 2 s does not come after 2 s: times must increase strictly, so cut or sort the file first"
         );
         assert_eq!(
             error(&[0.0, 1.0, 2.0, 3.0, 4.0], &[0.0, f64::NAN, 0.0, 0.0, 0.0]),
@@ -231,16 +231,16 @@ mod tests {
         let outside = Pair::new(&a, &a, (Some(2.0), None), 12).unwrap_err();
         assert_eq!(
             outside.to_string(),
-            "what is asked for, from 2 s to 0.5 s, lies outside the common times from 0 s to 0.5 s"
+            "the requested interval, from 2 s to 0.5 s, lies outside the common times from 0 s to 0.5 s"
         );
         let short = Pair::new(&a, &a, (None, Some(0.001)), 12).unwrap_err();
         assert_eq!(
             short.to_string(),
-            "the common times from 0 s to 0.001 s hold 11 samples at 10 kHz: at least 12 are needed; check the units of time and the asked interval"
+            "the common times from 0 s to 0.001 s hold 11 samples at 10 kHz: at least 12 are needed; check the units of time and the requested interval"
         );
         assert_eq!(
             a.filtered(60).unwrap_err().to_string(),
-            "line: its samples are 1.25e-1 s apart, too far for CFC 60: at most 1.67e-3 s; filter with a lower class or not at all"
+            "line: its samples are 1.25e-1 s apart, too far for CFC 60: at most 1.67e-3 s; use a lower class or no filter"
         );
         let long = line(0.0, 100.0, 10);
         let error = Pair::new(&long, &long, (None, None), 12).unwrap_err().to_string();

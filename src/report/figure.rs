@@ -23,7 +23,7 @@ impl Figure {
     /// `id` is unique in the page.
     pub(super) fn new(id: String, chart: Chart) -> Self {
         let mut chart = chart;
-        // In the page, title and notes are text beside the picture.
+        // In the page, title and notes are text next to the picture.
         let caption = std::mem::take(&mut chart.title);
         let notes = std::mem::take(&mut chart.notes);
         let mut drawing = chart.drawing();
@@ -51,7 +51,7 @@ impl Figure {
     }
 }
 
-/// Axes and values of a panel; equal abscissas of several lines stand there once.
+/// Axes and values of a panel; equal abscissas of several lines are there once.
 fn panel_data(panel: &Panel, place: &PanelPlace) -> Value {
     let mut xs: Vec<Vec<Value>> = Vec::new();
     let mut abscissa = |values: Vec<Value>| {

@@ -1,4 +1,4 @@
-//! What the report says of a group: its runs, how good predictions are, a prediction, the methods.
+//! The report on a group: its runs, the accuracy of predictions, a prediction, the methods.
 
 use super::figure::Figure;
 use super::page::{energy, force, mass, metres, percent, signed_percent};
@@ -82,8 +82,8 @@ fn runs(group: &str, cases: &[Case]) -> Table {
         "run",
         &format!("{kind} speed"),
         "mass",
-        "largest force",
-        "largest crush",
+        "peak force",
+        "maximum crush",
         "work",
         "work / energy",
         "warnings",
@@ -141,7 +141,7 @@ impl Validated<'_> {
         settings: &ReportSettings,
     ) {
         let Self { group, cases, validation, .. } = self;
-        parts.push(Part::Heading("How far predictions lie from FE".into()));
+        parts.push(Part::Heading("Accuracy of predictions".into()));
         let chosen = validation.means.iter().find(|means| means.model == validation.chosen);
         if let Some(means) = chosen {
             let value = percent(means.velocity_l1);
@@ -153,7 +153,7 @@ impl Validated<'_> {
         parts.push(Part::Text(format!("Chosen: {} ({}).", validation.chosen, validation.reason)));
         if let Some(scatter) = &validation.scatter {
             parts.push(Part::Text(format!(
-                "Equal runs lie apart by {} in force and {} in velocity: no model can remove this part of its errors.",
+                "Repeated runs differ by {} in force and {} in velocity: no model can remove this part of its errors.",
                 percent(scatter.force_l1),
                 percent(scatter.velocity_l1)
             )));
@@ -168,7 +168,7 @@ impl Validated<'_> {
         match charts::left_out_at(group, cases, worst.speed_m_per_s, Choice::Kind(kind)) {
             Ok(chart) => {
                 parts.push(Part::Text(format!(
-                    "Of the inner speeds, {} has the largest force error, {}. Left out, it is predicted so:",
+                    "Of the inner speeds, {} has the largest force error, {}. This is its prediction when left out:",
                     km_per_h(worst.speed_m_per_s),
                     percent(worst.force_l1)
                 )));
@@ -189,7 +189,7 @@ impl Validated<'_> {
         let Self { group, validation, .. } = self;
         let speeds = validation.means.first().map_or(0, |means| means.speeds);
         let heading =
-            ["model", "force", "energy", "largest crush", "velocity", "acceleration (CFC 60)"];
+            ["model", "force", "energy", "maximum crush", "velocity", "acceleration (CFC 60)"];
         let row = |means: &Means| {
             let is_chosen = means.model == validation.chosen;
             let texts = [
@@ -206,14 +206,14 @@ impl Validated<'_> {
         let left_out = counted(speeds, "inner speed");
         Table {
             caption: format!(
-                "{group}: errors against FE, means over {left_out}, each left out in turn (Σ|p − r|/Σ|r|; the body's force drives one mass)"
+                "{group}: errors against FE, means over {left_out}, each left out in turn (Σ|p − r|/Σ|r|; the body force drives one mass)"
             ),
             heading: heading.map(String::from).to_vec(),
             rows: validation.means.iter().map(row).collect(),
         }
     }
 
-    /// The curve at the asked speed, or in the middle of the widest gap.
+    /// The curve at the requested speed, or in the middle of the widest interval.
     fn add_prediction(
         &self,
         content: &mut Content,
@@ -240,8 +240,7 @@ impl Validated<'_> {
         if let Ok(set) = TrainingSet::new(group, *cases)
             && let Some(next) = next_run(&set, validation)
         {
-            let advice =
-                format!("Next FE run: {}, as {}.", km_per_h(next.speed_m_per_s), next.reason);
+            let advice = format!("Next FE run: {}: {}.", km_per_h(next.speed_m_per_s), next.reason);
             parts.push(Part::Text(advice));
         }
         Ok(())
@@ -253,8 +252,8 @@ impl Validated<'_> {
         let peak = curve.force_n.iter().copied().fold(0.0, f64::max);
         let mut rows = vec![
             ("model".to_string(), curve.model.clone()),
-            ("largest force".into(), force(peak)),
-            ("largest crush".into(), metres(curve.max_deflection_m)),
+            ("peak force".into(), force(peak)),
+            ("maximum crush".into(), metres(curve.max_deflection_m)),
             ("energy of the curve".into(), energy(curve.energy_j)),
             ("energy over kinetic energy".into(), percent(curve.provenance.energy_over_kinetic)),
             ("nearest FE run".into(), km_per_h(curve.provenance.nearest_training_speed_m_per_s)),
@@ -269,7 +268,7 @@ impl Validated<'_> {
                 format!("±{} of the local {} force", percent(band.pointwise_share), force.name()),
             ));
             if let Some(scatter) = &band.scatter {
-                let name = "part of it from scatter between equal runs".to_string();
+                let name = "part of it from scatter between repeated runs".to_string();
                 rows.push((name, format!("±{}", percent(scatter.pointwise_share))));
             }
         }
@@ -315,7 +314,7 @@ impl Validated<'_> {
                 .map(|text| Cell { text, title: String::new(), is_chosen: row.method == "best" })
                 .to_vec()
         });
-        let heading = ["method", "driven by", "velocity", "acceleration (CFC 60)", "largest crush"];
+        let heading = ["method", "driven by", "velocity", "acceleration (CFC 60)", "maximum crush"];
         parts.push(Part::Heading("Methods".into()));
         parts.push(Part::Table(Table {
             caption: format!(
@@ -346,12 +345,12 @@ fn mean_crush(comparisons: &[Comparison]) -> f64 {
 fn methods_explained(nsdm_seeds: u64) -> String {
     let nsdm = match nsdm_seeds {
         0 => {
-            " nsdm, the spring and damper fitted by a genetic algorithm, was left out; ask for it with --nsdm-seeds."
+            " nsdm, the spring and damper fitted by a genetic algorithm, was left out; --nsdm-seeds includes it."
         }
         _ => " nsdm: a spring and damper fitted by a genetic algorithm to that run.",
     };
     format!(
-        "fe: FE's own contact force at the left-out speed, the floor for predictions of it; fe_body: the force that FE's speeds imply, a check. fdrm: FE's curve of the nearest other speed.{nsdm} ddtcm: the reference method's forest. best: the model that leaving speeds out chooses."
+        "fe: FE's own contact force at the left-out speed, the floor for predictions of it; fe_body: the force that FE's speeds imply, a check. fdrm: FE's curve of the nearest other speed.{nsdm} ddtcm: the reference method's forest. best: the model chosen by leaving speeds out."
     )
 }
 
@@ -363,7 +362,7 @@ fn middle_of_widest_gap(cases: &[Case]) -> Option<f64> {
     gaps.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|gap| gap.0 > 0.0).map(|gap| gap.1)
 }
 
-/// Characters of a hash that tell files apart at a glance; the whole stands where the pointer rests.
+/// Characters of a hash that distinguish files at a glance; the whole stands where the pointer rests.
 const HASH: usize = 12;
 
 /// The section of files that the curves come from.

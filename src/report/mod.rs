@@ -1,7 +1,7 @@
 //! The report: one HTML page about a database and the runs made with it.
 //!
-//! The page needs nothing else: styles, script and numbers are inside, and it may not reach anywhere (`default-src
-//! 'none'`). Every picture stands in it as SVG; the script gives it values under the pointer and zoom. Without the script,
+//! The page is self-contained: styles, script and numbers are inside, and it may not load anything (`default-src
+//! 'none'`). Every picture is embedded as SVG; the script adds values under the pointer and zoom. Without the script,
 //! tables and pictures remain.
 
 mod figure;
@@ -38,7 +38,7 @@ pub(crate) struct ReportSettings {
 /// At which left-out speeds the methods are compared: each takes about half a second.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum MethodSpeeds {
-    /// At none; trains are not held against FE either.
+    /// At none; trains are not compared with FE either.
     None,
     /// Where the chosen model has its largest error.
     Worst,
@@ -54,7 +54,7 @@ pub(crate) struct Table {
     rows: Vec<Vec<Cell>>,
 }
 
-/// A text, and what more there is to say about it.
+/// A text with details.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Cell {
     text: String,
@@ -123,7 +123,7 @@ impl Content {
 
 /// The page about a database and scenarios, and how many warnings it shows.
 ///
-/// Of `models`, those that `auto` chose for these very cases spare their validation; `step` is told what is being done.
+/// Of `models`, those that `auto` chose for these very cases spare their validation; `step` receives the current step.
 pub(crate) fn report(
     path: &Path,
     database: &Database,

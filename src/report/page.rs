@@ -43,7 +43,7 @@ pub(super) fn html(content: &Content) -> String {
     .expect("the template asks for what the content has")
 }
 
-/// JSON that may stand in a script element, whatever its strings hold.
+/// JSON that may be in a script element, whatever its strings hold.
 fn in_script(json: &str) -> String {
     json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
 }

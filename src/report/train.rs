@@ -1,4 +1,4 @@
-//! What the report says of a scenario: motion, crush and energy of its run, and FE's train beside it.
+//! The report on a scenario: motion, crush and energy of its run, and the comparison with FE's train.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use crate::multibody::{Run, STANDARD_GRAVITY_M_PER_S2};
 use crate::scenario::{self, Prepared};
 use crate::unit::km_per_h;
 
-/// Runs a scenario and adds its section; with FE's run as its reference also the methods beside it.
+/// Runs a scenario and adds its section; with FE's run as reference also the comparison of methods.
 pub(super) fn add(
     content: &mut Content,
     path: &Path,
@@ -44,7 +44,7 @@ pub(super) fn add(
     let crush = run.interfaces.iter().map(|i| i.max_deflection_m).fold(0.0, f64::max);
     content
         .figures
-        .push(KeyFigure { value: metres(crush), name: format!("largest crush, {name}") });
+        .push(KeyFigure { value: metres(crush), name: format!("maximum crush, {name}") });
     let mut warnings = prepared.warnings.clone();
     warnings.extend(run.all_warnings());
     warnings.into_iter().for_each(|warning| content.warn(format!("{name}: {warning}")));
@@ -52,7 +52,7 @@ pub(super) fn add(
         let (seed, nsdm_seeds) = (settings.seed, settings.nsdm_seeds);
         let asked = ComparisonSettings { seed, nsdm_seeds, ..ComparisonSettings::default() };
         let comparison = compare_train(path, &read, &asked)?;
-        parts.push(Part::Heading("Beside FE's run of the whole train".into()));
+        parts.push(Part::Heading("Comparison with FE's run of the whole train".into()));
         let chart = train_speeds(&format!("{name}: speeds by FE and by the methods"), &comparison);
         parts.push(Part::Figure(Figure::new(format!("s{number}-train"), chart)));
         parts.push(Part::Table(methods(&comparison)));
@@ -121,8 +121,8 @@ fn interfaces(prepared: &Prepared, run: &Run) -> Table {
     let rows = row.collect();
     let heading = [
         "interface",
-        "largest force",
-        "largest crush",
+        "peak force",
+        "maximum crush",
         "at",
         "energy lost",
         "energy stored",
@@ -147,7 +147,7 @@ fn limits(prepared: &Prepared, run: &Run) -> Option<String> {
     let beyond = run.beyond_data().map(|k| prepared.chain.interfaces()[k].name.as_str());
     let beyond: Vec<&str> = beyond.collect();
     let over = if !beyond.is_empty() {
-        format!("cannot be told, because {} left the data of the curve", beyond.join(", "))
+        format!("unknown, because {} went beyond the data of its curve", beyond.join(", "))
     } else if over.is_empty() {
         "no vehicle".into()
     } else {
@@ -173,6 +173,7 @@ fn methods(comparison: &TrainComparison) -> Table {
         cells.extend(row.vehicles.iter().map(|v| percent(v.velocity_l1).into()));
         cells
     });
-    let caption = format!("Velocity errors to {:.0} ms, Σ|p − r|/Σ|r|", 1e3 * comparison.until_s);
+    let caption =
+        format!("Velocity errors up to {:.0} ms, Σ|p − r|/Σ|r|", 1e3 * comparison.until_s);
     table(&caption, &heading, rows.collect())
 }

@@ -116,7 +116,7 @@ fn no_chain(
 const SAME_RUN: f64 = 0.05;
 
 /// Warns of a curve that is of another speed or mass than the impact it drives, as a model does that is
-/// asked out of its range.
+/// used outside its range.
 fn of_another_run(
     curve: &str,
     slot: &Connection<'_>,
@@ -128,7 +128,7 @@ fn of_another_run(
     let mut warnings = Vec::new();
     if let Some(own) = spring.curve.speed_m_per_s.filter(|own| differs(*own, meeting_m_per_s)) {
         warnings.push(format!(
-            "curve \"{curve}\": it is of {}, and {} meets at {}: forces follow the impact speed; give the curve of this speed, or a model (crumple train)",
+            "curve \"{curve}\": it is for {}, but {} closes at {}: forces depend on the impact speed; give the curve of this speed, or a model (crumple train)",
             km_per_h(own),
             slot.name,
             km_per_h(meeting_m_per_s)
@@ -145,7 +145,7 @@ fn of_another_run(
     if let Some(own_kg) = own_kg.filter(|own_kg| differs(*own_kg, slot.mass_kg)) {
         let shown = Shown::mass(own_kg.max(slot.mass_kg));
         warnings.push(format!(
-            "curve \"{curve}\": it is of {}, and {} moves {}: give the curve of this mass, or a model (crumple train)",
+            "curve \"{curve}\": it is for {}, but {} moves {}: give the curve of this mass, or a model (crumple train)",
             shown.text(own_kg),
             slot.name,
             shown.text(slot.mass_kg)

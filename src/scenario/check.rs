@@ -1,4 +1,4 @@
-//! Checks that a single key cannot show: a scenario as written becomes a [`CheckedScenario`].
+//! Checks across several keys: a scenario as written becomes a [`CheckedScenario`].
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -20,7 +20,7 @@ use crate::unit::km_per_h;
 pub struct CheckedScenario<'a> {
     tables: Cow<'a, Scenario>,
     meeting_m_per_s: f64,
-    /// Its text, if it is as its file has it.
+    /// Its text, if it is as in its file.
     document: Option<Document>,
 }
 
@@ -75,7 +75,7 @@ impl CheckedScenario<'_> {
         self.meeting_m_per_s
     }
 
-    /// Its text, if it is as its file has it.
+    /// Its text, if it is as in its file.
     pub(super) fn document(&self) -> Option<&Document> {
         self.document.as_ref()
     }
@@ -91,7 +91,7 @@ impl CheckedScenario<'_> {
     }
 
     /// Checks `varied`, which differs from this scenario in numbers only and in which of its
-    /// curves stand where: what these cannot break is not looked at again.
+    /// curves stand where: what these cannot break is not examined again.
     pub(crate) fn vary<'v>(&self, varied: &'v Scenario) -> Result<CheckedScenario<'v>, Error> {
         check_values(varied)
     }
@@ -215,7 +215,7 @@ fn check_vehicles(scenario: &Scenario, train: &TrainTable) -> Result<(), Error> 
 fn between_ends(scenario: &Scenario, curve: &str) -> Error {
     error!(
         Scenario,
-        "curve \"{curve}\" stands between ends that come from models, where plates meet: remove it"
+        "curve \"{curve}\" lies between ends that come from models, where plates meet: remove it"
     )
     .at(scenario.use_of(curve))
 }
@@ -263,7 +263,7 @@ fn check_contact(scenario: &Scenario) -> Result<(), Error> {
 /// Most curves of a scenario; each is read from its file.
 const MAX_CURVES: usize = 1_000;
 
-/// Longest name, in bytes: it stands in the columns of results and tables.
+/// Longest name, in bytes: it appears in the columns of results and tables.
 const MAX_NAME: usize = 200;
 
 fn check_length(name: &str) -> Result<(), Error> {
@@ -275,7 +275,7 @@ fn check_length(name: &str) -> Result<(), Error> {
     Err(error!(Scenario, "the name \"{begin}…\" has {found} bytes: expected at most {MAX_NAME}"))
 }
 
-/// Names stand in the columns of the result.
+/// Names appear in the columns of the result.
 fn check_name(name: &str) -> Result<(), Error> {
     check_length(name)?;
     let breaks = |c: char| c.is_control() || [',', '|', '[', ']', '"'].contains(&c);

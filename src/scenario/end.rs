@@ -1,7 +1,7 @@
 //! Ends of vehicles from models: crush force, rate and stopped mass at one end, and the plates
 //! that meet.
 //!
-//! Models count speed and deflection against a wall, or of two equal ends together. An end takes
+//! Models give speed and deflection against a wall, or of two equal ends together. An end takes
 //! half of the deflection of two, twice their reduced stopped mass, and twice their stiffness.
 
 use std::sync::Arc;
@@ -28,7 +28,7 @@ pub(super) struct Crush {
     pub rate: RateFactor,
     /// Of an end; between vehicles of one mass the curve contains it.
     pub stopping: Option<Stopping>,
-    /// Speed that the model was asked for, in m/s of its kind.
+    /// Speed at which the model was evaluated, in m/s of its kind.
     pub speed_m_per_s: f64,
     pub warnings: Vec<String>,
 }

@@ -1,11 +1,11 @@
 //! Interface-local speeds: curves for the speed at which each interface closes itself.
 //!
-//! The interfaces inside a train close far more slowly than the trains meet. What an interface
-//! closes at depends on the curves of all, so both are sought together, by iteration.
+//! The interfaces inside a train close far more slowly than the trains meet. The closing speed of an interface
+//! depends on all curves, so both are determined together, by iteration.
 //!
 //! Local speeds are a fixed point: curves for the present speeds; a run; each interface's largest closing speed up to the
-//! first peak of its force; and again, until none changes by 0.1 m/s. Models are asked beyond their largest crush here,
-//! because neighbours push on; the closing speed that rate effects follow is then zero.
+//! first peak of its force; and again, until none changes by 0.1 m/s. Models are used beyond their maximum crush here,
+//! because neighbours keep pushing; the closing speed that rate effects follow is then zero.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -29,11 +29,11 @@ const PROMINENCE: f64 = 0.1;
 const INTERVAL_S: f64 = 0.25e-3;
 /// What closes for the first time after this is not looked for, in s.
 const LONGEST_S: f64 = 5.0;
-/// No curve is asked for below this speed, in m/s: an interface that hardly closes.
+/// No curve is requested below this speed, in m/s: an interface that hardly closes.
 const SLOWEST_M_PER_S: f64 = 0.1;
 
 /// Puts a scenario together with what its files hold; `path` is for messages. Interfaces whose
-/// curves come from models get them for their own closing speeds, unless the scenario asks for
+/// curves come from models get them for their own closing speeds, unless the scenario sets
 /// the trains' speed.
 pub(crate) fn assemble(
     path: &Path,
@@ -59,7 +59,7 @@ pub(crate) fn assemble(
             settings = settings.with_method(Method::FourthOrder);
         }
         let failed =
-            |error: Error| prepared.failed(error.of("while the interfaces' speeds were sought"));
+            |error: Error| prepared.failed(error.of("while the interface speeds were determined"));
         let run = simulate(&prepared.chain, &settings).map_err(failed)?;
         let largest = follow(&prepared.chain, &run, &own, &mut speeds_m_per_s, &mut before);
         if largest < CHANGE_M_PER_S {
@@ -113,7 +113,7 @@ fn follow(
     largest
 }
 
-/// Advice for every model whose interfaces close below its slowest run: one run there tells what no
+/// Advice for every model whose interfaces close below its slowest run: one run there shows what no
 /// model can.
 fn slow_interfaces(prepared: &Prepared, sources: &Sources) -> Vec<String> {
     let mut slowest: BTreeMap<&str, f64> = BTreeMap::new();

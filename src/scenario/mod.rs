@@ -62,7 +62,7 @@ pub struct Prepared {
     pub order: Vec<usize>,
     /// What each interface of the chain uses.
     pub(crate) used: Vec<CurveInUse>,
-    /// Limits that results are held against.
+    /// Limits that results are compared with.
     pub(crate) limits: Option<LimitsTable>,
     /// Bodies that the limits hold for: indices into the chain.
     pub limited: Vec<usize>,
@@ -108,7 +108,7 @@ pub fn parse(path: &Path, text: &str) -> Result<CheckedScenario<'static>, Error>
     Ok(checked.with(document).into_owned())
 }
 
-/// Checks a scenario that is not as its file has it, with the file's path in the message.
+/// Checks a scenario that is not as in its file, with the file's path in the message.
 pub(crate) fn check<'a>(path: &Path, scenario: &'a Scenario) -> Result<CheckedScenario<'a>, Error> {
     scenario.check().map_err(|error| error.placed(|_| Place::of_file(path)))
 }

@@ -7,7 +7,7 @@ use super::{CheckedScenario, Prepared, Scenario, TrainTable, VehicleTable};
 use crate::error::{Document, KeyPath, Place};
 
 impl CheckedScenario<'_> {
-    /// The place of a key; of a scenario that is not as its file has it only the file, at `path`.
+    /// The place of a key; of a scenario that is not as in its file only the file, at `path`.
     pub(crate) fn place(&self, path: &Path, key: &KeyPath) -> Place {
         match self.document() {
             Some(document) => document.place(key),

@@ -115,7 +115,7 @@ impl Sources {
 }
 
 impl CurveSource {
-    /// Reads what the table of curve `name` in the scenario at `path` asks for.
+    /// Reads the source named in the table of curve `name` in the scenario at `path`.
     fn read(path: &Path, name: &str, table: &CurveTable) -> Result<Self, Error> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let of_curve = |error: Error| error.of(format_args!("curve \"{name}\""));
@@ -193,7 +193,8 @@ fn staged(stages: &[StageTable]) -> Result<Envelope, Error> {
             let stage = stage.name.clone().unwrap_or_else(|| format!("{}", i + 1));
             return Err(error!(
                 Scenario,
-                "stage {stage} has a stroke of {stroke_m} m: expected over 0.2 mm"
+                "stage {stage} has a stroke of {} mm: expected more than 0.2 mm",
+                stroke_m * 1e3
             )
             .at(KeyPath::of("stages").item(i).key("stroke")));
         }
@@ -213,6 +214,8 @@ fn staged(stages: &[StageTable]) -> Result<Envelope, Error> {
         f.push(to);
     }
     Envelope::new(d, f).map_err(|error| {
-        Error::below(ErrorCode::Scenario, error).of("its stages make no curve").at_key("stages")
+        Error::below(ErrorCode::Scenario, error)
+            .of("its stages do not form a curve")
+            .at_key("stages")
     })
 }

@@ -1,4 +1,4 @@
-//! Springs: what a curve's source gives at one interface, and the force law made of it.
+//! Springs: the curve of a source at one interface, and its force law.
 
 use super::layout::{Connection, Role};
 use super::{CurveSource, CurveTable as Table, LawName};
@@ -8,6 +8,7 @@ use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
 use crate::surrogate::predict::predict_driving;
 use crate::surrogate::{Model, PredictedCurve, Query, Warning};
+use crate::unit::Shown;
 
 /// The curve at one interface, with its warnings.
 pub(super) struct Spring {
@@ -144,12 +145,12 @@ fn texts(warnings: &[Warning]) -> Vec<String> {
 }
 
 /// Said of a file without `# force_kind`.
-const UNKNOWN_FORCE: &str = "its file does not say which force it holds: taken as the one that moves the bodies; write \"# force_kind: body\" or \"# force_kind: contact\" into it, or force = \"…\" beside it";
+const UNKNOWN_FORCE: &str = "its file does not state which force it holds: taken as the body force; write \"# force_kind: body\" or \"# force_kind: contact\" into it, or force = \"…\" beside it";
 
-/// Said of a contact force that drives bodies of one mass without being asked for.
-const ONLY_CONTACT: &str = "it has a contact force only, which a vehicle of one mass does not follow: mass that the crush zone stops early is in it; use a body force, or split the vehicles (front, rear)";
+/// Warning for a contact force that drives bodies of one mass without being requested.
+const ONLY_CONTACT: &str = "it has a contact force only, which includes mass that the crush zone stops early and is wrong for a vehicle of one mass; use a body force, or split the vehicles (front, rear)";
 
-/// The force that drives the interface: what was asked for, or what the vehicles need; `None` for
+/// The force that drives the interface: what was requested, or what the vehicles need; `None` for
 /// the recipe's own. One mass per vehicle moves by the body force; where the crush zone has a mass
 /// of its own, the contact force drives it, and a body force would count that mass twice.
 fn which_force(
@@ -186,7 +187,7 @@ impl Spring {
         Ok(Self { curve, end, ..self })
     }
 
-    /// The force law that the curve's table asks for, with all warnings.
+    /// The force law that the curve's table specifies, with all warnings.
     pub(crate) fn law_with_warnings(
         mut self,
         table: &Table,
@@ -206,8 +207,8 @@ impl Spring {
         let mut warnings = Vec::new();
         if asked.is_none() && known.is_none() && steepest > 0.0 {
             warnings.push(format!(
-                "it has no unloading stiffness: it unloads with its steepest rise, {:.4} MN/m; how much it gives back follows from that: say unloading = \"…MN/m\"",
-                steepest / 1e6
+                "it has no unloading stiffness: it unloads with its steepest rise, {}, which decides the rebound: set unloading = \"…MN/m\"",
+                Shown::one_stiffness(steepest)
             ));
         }
         if let Some(asked) = asked
@@ -215,9 +216,9 @@ impl Spring {
             && table.stages.is_none()
         {
             warnings.push(format!(
-                "unloading {:.4} MN/m is softer than the curve's steepest rise ({:.4} MN/m): where it rises so, unloading is stiffer",
-                asked / 1e6,
-                steepest / 1e6
+                "unloading {} is softer than the curve's steepest rise ({}): there it unloads as steeply as it rises",
+                Shown::one_stiffness(asked),
+                Shown::one_stiffness(steepest)
             ));
         }
         let stiffness = asked.or(known).unwrap_or(steepest);

@@ -28,7 +28,7 @@ pub struct Scenario {
     pub(crate) wall: Option<WallTable>,
     /// Between the two noses, or nose and wall.
     pub(crate) contact: ContactTable,
-    /// Limits that results are held against.
+    /// Limits that results are compared with.
     pub(crate) limits: Option<LimitsTable>,
     /// FE's run of the whole, for `crumple compare --train`; a run takes no notice of it.
     pub(crate) reference: Option<ReferenceTable>,
@@ -46,7 +46,7 @@ pub(crate) struct LimitsTable {
     pub(crate) edition: String,
     /// Of the mean deceleration while the net contact force acts, in g.
     pub(crate) mean_deceleration_g: f64,
-    /// Trains whose vehicles (without crush zones that are masses of their own) are held against
+    /// Trains whose vehicles (without crush zones that are masses of their own) are compared with
     /// it, by name; all if absent.
     pub(crate) trains: Option<Vec<String>>,
 }
@@ -55,7 +55,7 @@ pub(crate) struct LimitsTable {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ReferenceTable {
-    /// Solver file with the nodes, such as a nodout; a case.json beside it says how long FE
+    /// Solver file with the nodes, such as a nodout; a case.json next to it says how long FE
     /// took.
     pub(crate) file: PathBuf,
     /// Units of the file, such as "mm-t-s".
@@ -119,7 +119,7 @@ pub(crate) struct CurveTable {
     pub(crate) model: Option<PathBuf>,
     /// Curve file: predicted curve (JSON), table (CSV), or any other format of `crumple db add --list`.
     pub(crate) file: Option<PathBuf>,
-    /// Of a file that does not say its units, such as "mm-t-s".
+    /// Of a file that does not state its units, such as "mm-t-s".
     #[schemars(with = "Option<String>")]
     pub(crate) units: Option<UnitSystem>,
     /// Of a file of several curves: number or name of the one that is meant.
@@ -147,14 +147,14 @@ pub(crate) struct CurveTable {
     /// What the force does beyond the curve. Default: `bottom`, as exports do, for curves of models,
     /// predicted curves and database cases; `hold` for others.
     pub(crate) end: Option<EnvelopeEnd>,
-    /// Of a model: the rule for the maximal crush; the model's own if absent.
+    /// Of a model: the rule for the maximum crush; the model's own if absent.
     #[serde(default)]
     pub(crate) max_crush: Option<MaxCrushRule>,
     /// Of a model: values of its further parameters.
     #[serde(default)]
     pub(crate) parameters: BTreeMap<String, Parameter>,
     /// Of a model, predicted curve or database case: the force that is taken; if absent the
-    /// one that the vehicles need (body force for one mass, contact force for split ones). Of a CSV file that does not say it: the force that it holds.
+    /// one that the vehicles need (body force for one mass, contact force for split ones). Of a CSV file that does not state it: the force that it holds.
     pub(crate) force: Option<ForceKind>,
     /// Of a model or predicted curve: member of the band of the force that is taken, from −1
     /// (lower edge) over 0 (the curve) to 1 (upper edge).
@@ -171,7 +171,7 @@ pub(crate) struct StageTable {
     pub(crate) name: Option<String>,
     /// Length of the stage.
     pub(crate) stroke: LengthText,
-    /// Force at the begin of the stage, 0 if absent: it steps there from the stage before.
+    /// Force at the start of the stage, 0 if absent: it steps there from the stage before.
     pub(crate) from: Option<ForceText>,
     /// Force at its end; the same as at its begin if absent.
     pub(crate) to: Option<ForceText>,
@@ -300,7 +300,7 @@ impl CrushZone<'_> {
     }
 }
 
-/// A mass split off a vehicle: it stands in front of the interface's spring, the body behind.
+/// A mass split off a vehicle: it is in front of the interface's spring, the body behind.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CrushZoneTable {

@@ -36,7 +36,7 @@ pub(crate) fn bounded(a: &[Vec<f64>], b: &[f64], upper: &[f64]) -> Vec<f64> {
 }
 
 /// Moves the free unknowns to their solution, or towards it until the first of them meets a bound
-/// and stands there; whether one did.
+/// and is there; whether one did.
 fn step_to_bound(
     a: &[Vec<f64>],
     b: &[f64],
@@ -90,7 +90,7 @@ pub(crate) struct Cholesky {
 }
 
 impl Cholesky {
-    /// Of the matrix of `n` rows with these entries; only those up to the diagonal are asked for.
+    /// Of the matrix of `n` rows with these entries; only those up to the diagonal are requested.
     pub(crate) fn of(n: usize, entry: impl Fn(usize, usize) -> f64) -> Self {
         let mut l = vec![vec![0.0; n]; n];
         for r in 0..n {

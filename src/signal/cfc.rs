@@ -9,7 +9,7 @@ use super::interpolate;
 pub enum CfcError {
     /// The samples are too far apart for the class.
     #[error(
-        "the interval of {interval_s:e} s is too long for CFC{class}: at most {longest_s:e} s; use a lower class, filter = \"none\", or output at a higher rate"
+        "the interval of {:.3} ms is too long for CFC{class}: at most {:.3} ms; use a lower class, filter = \"none\", or a shorter output interval", interval_s * 1e3, longest_s * 1e3
     )]
     TooCoarse {
         /// The class, such as 60.

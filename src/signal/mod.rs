@@ -51,7 +51,7 @@ pub fn derivative(time: &[f64], values: &[f64]) -> Vec<f64> {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("time {time_s} s lies outside the history ({first_s} s to {last_s} s)")]
 pub(crate) struct OutOfRange {
-    /// The time that was asked for.
+    /// The time that was requested.
     pub time_s: f64,
     /// The first of the history.
     pub first_s: f64,

@@ -46,7 +46,7 @@ struct Saddle {
 }
 
 /// The saddle before each value. The stack holds what no later value has yet exceeded, falling
-/// from bottom to top, each with the lowest value behind the one below it.
+/// from bottom to top, each with the lowest value after the one below it.
 fn saddles<'a>(values: impl Iterator<Item = &'a f64>) -> Vec<Saddle> {
     let mut stack: Vec<(f64, f64)> = Vec::new();
     values

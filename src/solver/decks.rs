@@ -1,4 +1,4 @@
-//! The deck of a run: found beside its files, read with its includes, held against them.
+//! The deck of a run: found next to its files, read with its includes, compared with them.
 
 use std::collections::HashMap;
 use std::io::{self, BufRead, BufReader};
@@ -12,15 +12,15 @@ use crate::file;
 
 /// Endings of keyword decks.
 const ENDINGS: [&str; 5] = ["k", "key", "dyn", "dyna", "kwd"];
-/// Names of a folder that are looked at, and decks among them that are read.
+/// Names of a folder that are examined, and decks among them that are read.
 const MAX_NAMES: usize = 10_000;
 const MAX_DECKS: usize = 20;
 /// Bytes by which text that is not plain is known.
 const HEAD: usize = 16;
-/// Lines looked at for the first keyword.
+/// Lines examined for the first keyword.
 const HEAD_LINES: usize = 1_000;
 
-/// What a folder has of decks.
+/// The decks of a folder.
 pub(crate) enum Search {
     None,
     /// The only deck, or the one that includes the others.
@@ -29,7 +29,7 @@ pub(crate) enum Search {
     Several(Vec<PathBuf>),
 }
 
-/// Reads a deck; included files are looked for beside it.
+/// Reads a deck; included files are looked for next to it.
 ///
 /// # Errors
 /// If the deck itself cannot be read.
@@ -105,7 +105,7 @@ pub(crate) fn find(folder: &Path) -> io::Result<Search> {
     })
 }
 
-/// The only deck beside the file at `path`, or the one that includes the others, if it can be read.
+/// The only deck next to the file at `path`, or the one that includes the others, if it can be read.
 pub(crate) fn beside(path: &Path) -> Option<(PathBuf, Deck)> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     match find(folder) {

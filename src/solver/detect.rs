@@ -1,4 +1,4 @@
-//! The kinds of files that are read, and which one a file is: told by its content, and by its name where that is not enough.
+//! The kinds of files that are read, and which one a file is: recognised by its content, and by its name where that is not enough.
 
 use std::io::Read;
 use std::path::Path;
@@ -10,7 +10,7 @@ use super::{SolverFile, lsdyna, openradioss, unknown_format};
 use crate::error::{Error, error};
 use crate::guess;
 
-/// Every file we read, in the order in which their signatures are tried. To add one: write its
+/// All files we read, in the order in which their signatures are tried. To add one: write its
 /// module with its `FORMAT`, and add that here.
 pub const FORMATS: &[Format] = &[
     lsdyna::nodout::FORMAT,
@@ -36,7 +36,7 @@ pub const FORMATS: &[Format] = &[
     openradioss::FORMAT,
 ];
 
-/// What an id of this format or section counts, for messages.
+/// Kind of entity of this format or section, for messages.
 pub(crate) fn entity_word(section: &str) -> &'static str {
     let name = section.strip_suffix("/forces").unwrap_or(section);
     FORMATS.iter().find(|format| format.name == name).map_or("entity", |format| format.entity)
@@ -55,7 +55,7 @@ pub(super) fn named(name: &str) -> Result<&'static Format, Error> {
     })
 }
 
-/// Lines looked at before a file counts as unknown: more than the longest legend seen,
+/// Lines examined before a file counts as unknown: more than the longest legend seen,
 /// few enough that a large foreign file is refused at once.
 const DETECT_LINES: u64 = 100_000;
 
@@ -84,8 +84,8 @@ pub(super) fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format
 
 const NOT_RECOGNISED: &str = "no solver output is recognised in it";
 
-/// The format that the content tells, and whether it has the header of LS-DYNA's text files. Where lines of several
-/// kinds stand in a file, those of the kind that it is `named` by count.
+/// The format found in the content, and whether it has the header of LS-DYNA's text files. Where lines of several
+/// kinds are in a file, those of the kind that it is `named` by count.
 fn look_at(
     path: &Path,
     source: &dyn Source,
@@ -144,7 +144,7 @@ fn look_at(
     Ok((first, is_lsdyna))
 }
 
-/// Holds a named format against what the file looks like, if nothing was read by it.
+/// Compares a named format with the content of the file, if nothing was read by it.
 pub(super) fn check_format(
     path: &Path,
     format: &Format,
@@ -157,12 +157,12 @@ pub(super) fn check_format(
     match look_at(path, source, None)? {
         (Some(found), _) if found.name != format.name => Err(error!(
             SolverFile,
-            "{}: this is not a {}: it looks like a {}, read it as that",
+            "{}: this is not a {}: it looks like a {}: read it as such",
             path.display(),
             format.name,
             found.name
         )),
-        // A file that ends after its header tells no format, nor does one that has just begun.
+        // A file that ends after its header has no recognisable format; neither has one that was just started.
         (None, false) if source.size().is_ok_and(|size| size > 0) => {
             Err(unknown_format(path, NOT_RECOGNISED))
         }

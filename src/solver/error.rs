@@ -1,7 +1,7 @@
-//! Selections held against what a file has.
+//! Selections checked against the content of a file.
 //!
-//! Errors are about a key that callers know to answer: `format` if no reader knows the file, `deck` for a
-//! keyword deck, `ids[k]` and `component` for what was selected and is not there.
+//! Errors name a key that callers can handle: `format` if no reader knows the file, `deck` for a
+//! keyword deck, `ids[k]` and `component` for what was selected and is missing.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use super::{Entity, NoDataReason, Selection, SolverFile};
 use crate::error::{Error, KeyPath, error};
 use crate::guess;
 
-/// Holds every selected id and component against what the file has.
+/// Checks every selected id and component against the file.
 pub(super) fn check_selection(
     path: &Path,
     file: &SolverFile,

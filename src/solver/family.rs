@@ -1,4 +1,4 @@
-//! Which files make up one: the continuations of a binary file, a run's several binouts, the histories of its restarts.
+//! Which files belong together: the continuations of a binary file, a run's several binouts, the histories of its restarts.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ pub(crate) fn family(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut parts = with_continuations(path)?;
     let name = name_of(path);
     if let Some(number) = restart_number(&name) {
-        // Only the first of them stands for all, so that each can still be looked at alone.
+        // Only the first of them includes all, so that each can still be read alone.
         let is_first = number == 1 || !is_file(&restart(path, number - 1))?;
         for next in (number + 1..=LAST_RESTART).map(|n| restart(path, n)) {
             if !is_first || !is_file(&next)? {
@@ -34,7 +34,7 @@ pub(crate) fn family(path: &Path) -> Result<Vec<PathBuf>, Error> {
         others.extend(other.map(|(_, number)| (number, entry.path())));
     }
     others.sort();
-    // Only the first of them stands for all, so that each can still be looked at alone.
+    // Only the first of them includes all, so that each can still be read alone.
     if others.first().is_some_and(|(first, _)| *first == number) {
         for (_, other) in others.iter().skip(1) {
             if is_file(other)? {
@@ -45,7 +45,7 @@ pub(crate) fn family(path: &Path) -> Result<Vec<PathBuf>, Error> {
     Ok(parts)
 }
 
-/// What stands before `binout0000`, a job id or nothing, and its digits.
+/// The text before `binout0000`, a job id or nothing, and its digits.
 fn process_number(name: &str) -> Option<(&str, u32)> {
     let (job, digits) = name.rsplit_once("binout")?;
     let is_job = job.is_empty() || job.ends_with('.');
@@ -92,7 +92,7 @@ pub(super) fn is_continuation(path: &Path) -> bool {
     path.file_name().is_some_and(|name| name.to_string_lossy().contains('%'))
 }
 
-/// Continuations looked for behind one that is missing.
+/// Continuations looked for after one that is missing.
 const MAX_MISSING_FILES: usize = 20;
 
 /// The first continuation that is missing although others are there, of any of the files, and what is therefore not
@@ -102,7 +102,7 @@ pub(crate) fn missing_continuation(path: &Path) -> Result<Option<String>, Error>
         let before = restart(path, number.saturating_sub(1));
         if number > 1 && !is_file(&before)? {
             let missing = name_of(&before);
-            return Ok(Some(format!("{missing} is not there, so that the record begins late")));
+            return Ok(Some(format!("{missing} is missing, so the record starts late")));
         }
         let next = number + family(path)?.len() as u32;
         return unread_behind((next..=LAST_RESTART).map(|n| restart(path, n)));
@@ -118,7 +118,7 @@ pub(crate) fn missing_continuation(path: &Path) -> Result<Option<String>, Error>
     Ok(None)
 }
 
-/// What is not read because the first of these files is missing, if another is there.
+/// The files not read because the first of them is missing.
 fn unread_behind(mut files: impl Iterator<Item = PathBuf>) -> Result<Option<String>, Error> {
     let Some(missing) = files.next() else { return Ok(None) };
     if is_file(&missing)? {
@@ -127,9 +127,7 @@ fn unread_behind(mut files: impl Iterator<Item = PathBuf>) -> Result<Option<Stri
     for file in files {
         if is_file(&file)? {
             let missing = name_of(&missing);
-            return Ok(Some(format!(
-                "{missing} is not there, so that what continues behind it is not read"
-            )));
+            return Ok(Some(format!("{missing} is missing, so its continuation is not read")));
         }
     }
     Ok(None)

@@ -9,7 +9,7 @@ use super::{Selection, SolverFile, problem};
 pub struct Format {
     /// Named as the solver names the file.
     pub name: &'static str,
-    /// What an id in it counts, for messages.
+    /// Kind of its entities, for messages.
     pub(super) entity: &'static str,
     reader: Reader,
 }
@@ -21,7 +21,7 @@ type ReadText = fn(&'static Format, &dyn Source, &Selection) -> io::Result<Solve
 enum Reader {
     /// Lines of text. A signature is a line below the header that shows the kind.
     Text { signature: fn(&[u8]) -> bool, read: ReadText },
-    /// Bytes, told by the first of them; over one or several files; sections inside.
+    /// Bytes, recognised by the first of them; over one or several files; sections inside.
     Binary { recognises: fn(&[u8]) -> bool, read: ReadSections },
 }
 

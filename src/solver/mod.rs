@@ -1,8 +1,8 @@
 //! Solver files: from bytes to [`History`](crate::history::History).
 //!
 //! A reader takes a [`Source`] and a [`Selection`], returns a [`SolverFile`], and treats
-//! damage as part of the result ([`Problem`]): complete states are returned, what is
-//! missing is named. It never prints, panics, or holds more than was selected.
+//! damage as part of the result ([`Problem`]): complete states are returned, missing
+//! parts are named. It never prints, panics, or holds more than was selected.
 //!
 //! ```
 //! use crumple::solver::{Selection, read};
@@ -63,7 +63,7 @@ pub use source::{Access, Source, Window};
 
 /// Reads the selected histories of the file at `path`, of one section.
 ///
-/// `format` names the kind of file; without it the kind is told by the content and,
+/// `format` names the kind of file; without it the kind is recognised by the content and,
 /// for a file that ends after its header, by the name of the file or of its folder.
 ///
 /// # Errors
@@ -109,7 +109,7 @@ fn listed(sections: &[SolverFile]) -> String {
 }
 
 /// Reads the selected histories of every section of the file at `path`, or of the one
-/// selected. Ids and components are not held against what a section has.
+/// selected. Ids and components are not compared with what a section has.
 ///
 /// # Errors
 /// If the file cannot be opened or its kind is not known.
@@ -170,7 +170,7 @@ fn open(
         ));
     }
     // Before the first is opened: its size is then fixed, and what a run wrote into a
-    // continuation that began later would stand behind a hole.
+    // continuation that began later would are after a hole.
     let family = family(path)?;
     let first = source::open(path, selection.access).map_err(io)?;
     let format = match format {

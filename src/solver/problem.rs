@@ -162,7 +162,7 @@ impl Diagnostics {
         self.add(code, Some(Place::at_byte(byte)), None, message);
     }
 
-    /// Adds the problems of another list behind these.
+    /// Adds the problems of another list after these.
     pub(crate) fn append(&mut self, other: Self) {
         let room = MAX_KEPT - self.kept.len();
         self.dropped += other.dropped + other.kept.len().saturating_sub(room);

@@ -7,7 +7,7 @@ use super::problem::{Diagnostics, Place, Problem, ProblemCode};
 /// it, and is named.
 ///
 /// `is_same`: whether a state is written again by another of its time below it; `None` if the
-/// file does not tell.
+/// file does not state it.
 /// `place`: where a state begins. `of`: what stands ahead of each message.
 ///
 /// Returns the indices, increasing, and what was left out or is out of order.
@@ -41,7 +41,7 @@ pub(crate) fn resolve(
             if let (Some(&first), Some(&last)) = (left_out.first(), left_out.last()) {
                 let twice = || {
                     format!(
-                        "{of}the state at time {:?} is written twice: the last writing counts",
+                        "{of}the state at time {:?} is written twice: the last one counts",
                         time[i]
                     )
                 };
@@ -67,7 +67,7 @@ pub(crate) fn resolve(
 const STEPS: f64 = 10.0;
 
 /// Whether two states of one time are the same one: neighbours at other times are much further
-/// away than the last of the times' digits can tell.
+/// away than the last digit of the times can resolve.
 pub(crate) fn is_known_apart(time: &[f64], above: usize, below: usize, digits: i32) -> bool {
     let at = time[below];
     let before = time[..above].iter().rev().find(|&&t| t != at);

@@ -1,4 +1,4 @@
-//! Run folders: which folders below one hold solver files, and which files of a folder those are.
+//! Run folders: which folders below one contain solver files, and which files those are.
 
 use std::collections::HashSet;
 use std::fs;
@@ -11,21 +11,21 @@ use super::is_output;
 use super::source::{self, Access};
 use crate::file::is_file;
 
-/// Folders deeper than this are not looked into.
+/// Folders deeper than this are not examined.
 const DEEPEST: usize = 12;
-/// Folders that are looked into, so that a whole disk is not walked.
+/// Folders that are examined, so that a whole disk is not walked.
 const MOST_FOLDERS: usize = 20_000;
-/// Names of one folder that are looked at.
+/// Names of one folder that are examined.
 const MOST_NAMES: usize = 100_000;
 
-/// What stands below a folder.
+/// What is below a folder.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct RunFolders {
-    /// Folders with solver files, in order of their names; nothing below them is looked at.
+    /// Folders with solver files, in order of their names; nothing below them is examined.
     pub runs: Vec<PathBuf>,
     /// Folders that hold neither solver files nor folders, likewise.
     pub without_files: Vec<PathBuf>,
-    /// Folders that cannot be looked into, each with the reason.
+    /// Folders that cannot be examined, each with the reason.
     pub unreadable: Vec<(PathBuf, String)>,
 }
 
@@ -59,7 +59,7 @@ pub(crate) fn output_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
             files.push(path);
         }
     }
-    // Other files end like the history of a restart, too: what is in them tells.
+    // Other files end like the history of a restart, too: their content decides.
     let is_restart = |name: &str| restart_number(name).is_some_and(|number| number > 1);
     files.retain(|path| {
         let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
@@ -101,7 +101,7 @@ struct Walk {
     /// The real place of the folder that was given.
     root: PathBuf,
     found: RunFolders,
-    /// Real places of the folders that were looked into: links may lead in circles.
+    /// Real places of the folders that were examined: links may lead in circles.
     seen: HashSet<PathBuf>,
 }
 

@@ -1,4 +1,4 @@
-//! What is asked of a file: which entities, which components, which section.
+//! What is selected from a file: which entities, which components, which section.
 
 use super::Access;
 use crate::history::{EntityId, Side};
@@ -6,7 +6,7 @@ use crate::history::{EntityId, Side};
 /// Which entity is wanted: an id, on both sides of an interface unless one is named.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WantedId {
-    /// As the file has it.
+    /// As in the file.
     pub id: i64,
     /// `None` for both sides.
     pub side: Option<Side>,

@@ -1,4 +1,4 @@
-//! What reading a file gives.
+//! The result of reading a file.
 
 use std::sync::Arc;
 
@@ -21,7 +21,7 @@ pub struct Entity {
 /// An entity that the file names without giving it values.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct WithoutData {
-    /// As the legend has it.
+    /// As in the legend.
     pub id: i64,
     /// `None` where the legend gives none.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -47,9 +47,9 @@ pub struct SolverFile {
     pub format: &'static str,
     /// Section of a binary file; of a text file its format's name.
     pub section: String,
-    /// Name of the solver, where the file tells.
+    /// Name of the solver, if the file states it.
     pub solver: Option<String>,
-    /// Version of the solver, where the file tells.
+    /// Version of the solver, if the file states it.
     pub version: Option<String>,
     /// Title of the run.
     pub title: Option<String>,

@@ -1,8 +1,8 @@
 //! Where bytes come from: files, memory maps and memory, read at a position.
 //!
-//! Plain reading is the default, because the file of a run that is still going may grow or
+//! Plain reading is the default, because the file of a running job may grow or
 //! shrink at any time: a plain read then ends early, while the access to a map beyond the
-//! end of its file kills the process. What is written behind the opening is not there for a
+//! end of its file kills the process. Data written after opening are ignored by a
 //! reader: its end would move while it reads, and half a line would be followed by another.
 
 use std::fs::File;
@@ -93,7 +93,7 @@ struct Mapped(memmap2::Mmap);
 impl Mapped {
     #[allow(unsafe_code, reason = "a map is only as safe as its file; see Access::Map")]
     fn new(file: &File) -> io::Result<Self> {
-        // SAFETY: the user asked for a map and so promised that nothing writes to the file.
+        // SAFETY: the user requested a map and so promised that nothing writes to the file.
         unsafe { memmap2::Mmap::map(file) }.map(Self)
     }
 }
@@ -147,11 +147,11 @@ impl Source for Vec<u8> {
 /// What a file is that begins so, and what to do, if it is compressed or no plain text.
 pub(crate) fn encoded(head: &[u8]) -> Option<&'static str> {
     const ENCODED: [(&[u8], &str); 7] = [
-        (b"\x1f\x8b", "this is compressed by gzip, which gunzip undoes"),
-        (b"BZh", "this is compressed by bzip2, which bunzip2 undoes"),
-        (b"\xfd7zXZ\0", "this is compressed by xz, which unxz undoes"),
-        (b"\x28\xb5\x2f\xfd", "this is compressed by zstd, which unzstd undoes"),
-        (b"PK\x03\x04", "this is a zip archive, which unzip unpacks"),
+        (b"\x1f\x8b", "this is compressed with gzip (unpack it with gunzip)"),
+        (b"BZh", "this is compressed with bzip2 (unpack it with bunzip2)"),
+        (b"\xfd7zXZ\0", "this is compressed with xz (unpack it with unxz)"),
+        (b"\x28\xb5\x2f\xfd", "this is compressed with zstd (unpack it with unzstd)"),
+        (b"PK\x03\x04", "this is a zip archive (unpack it with unzip)"),
         (b"\xff\xfe", UTF_16),
         (b"\xfe\xff", UTF_16),
     ];
@@ -165,7 +165,7 @@ pub(crate) fn encoded(head: &[u8]) -> Option<&'static str> {
     (pairs.len() >= 4 && (is_utf_16(0) || is_utf_16(1))).then_some(UTF_16)
 }
 
-const UTF_16: &str = "this is UTF-16 text, which iconv -f UTF-16 -t UTF-8 makes plain";
+const UTF_16: &str = "this is UTF-16 text (convert it with iconv -f UTF-16 -t UTF-8)";
 
 /// Fills as much of `buffer` as the source has from `offset` on; returns how much.
 pub(crate) fn fill_at(source: &dyn Source, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {

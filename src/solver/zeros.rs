@@ -1,6 +1,6 @@
-//! Zeros that look like an overwritten part of a binary file, which has no check sums.
+//! Zeros that look like an overwritten part of a binary file, which has no checksums.
 //!
-//! One value, or all of one entity's, may be zero in one state by physics: a node stands on
+//! One value, or all of one entity's, may be zero in one state for physical reasons: a node rests on
 //! a wall, a contact is lost. So only several values next to each other are named.
 
 use std::collections::HashMap;
@@ -28,17 +28,17 @@ const MAY_VANISH: [&str; 12] = [
 /// Entities next to each other that lose one component in one state before that is named.
 const ENTITIES: usize = 3;
 
-/// Whether all components of an entity are needed to tell damage from a quantity that is
+/// Whether all components of an entity are needed to distinguish damage from a quantity that is
 /// zero for one state.
 pub(crate) fn may_vanish(section: &str) -> bool {
     MAY_VANISH.contains(&section)
 }
 
-/// Names the states in which a component is exactly zero for several entities beside each
+/// Names the states in which a component is exactly zero for several entities next to each
 /// other, though it is not in the states around it (at the ends of a history: in the one
-/// beside it), and for most of them returns to about what it was.
+/// next to it), and for most of them returns to about what it was.
 ///
-/// The last tells zeros that were written over values from a front that stands on a wall for
+/// The last distinguishes zeros that overwrote values from a front that rests on a wall for
 /// one state. Forces may vanish together: there, another component of the entity must be
 /// there in that state, because a lost contact loses all.
 pub(crate) fn suspect(section: &str, histories: &[History]) -> Vec<Problem> {
@@ -96,7 +96,7 @@ struct Run {
     /// Indices of the first and the last history.
     first: usize,
     last: usize,
-    /// How many are behind it about what they were before.
+    /// How many are after it about what they were before.
     returning: usize,
 }
 
@@ -113,7 +113,7 @@ impl Run {
         let Self { state, first, last, .. } = *self;
         let at = histories[first].time.get(state).copied().unwrap_or(f64::NAN);
         let message = format!(
-            "{section}: {} values of state {} (time {at:?}), {} to {}, are zero but not so in the states around it: was the file overwritten there?",
+            "{section}: {} values of state {} (time {at:?}), {} to {}, are zero, but not in the states around it: was the file overwritten there?",
             last - first + 1,
             state + 1,
             histories[first].label(),
@@ -140,8 +140,8 @@ fn vanishing(values: &[f64]) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Whether a value is behind a state about what it was before: of the same sign and at most
-/// twice as large. At the last state this cannot be told.
+/// Whether a value is after a state about what it was before: of the same sign and at most
+/// twice as large. At the last state this cannot be determined.
 fn returns(values: &[f64], state: usize) -> bool {
     let (before, behind) = (values[state - 1], values.get(state + 1).copied());
     behind.is_none_or(|behind| (0.5..=2.0).contains(&(behind / before)))

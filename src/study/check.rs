@@ -1,4 +1,4 @@
-//! What of a study manifest only the whole shows.
+//! Checks of a study manifest across several keys.
 
 use std::collections::HashSet;
 
@@ -30,7 +30,7 @@ pub(super) fn check(manifest: &Manifest) -> Result<(), Error> {
         (StudyKind::Pair, true, true) => {
             return Err(error!(
                 Study at "study.half_model",
-                "half_model = true doubles the deflection, which a minus_node already makes whole: keep one of them"
+                "half_model = true doubles the deflection, which minus_node already completes: keep one of them"
             ));
         }
         (StudyKind::Wall, true, _) => {
@@ -65,7 +65,7 @@ fn check_contact(recipe: &Recipe) -> Result<(), Error> {
     if let Some(share) = recipe.contact_threshold.filter(|share| !(*share > 0.0 && *share < 1.0)) {
         return Err(error!(
             Study at "recipe.contact_threshold",
-            "recipe.contact_threshold = {share} is not a share of the largest force: write a number above 0 and below 1, such as 0.005"
+            "recipe.contact_threshold = {share} is not a fraction of the peak force: write a number above 0 and below 1, such as 0.005"
         ));
     }
     match (&recipe.contact, &recipe.force) {
@@ -141,7 +141,7 @@ fn check_parameters(entry: &RunEntry) -> Result<(), Error> {
 /// Longest name, in bytes, as databases take it.
 const MAX_NAME: usize = 200;
 
-/// Names stand in files, tables and HDF5 paths.
+/// Names appear in files, tables and HDF5 paths.
 fn check_name(key: &str, name: &str, slash: bool) -> Result<(), Error> {
     let shown = name.escape_debug();
     if name.trim().is_empty() || name == "." || name == ".." {

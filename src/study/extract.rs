@@ -12,7 +12,7 @@ use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::file::is_file;
 use crate::history::History;
 use crate::solver::{self, Selection, SolverFile, WantedId};
-use crate::unit::UnitSystem;
+use crate::unit::{Shown, UnitSystem};
 
 impl LocatedRun<'_> {
     /// Reads the selected histories and extracts the case.
@@ -59,11 +59,11 @@ impl LocatedRun<'_> {
             (None, None) => {
                 let deck = match &self.deck {
                     Some(deck) => format!("the deck {} states none", deck.file.path.display()),
-                    None => "the run has no deck that could".into(),
+                    None => "the run has no deck that could state them".into(),
                 };
                 return Err(error!(
                     Run,
-                    "the manifest gives no units and {deck}: add units = \"mm-t-s\" (or what they are) to [study]"
+                    "the manifest gives no units and {deck}: add units = \"mm-t-s\" (or the actual ones) to [study]"
                 )
                 .at(KeyPath::of("study")));
             }
@@ -105,7 +105,7 @@ impl LocatedRun<'_> {
         })
     }
 
-    /// That the kinetic energy at the start, in a glstat beside the run, asks for another mass: a
+    /// That the kinetic energy at the start, in a glstat next to the run, asks for another mass: a
     /// body force is in balance with every mass.
     fn mass_by_energy(
         &self,
@@ -145,10 +145,10 @@ impl LocatedRun<'_> {
         let ratio = found_j / stated_j;
         ((ratio - 1.0).abs() > SAME_ENERGY).then(|| {
             format!(
-                "mass: glstat has {:.4} MJ at the start, the masses of the manifest have {:.4} MJ: the mass of the run is wrong ({:.4} t would agree), or more moves than its bodies",
-                found_j / 1e6,
-                stated_j / 1e6,
-                ratio * masses.body_kg / 1e3
+                "mass: glstat has {} at the start, the masses of the manifest give {}: the mass of the run is wrong ({} would agree), or more than its bodies moves",
+                Shown::one_energy(found_j),
+                Shown::one_energy(stated_j),
+                Shown::one_mass(ratio * masses.body_kg)
             )
         })
     }
@@ -336,7 +336,7 @@ fn is_same(read: &SolverFile, twin: &SolverFile) -> bool {
 pub(crate) fn is_alike(a: &[f64], b: &[f64]) -> bool {
     let finite = a.iter().filter(|v| v.is_finite());
     let largest = finite.fold(0.0, |m: f64, v| m.max(v.abs()));
-    // A number that is not there must not be there in the other either.
+    // A number that is missing must not be there in the other either.
     let differ =
         |a: f64, b: f64| (a - b).abs() > SAME_VALUE * largest || a.is_finite() != b.is_finite();
     a.len() == b.len() && !a.iter().zip(b).any(|(a, b)| differ(*a, *b))

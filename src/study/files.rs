@@ -17,7 +17,7 @@ pub(super) struct Located {
     pub path: PathBuf,
     /// Section of a binary file; `None` for a text file.
     pub section: Option<String>,
-    /// A binary file beside the text file that has the same section.
+    /// A binary file next to the text file that has the same section.
     pub twin: Option<(PathBuf, String)>,
     pub size_bytes: u64,
     pub blake3: String,
@@ -46,7 +46,7 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
         }
         let sections = match solver::read_sections(&path, None, &names_only) {
             Ok(sections) => sections,
-            // Only named like one; or broken, which matters where the text is not there.
+            // Only named like one; or broken, which matters where the text is missing.
             Err(error) if error.is_about("format") => continue,
             Err(error) if is_text && error.code() != ErrorCode::Io => continue,
             Err(error) => return Err(error.at(KeyPath::default())),
@@ -64,7 +64,7 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
         }
     }
     let (path, section, twin) = match (is_text, binout) {
-        // A solver that was asked for the binary file alone may leave the header of the text.
+        // A solver that was requested the binary file alone may leave the header of the text.
         (true, Some((path, section))) if is_without_states(&text) => (path, Some(section), None),
         (true, twin) => (text, None, twin),
         (false, Some((path, section))) => (path, Some(section), None),
@@ -132,7 +132,7 @@ pub(super) fn hashed_family(
     Ok(Located { file: name.into(), size_bytes, blake3, path, section: None, twin: None })
 }
 
-/// Size and BLAKE3 of files one behind the other.
+/// Size and BLAKE3 of files one after the other.
 pub(crate) fn content_hash(parts: &[PathBuf]) -> Result<(u64, String), Error> {
     let mut hasher = blake3::Hasher::new();
     for part in parts {

@@ -15,7 +15,7 @@ use crate::solver::{self, Selection};
 /// Part of every fingerprint: raise it when the extraction gives other numbers.
 const EXTRACTION_VERSION: u32 = 4;
 
-/// Most bytes of a run's case.json, which has some hundred.
+/// Maximum number of bytes of a run's case.json, which has some hundred.
 const MAX_CASE_BYTES: u64 = 1 << 20;
 
 /// The keyword deck of a run.

@@ -29,13 +29,13 @@ pub struct Manifest {
 pub(crate) struct StudyHeader {
     /// Name of the study.
     pub name: String,
-    /// Units of the solver's files: "SI", "mm-t-s", "kg-mm-ms", …; taken from the runs' decks
+    /// Units of the solver files: "SI", "mm-t-s", "kg-mm-ms", …; taken from the runs' decks
     /// if absent.
     #[schemars(with = "Option<String>")]
     pub units: Option<UnitSystem>,
     /// Group of the curve database.
     pub group: String,
-    /// What hits what.
+    /// Kind of impact.
     pub kind: StudyKind,
     /// The pair is modelled as one body against its symmetry plane: closing speed and
     /// deflection are twice the run's.
@@ -47,7 +47,7 @@ pub(crate) struct StudyHeader {
     pub accept_energy: bool,
 }
 
-/// What hits what.
+/// Kind of impact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum StudyKind {
@@ -58,7 +58,7 @@ pub(crate) enum StudyKind {
 }
 
 impl StudyKind {
-    /// As a manifest has it: `wall` or `pair`.
+    /// As in a manifest: `wall` or `pair`.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Wall => "wall",
@@ -71,7 +71,7 @@ impl StudyKind {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RunEntry {
-    /// Folder with the solver's files, relative to the manifest.
+    /// Folder with the solver files, relative to the manifest.
     pub path: String,
     /// Name of the case; the path if absent.
     pub name: Option<String>,
@@ -93,7 +93,7 @@ pub(crate) struct RunEntry {
     /// Deflection at contact: above 0 for a record that begins crushed, below 0 for slack that
     /// is not crush.
     pub offset: Option<SignedLengthText>,
-    /// Solver's time behind which the record is not used.
+    /// Solver's time after which the record is not used.
     pub truncate: Option<InstantText>,
     /// 1 or -1: the factor that makes the file's force positive in compression; found from its
     /// impulse if absent.

@@ -1,24 +1,24 @@
-//! Bands: how far FE curves lay from the model at speeds it had not seen.
+//! Bands: deviation of FE curves from the model at speeds it was not trained on.
 //!
-//! The half width is Student's t times the root mean square of the left-out residuals, in ratio to the local level of
+//! The half width is Student's t times the root mean square of the left-out residuals, relative to the local level of
 //! the force. (A pointwise quantile of two to five residuals would be their largest and promise more than they can.)
 //! Neighbouring residuals of a curve belong to one fold and are one observation; its folds are several. So t has the
 //! degrees of freedom of the stretches over which a curve's residuals are alike. The band that must hold a whole curve
-//! has those of the curves, and so have bands outside the training speeds, where a whole curve drifts away. Each says on
-//! how many curves it rests.
+//! has those of the curves, and so have bands outside the training speeds, where a whole curve drifts away. Each states on
+//! how many curves it is based.
 //!
-//! A speed that is left out opens a gap about twice as wide as a query finds. So residuals are divided by the power 0.65
+//! Leaving out a speed opens a gap about twice as wide as a query encounters. So residuals are divided by the power 0.65
 //! of their gap, and the band is the result times the same power of the query's gap: the distance between the two
-//! training speeds around it; at a training speed, the wider of the two gaps beside it. A left-out speed lies in the
-//! middle of its gap, so it does not tell how fast errors fall towards the gap's ends.
+//! training speeds around it; at a training speed, the wider of the two adjacent gaps. A left-out speed lies in the
+//! middle of its gap, so it does not show how fast errors decrease towards the gap's ends.
 //!
-//! Where speeds have several runs, their scatter is a part of its own: what a single run differs from the mean of its
-//! like by no gap can change. A left-out residual is that of interpolation plus the scatter of the runs it is measured
-//! against, of n the n-th part, which is taken off its square; the half width is the root of the squares of both parts.
+//! If speeds have several runs, their scatter is a separate part: the deviation of a single run from the mean of its
+//! kind does not depend on the gap. A left-out residual is that of interpolation plus the scatter of the runs it is measured
+//! against (for n runs the n-th part), which is subtracted from its square; the half width is the root of the squares of both parts.
 //!
-//! The declared force and the body force have a band each, made in the same way of their own residuals and scatter.
+//! The declared force and the body force each have a band, from their own residuals and scatter.
 //!
-//! Outside the training speeds, the two ends that were left out tell, in proportion to the distance. Further outside than
+//! Outside the training speeds, the band is based on the two left-out ends, in proportion to the distance. Further outside than
 //! a third of the range, a prediction needs `--extrapolate`. In multi-body runs this is only a warning: inside a train,
 //! interfaces close far more slowly than any run by itself.
 
@@ -42,10 +42,10 @@ const WIDEST: f64 = 1e6;
 )]
 #[serde(rename_all = "snake_case")]
 pub enum LeftOutSpeeds {
-    /// Speeds between others: they tell of queries between training speeds.
+    /// Speeds between others: for queries between training speeds.
     #[default]
     Inner,
-    /// The lowest and the highest: they tell of queries outside the training speeds.
+    /// The lowest and the highest: for queries outside the training speeds.
     Ends,
 }
 
@@ -70,7 +70,7 @@ impl LeftOutSpeeds {
 
 /// An empirical range around a predicted force, from the residuals of left-out speeds.
 ///
-/// Residuals are taken in ratio to the local level of the force, and to the span over which each
+/// Residuals are taken relative to the local level of the force, and to the span over which each
 /// was predicted: a left-out speed opens a wider gap than a query finds. With a handful of curves
 /// no level can be guaranteed; the range is the one that a further residual of the same kind
 /// would keep to: their root mean square times Student's t, for as many independent stretches as the
@@ -92,7 +92,7 @@ pub struct Band {
     pub pointwise_share: f64,
     /// Half width that the whole curve keeps to.
     pub simultaneous_share: f64,
-    /// The part of both that comes from the scatter between equal runs, whatever the span; the
+    /// The part of both that comes from the scatter between repeated runs, whatever the span; the
     /// squares of it and of the error of interpolation add. Absent without such runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scatter: Option<ScatterWidths>,
@@ -102,20 +102,20 @@ pub struct Band {
     pub coverage: Option<f64>,
 }
 
-/// Half widths that the scatter between equal runs gives by itself: Student's t times its root mean
+/// Half widths that the scatter between repeated runs gives by itself: Student's t times its root mean
 /// square.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ScatterWidths {
-    /// As of [`Band::pointwise_share`].
+    /// As for [`Band::pointwise_share`].
     pub pointwise_share: f64,
-    /// As of [`Band::simultaneous_share`].
+    /// As for [`Band::simultaneous_share`].
     pub simultaneous_share: f64,
 }
 
-/// Scatter of one force between equal runs, in ratio to its local level.
+/// Scatter of one force between repeated runs, relative to its local level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ForceScatter {
-    /// Runs at the speeds that have several, less one for the mean of each.
+    /// Runs at the speeds that have several, minus one for the mean of each.
     pub degrees_of_freedom: usize,
     /// Root mean square of the residuals.
     pub force_share: f64,
@@ -138,10 +138,10 @@ fn without(whole: f64, part: f64) -> f64 {
     (whole * whole - part * part).max(0.0).sqrt()
 }
 
-/// Residuals of one left-out curve in ratio to the local level of the prediction.
+/// Residuals of one left-out curve relative to the local level of the prediction.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Residuals {
-    /// Over which it was predicted, as of [`Band::span_m_per_s`].
+    /// Over which it was predicted, as for [`Band::span_m_per_s`].
     pub span_m_per_s: f64,
     pub ratios: Vec<f64>,
     /// How many runs the left-out curve is the mean of.
@@ -183,7 +183,7 @@ pub(crate) fn ratios(reference_n: &[f64], predicted_n: &[f64]) -> Vec<f64> {
 /// outside of all; `None` for fewer than two speeds. `speeds` do not fall.
 ///
 /// At a training speed it is the wider of the gaps that end there: left-out speeds lie in the
-/// middle of their gaps and do not tell how fast the error falls towards the ends of one.
+/// middle of their gaps and do not show how fast the error decreases towards the ends of one.
 pub(crate) fn gap_m_per_s(speeds: &[f64], v: f64) -> Option<f64> {
     let mut speeds = speeds.to_vec();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
@@ -342,8 +342,8 @@ impl Band {
 
 /// The band at speed `v` of a model of these training speeds, which do not fall.
 ///
-/// Outside of them it is what the ends tell, growing with the distance, but never narrower than
-/// just inside; `None` where nothing that was left out tells of it.
+/// Outside of them it follows the ends, growing with the distance, but never narrower than
+/// just inside; `None` if nothing left out covers it.
 pub(crate) fn at(inner: Option<Band>, ends: Option<Band>, speeds: &[f64], v: f64) -> Option<Band> {
     let inside = inner.zip(gap_m_per_s(speeds, v)).and_then(|(band, gap)| band.over(gap));
     let distance = distance_outside_m_per_s(speeds, v);

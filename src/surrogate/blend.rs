@@ -1,17 +1,17 @@
 //! How much of each run goes into a value at another impact speed.
 //!
-//! The values of the runs are taken for a smooth function of the impact speed with noise, a Gaussian
+//! The values of the runs are modelled as a smooth function of the impact speed with noise, a Gaussian
 //! process of unknown mean (ordinary kriging: Rasmussen and Williams, Gaussian Processes for Machine
-//! Learning, 2006, sections 2.2, 2.7 and 4.2). A run that stands out from the others does so by a fold of its
-//! own, which its neighbours in speed need not have. What a run has beside the smooth function fades with
-//! the square of the nearness in speed, so that at its own speed a run comes out as it is.
+//! Learning, 2006, sections 2.2, 2.7 and 4.2). A run that deviates from the others does so by an individual
+//! fold, which need not occur at neighbouring speeds. The residual of a run fades with
+//! the square of the proximity in speed, so that at its own speed a run is reproduced exactly.
 
 use super::curves::neighbours;
 use crate::signal::Cholesky;
 
-/// Length over which the runs are alike, in ratio to the range of their speeds.
+/// Length over which the runs are alike, relative to the range of their speeds.
 const LENGTH: f64 = 1.5;
-/// Variance of what is a run's own, in ratio to that of the smooth function.
+/// Variance of what is a run's own, relative to that of the smooth function.
 const OWN: f64 = 0.02;
 
 /// The runs of a group, by their increasing impact speeds.
@@ -36,7 +36,7 @@ impl<'a> Blend<'a> {
     }
 
     /// The weights of the runs from the `first` on, 0 for those before, at an impact speed; beyond the speeds
-    /// of all runs those of the outermost. The runs from the `first` on tell of no speed below that of the one
+    /// of all runs those of the outermost. The runs from the `first` on say nothing about speeds below that of the one
     /// before. Their sum is 1.
     pub(super) fn weights(&self, first: usize, speed_m_per_s: f64) -> Vec<f64> {
         let all = self.speeds_m_per_s;
@@ -118,7 +118,7 @@ mod tests {
         }
     }
 
-    /// Few fast runs that are asked far below their speeds give no weights that would amplify their folds.
+    /// Few fast runs used far below their speeds give no weights that would amplify their folds.
     #[test]
     fn weights_are_bounded_wherever_slower_runs_have_ended() {
         let speeds = [18.0, 25.0, 36.0, 48.0, 60.0, 72.0];
@@ -129,7 +129,7 @@ mod tests {
                 assert!(weights.iter().all(|w| w.abs() < 1.6), "from {first} at {v}: {weights:?}");
             }
         }
-        // Three cases of one speed tell alike.
+        // Three cases of one speed have equal weights.
         let equal = Blend::of(&[5.0; 3]).weights(0, 5.0);
         assert!(close(equal.iter().sum(), 1.0) && equal.iter().all(|w| w.is_finite()), "{equal:?}");
     }

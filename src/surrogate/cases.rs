@@ -1,4 +1,4 @@
-//! What a model keeps of its training cases, and their curves by force.
+//! The data that a model keeps of its training cases, and their curves by force.
 
 use serde::{Deserialize, Serialize};
 
@@ -11,7 +11,7 @@ use crate::error::Error;
 /// Forces beyond this are damage, not measurement.
 const LARGEST_N: f64 = 1e15;
 
-/// What a model keeps of a training case: its curves over even deflections, no coarser than
+/// Data of a training case in a model: its curves over even deflections, no coarser than
 /// 2 mm, and its ends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModelCase {
@@ -22,17 +22,17 @@ pub struct ModelCase {
     /// Values of the model's features.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub features: Vec<f64>,
-    /// Largest deflection, in m.
+    /// Maximum deflection, in m.
     pub max_deflection_m: f64,
     /// Whether the record ended while loading, so that a larger deflection may follow.
     pub truncated: bool,
     /// Measured unloading stiffness, in N/m, if the record reaches so far.
     #[serde(rename = "unloading_stiffness_N_per_m")]
     pub unloading_stiffness_n_per_m: Option<f64>,
-    /// Speed of separation after the body force has first fallen to zero.
+    /// Separation speed after the body force has first fallen to zero.
     #[serde(default)]
     pub rebound_speed_m_per_s: Option<f64>,
-    /// What its build said of it.
+    /// Warnings of its build.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
     /// Empty in files of version 1.
@@ -72,7 +72,7 @@ impl ModelCase {
         }
     }
 
-    /// What a fit guarantees of a case.
+    /// Invariants of a case in a fit.
     pub(super) fn check(&self) -> Result<(), String> {
         let positive = |value: Option<f64>| value.is_none_or(|v| v > 0.0 && v.is_finite());
         if !positive(self.unloading_stiffness_n_per_m) || !positive(self.rebound_speed_m_per_s) {
@@ -86,7 +86,7 @@ impl ModelCase {
             && (end / self.max_deflection_m - 1.0).abs() > 1e-9
         {
             let max = self.max_deflection_m;
-            return Err(format!("its curve ends at {end} m, its maximal deflection is {max} m"));
+            return Err(format!("its curve ends at {end} m, its maximum deflection is {max} m"));
         }
         Ok(())
     }
@@ -107,7 +107,7 @@ impl ModelCase {
 pub(super) struct Curves {
     pub declared: Vec<CaseCurve>,
     pub body: Vec<CaseCurve>,
-    /// Of the curves of the declared force and of the body's, once it was asked for.
+    /// Of the curves of the declared force and of the body's, once it was requested.
     pub kinks: [Cached<SlopeJump>; 2],
 }
 

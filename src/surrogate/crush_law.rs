@@ -1,14 +1,14 @@
 //! Crush law: one law behind the contact force and the body force of a group.
 //!
-//! A crush zone is stopped from its tip on. With `m_s(d)` the mass that has been stopped,
-//! `λ = dm_s/dd` and `u` the speed of the body against what has been stopped,
+//! A crush zone comes to rest from its tip on. With `m_s(d)` the stopped mass,
+//! `λ = dm_s/dd` and `u` the speed of the body relative to the stopped mass,
 //! - the crush force `F_f = Q(d; v) (1 + β√u)` acts between crush zone and body,
-//! - the contact feels `F_c = F_f + λ u²`, by the momentum of what is being stopped,
+//! - the contact force is `F_c = F_f + λ u²`, with the momentum of the mass being stopped,
 //! - the body moves by `(M − m_s) dv/dt = −F_f`.
 //!
 //! The stopped mass is that of [`StoppedMass`]. Of the β that makes the `Q` of neighbouring speeds most
-//! alike where they overlap, half is taken, as by the model `rate`. What this leaves of their levels is put
-//! down to the impact speed, as `1 + γ√v`; freed of it, the `Q` of the runs are blended (`blend.rs`).
+//! alike where they overlap, half is taken, as in the model `rate`. The remaining differences in level are attributed
+//! to the impact speed, as `1 + γ√v`; divided by it, the `Q` of the runs are blended (`blend.rs`).
 //!
 //! The same equations hold in the closing coordinates of two equal bodies, with the reduced mass.
 
@@ -24,12 +24,12 @@ use crate::dataset::grid;
 /// no crush zones as heavy.
 const LEAST_FREE: f64 = 0.5;
 
-/// What a body of one mass feels for each newton of crush force: `M / (M − m_s)`.
+/// Force on a body of one mass for each newton of crush force: `M / (M − m_s)`.
 pub(crate) fn per_crush_force(stopped_kg: f64, mass_kg: f64) -> f64 {
     mass_kg / (mass_kg - stopped_kg).max(LEAST_FREE * mass_kg)
 }
 
-/// What a group's runs say of the mass that is stopped, and of the force behind it.
+/// Stopped mass and crush force of the runs of a group.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CrushLaw {
     /// β in (s/m)^½, over the closing speed of the model's kind.
@@ -38,7 +38,7 @@ pub struct CrushLaw {
     /// γ in (s/m)^½, over the impact speed.
     #[serde(rename = "impact_sensitivity_sqrt_s_per_m", default)]
     pub of_impact: f64,
-    /// The mass that is stopped, with what the runs' momentum says beside it.
+    /// The stopped mass, with the deviation of the runs' momentum.
     #[serde(flatten)]
     pub stopped: StoppedMass,
     #[serde(skip)]
@@ -62,7 +62,7 @@ pub(crate) struct CrushCurve {
     pub stopped_kg: Envelope,
 }
 
-/// Fewest points of a law at one speed.
+/// Minimum number of points of a law at one speed.
 const POINTS: usize = 400;
 
 impl CrushLaw {
@@ -84,7 +84,7 @@ impl CrushLaw {
         Self::of(self.stopped.without_any(), contact)
     }
 
-    /// What a fit guarantees and a file might not.
+    /// Invariants of a fit that a file might break.
     pub(super) fn check(&self) -> Result<(), String> {
         Rate::of(self.sensitivity, None).check_sensitivity()?;
         Rate::of(self.of_impact, None).check_sensitivity()?;

@@ -1,6 +1,6 @@
 //! `crush-law`: contact force and body force from one law of stopped mass, rate and impact speed.
 //!
-//! The other models fit the two forces one by one. Here both follow from [`CrushLaw`]: the contact feels
+//! The other models fit the two forces separately. Here both follow from [`CrushLaw`]: the contact force is
 //! `F_f + λu²`, the body moves as one mass under `F_f M/(M − m_s)`.
 
 use std::sync::Arc;
@@ -86,7 +86,7 @@ fn over_interval(
 const LEAST_WAY_M: f64 = 1e-6;
 
 impl OfCrushLaw {
-    /// What a body of one mass feels for each newton of crush force.
+    /// Force on a body of one mass for each newton of crush force.
     fn per_crush_force(&self, deflection_m: f64, mass_kg: f64) -> f64 {
         per_crush_force(self.law.stopped.at(deflection_m), mass_kg)
     }

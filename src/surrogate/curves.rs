@@ -53,7 +53,7 @@ impl CaseCurve {
         self.envelope.force_at(deflection_m)
     }
 
-    /// Largest deflection, in m.
+    /// Maximum deflection, in m.
     pub(crate) fn end_m(&self) -> f64 {
         self.envelope.end_m()
     }

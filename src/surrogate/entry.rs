@@ -1,4 +1,4 @@
-//! What the table of models says of each.
+//! The entries of the table of models.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::curve::ForceKind;
 use crate::dataset::TrainingSet;
 use crate::error::{Error, error};
 
-/// One model: what it is called, what it needs, how it is fitted and read again.
+/// One model: its name, its requirements, how it is fitted and read.
 #[derive(Clone, Copy, Debug)]
 pub struct ModelEntry {
     /// As the command line and model files name it.
@@ -27,11 +27,11 @@ pub struct ModelEntry {
     pub sees_features: bool,
     /// Whether its force follows the closing speed at each deflection.
     pub follows_closing: bool,
-    /// Whether it needs runs that tell a crush law with stopped mass.
+    /// Whether it needs runs that determine a crush law with stopped mass.
     pub needs_crush_law: bool,
-    /// Fewest training curves that it answers from.
+    /// Minimum number of training curves that it answers from.
     pub least_curves: usize,
-    /// The rule for the maximal crush of a model that was not validated, if speed alone differs.
+    /// The rule for the maximum crush of a model that was not validated, if speed alone differs.
     pub crush_rule: MaxCrushRule,
     /// Options of its forest; `None` for a model without one.
     pub(super) forest: Option<fn() -> ForestOptions>,
@@ -46,14 +46,14 @@ pub(super) type Fit = fn(&FitInput<'_>) -> Result<Arc<dyn Surrogate>, Error>;
 /// Makes a model of its parameters in a model file.
 pub(super) type Load = fn(Option<&RawValue>) -> Result<Arc<dyn Surrogate>, serde_json::Error>;
 
-/// What a model is fitted to.
+/// Input of a fit.
 pub(super) struct FitInput<'a> {
     pub set: &'a TrainingSet,
     /// The curves of `force`, in order of speed.
     pub curves: &'a [CaseCurve],
     pub force: ForceKind,
     pub forest: Option<&'a ForestOptions>,
-    /// Of the set, if the model needs one and the runs tell one.
+    /// Of the set, if the model needs one and the runs determine one.
     pub crush_law: Option<&'a CrushLaw>,
 }
 
@@ -64,7 +64,7 @@ impl FitInput<'_> {
 
     /// The crush law with stopped mass.
     pub(crate) fn crush_law(&self) -> Result<CrushLaw, Error> {
-        self.crush_law.cloned().ok_or(error!(Model, "model crush-law needs runs from whose momentum the mass stopped in the crush zone follows: contact force and speed of a body against a wall or of two of equal mass, whose momentum agrees; this group's do not: use --model rate"))
+        self.crush_law.cloned().ok_or(error!(Model, "model crush-law takes the mass stopped in the crush zone from momentum: it needs contact forces and speeds of a body against a wall, or of two bodies of equal mass, whose momentum agrees; the runs of this group do not qualify: use --model rate"))
     }
 }
 

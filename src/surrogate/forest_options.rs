@@ -17,7 +17,7 @@ pub struct ForestOptions {
     pub thresholds: Thresholds,
     /// When a branch stops growing.
     pub stop: StopRule,
-    /// Fewest samples in a leaf.
+    /// Minimum number of samples in a leaf.
     pub min_samples_leaf: usize,
     /// Which points of the loading branches it learns from.
     pub table: TableKind,

@@ -6,7 +6,7 @@ use crate::piecewise;
 use crate::signal::peaks::{PROMINENCE, peaks};
 
 /// Landmarks of neighbouring cases match if they lie no further apart than this share of
-/// the larger maximal crush.
+/// the larger maximum crush.
 const NEAR: f64 = 0.15;
 /// Step at which curves are searched, as a share of their end.
 const STEPS: usize = 500;
@@ -192,7 +192,7 @@ impl Landmarks {
     }
 }
 
-/// A monotone piecewise linear map of deflections that keeps 0 and goes on with slope 1
+/// A monotone piecewise linear map of deflections that keeps 0 and continues with slope 1
 /// beyond its last landmark.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Warp {

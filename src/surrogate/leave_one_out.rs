@@ -1,4 +1,4 @@
-//! What leave-one-speed-out finds: errors of a model at speeds it was not trained on.
+//! Results of leave-one-speed-out: errors of a model at speeds it was not trained on.
 
 use std::collections::BTreeMap;
 
@@ -11,7 +11,7 @@ use crate::curve::ForceKind;
 
 /// Errors of one model at one speed that was left out.
 ///
-/// Ratios are `Σ|p − r|/Σ|r|`; other errors are prediction over FE, less 1.
+/// Ratios are `Σ|p − r|/Σ|r|`; other errors are prediction over FE, minus 1.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LeftOut {
     /// Name of the model.
@@ -26,16 +26,16 @@ pub struct LeftOut {
     pub force_l1: f64,
     /// Energy of the predicted curve.
     pub energy_error: f64,
-    /// Maximal crush by the model's rule.
+    /// Maximum crush by the model's rule.
     pub max_crush_error: f64,
-    /// Maximal crush by every rule that has an answer.
+    /// Maximum crush by every rule that has an answer.
     pub max_crush_errors: BTreeMap<MaxCrushRule, f64>,
     /// The first two peaks of FE's curve.
     pub peaks: Vec<PeakError>,
     /// Multi-body run driven by the model's body force; by the declared one if the two are
     /// the same.
     pub velocity_l1: f64,
-    /// Accelerations filtered with CFC 60, as SAE J211 has it for the comparison of vehicles.
+    /// Accelerations filtered with CFC 60, as in SAE J211 for the comparison of vehicles.
     pub acceleration_l1: f64,
     /// Accelerations as central differences over two sampling intervals, not filtered.
     pub acceleration_unfiltered_l1: f64,
@@ -66,7 +66,7 @@ pub struct PeakError {
 }
 
 /// FE's own curve in the same multi-body model. That of a contact force is the floor for its
-/// predictions; that of the body's force is made from FE's own speeds, and checks that curve, force
+/// predictions; that of the body force is made from FE's own speeds, and checks that curve, force
 /// law and run are consistent.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Floor {
@@ -80,9 +80,9 @@ pub struct Floor {
     pub inner: bool,
     /// Ratio of the errors of the velocity.
     pub velocity_l1: f64,
-    /// The same of accelerations filtered with CFC 60.
+    /// The same for accelerations filtered with CFC 60.
     pub acceleration_l1: f64,
-    /// The same of accelerations that are not filtered.
+    /// The same for accelerations that are not filtered.
     pub acceleration_unfiltered_l1: f64,
 }
 
@@ -111,7 +111,7 @@ pub struct Means {
     pub acceleration_unfiltered_l1: f64,
 }
 
-/// How far runs of one speed lie from their mean: no model can remove this part of an error.
+/// Deviation of runs of one speed from their mean: no model can remove this part of an error.
 ///
 /// Errors of runs that the mean is made of are multiplied by √(n/(n − 1)): they are those of a run
 /// that it does not know.
@@ -119,13 +119,13 @@ pub struct Means {
 pub struct Scatter {
     /// Those that have several runs.
     pub speeds: Vec<SpeedScatter>,
-    /// Runs at these speeds, less one for the mean of each: weights of the means below.
+    /// Runs at these speeds, minus one for the mean of each: weights of the means below.
     pub degrees_of_freedom: usize,
-    /// Error of the declared force of a run against the mean, as the tables have it.
+    /// Error of the declared force of a run against the mean, as in the tables.
     pub force_l1: f64,
-    /// The same of the closing speed.
+    /// The same for the closing speed.
     pub velocity_l1: f64,
-    /// Root mean square of the declared force's residuals in ratio to its local level, as of bands.
+    /// Root mean square of the declared force's residuals relative to its local level, as for bands.
     pub force_share: f64,
     /// Root mean square over the runs of the largest of these residuals.
     pub largest_force_share: f64,
@@ -150,7 +150,7 @@ impl Scatter {
 /// The scatter of the body force.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct BodyScatter {
-    /// Root mean square of its residuals in ratio to its local level, as of bands.
+    /// Root mean square of its residuals relative to its local level, as for bands.
     pub force_share: f64,
     /// Root mean square over the runs of the largest of these residuals.
     pub largest_force_share: f64,
@@ -163,15 +163,15 @@ pub struct SpeedScatter {
     pub speed_m_per_s: f64,
     /// Names of the runs.
     pub runs: Vec<String>,
-    /// As of all speeds.
+    /// As for all speeds.
     pub force_l1: f64,
-    /// As of all speeds.
+    /// As for all speeds.
     pub velocity_l1: f64,
-    /// As of all speeds.
+    /// As for all speeds.
     pub force_share: f64,
-    /// As of all speeds.
+    /// As for all speeds.
     pub largest_force_share: f64,
-    /// As of all speeds.
+    /// As for all speeds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body: Option<BodyScatter>,
 }
@@ -191,7 +191,7 @@ pub struct Validation {
     pub means: Vec<Means>,
     /// FE's own curves in the same runs.
     pub floors: Vec<Floor>,
-    /// How far equal runs lie apart; absent where no speed has several runs.
+    /// Scatter of repeated runs; absent if no speed has several runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scatter: Option<Scatter>,
     /// Of the declared force between training speeds, from the chosen model's residuals at the

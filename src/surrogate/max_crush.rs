@@ -1,7 +1,7 @@
-//! Maximal crush as a function of impact speed: four rules, and their spread.
+//! Maximum crush as a function of impact speed: four rules, and their spread.
 //!
 //! Four rules: a cubic spline over the speeds, a monotone interpolation, the kinetic energy, and the motion: where the
-//! body's force stops the body. `energy` solves the same on the declared force, which as a contact force takes up the
+//! body force stops the body. `energy` solves the same with the declared force, which as a contact force absorbs the
 //! energy too early (W/E in `db ls`). A model uses the rule with the smallest errors of crush and energy when speeds were
 //! left out, never the spline, which need not be monotone; `--paper` uses the spline.
 
@@ -12,7 +12,7 @@ use super::Model;
 use crate::curve::Envelope;
 use crate::error::{Error, error};
 
-/// How the maximal crush is found.
+/// Rule for the maximum crush.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
@@ -23,9 +23,9 @@ pub enum MaxCrushRule {
     /// Monotone cubic through (0, 0) and the training cases.
     #[default]
     Monotone,
-    /// Where the predicted curve has taken up the kinetic energy.
+    /// Where the predicted curve has absorbed the kinetic energy.
     Energy,
-    /// Where the body's force has stopped the body; the same as `energy` if the predicted
+    /// Where the body force has stopped the body; the same as `energy` if the predicted
     /// curve is that force. A contact curve takes up the energy too early, because mass in the
     /// crush zone is stopped before the body.
     Motion,
@@ -46,14 +46,14 @@ impl MaxCrushRule {
     }
 }
 
-/// The maximal crush by all rules, in m; `None` where a rule has no answer.
+/// The maximum crush by all rules, in m; `None` where a rule has no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct MaxCrush {
     /// By a cubic spline over the speeds.
     pub spline_m: Option<f64>,
     /// By a cubic that never falls with the speed.
     pub monotone_m: Option<f64>,
-    /// Where the curve has taken up the impact's energy.
+    /// Where the curve has absorbed the impact's energy.
     pub energy_m: Option<f64>,
     /// Absent in files of earlier versions.
     #[serde(default)]
@@ -162,13 +162,13 @@ pub(crate) fn monotone(points: &[(f64, f64)], v: f64) -> Option<f64> {
     )
 }
 
-/// The deflection at which `curve` has taken up `kinetic_j`; beyond its end the force
+/// The deflection at which `curve` has absorbed `kinetic_j`; beyond its end the force
 /// holds its last value.
 pub(crate) fn energy(curve: &Envelope, kinetic_j: f64) -> Option<f64> {
     curve.deflection_for_work(kinetic_j)
 }
 
-/// The maximal crush by every rule.
+/// The maximum crush by every rule.
 pub(super) fn by_all_rules(
     model: &Model,
     v: f64,
@@ -209,10 +209,10 @@ pub(super) fn chosen(crush: &MaxCrush, rule: MaxCrushRule) -> Result<f64, Error>
     match crush.by(rule) {
         Some(end) if end > 0.0 && end.is_finite() => Ok(end),
         found => Err(
-            error!(Prediction at "max_crush", "the maximal crush by the {rule} rule is {found}: expected a length above 0; try --max-crush {other}", found = found.map_or("not defined for these cases".into(), |d| format!("{d} m")), other = MaxCrushRule::ALL
+            error!(Prediction at "max_crush", "the maximum crush by the {rule} rule is {found}: expected a length above 0; try --max-crush {other}", found = found.map_or("not defined for these cases".into(), |d| format!("{d} m")), other = MaxCrushRule::ALL
                 .into_iter()
                 .find(|&r| crush.by(r).is_some_and(|d| d > 0.0 && d.is_finite()))
-                .map_or("(no rule has an answer here)", MaxCrushRule::name), rule = rule.name()),
+                .map_or("(no rule applies here)", MaxCrushRule::name), rule = rule.name()),
         ),
     }
 }

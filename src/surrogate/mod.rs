@@ -54,7 +54,7 @@ mod registered;
 mod spikes;
 pub(crate) mod warning;
 
-/// Where a surrogate is asked.
+/// Where a surrogate is used.
 #[derive(Clone, Copy, Debug)]
 pub struct QueryPoint<'a> {
     /// Impact speed, of the training cases' kind.

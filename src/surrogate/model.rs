@@ -1,4 +1,4 @@
-//! Models: a surrogate fitted to a group, with everything needed to predict and to trust.
+//! Models: a surrogate fitted to a group, with everything needed to predict and to assess it.
 
 use std::sync::Arc;
 
@@ -39,7 +39,7 @@ pub struct Model {
     pub mass_kg: f64,
     /// Mass of the other body of a pair.
     pub other_mass_kg: Option<f64>,
-    /// Units of the solver's files that the training cases come from, for exports.
+    /// Units of the solver files that the training cases come from, for exports.
     pub study_units: Option<UnitSystem>,
     /// Parameters besides speed that queries must give.
     pub features: Vec<Feature>,
@@ -49,17 +49,17 @@ pub struct Model {
     pub cases: Vec<ModelCase>,
     /// Which model, with its options.
     pub kind: ModelKind,
-    /// How the maximal crush is found if a query does not say.
+    /// How the maximum crush is found by default.
     pub max_crush_rule: MaxCrushRule,
     /// Pairs of neighbouring training speeds between which the collapse changes its mode.
     pub mode_switches_m_per_s: Vec<(f64, f64)>,
-    /// Leave-one-speed-out of the group, if it was asked for.
+    /// Leave-one-speed-out of the group, if it was requested.
     pub leave_one_out: Option<Validation>,
     /// For the declared force.
     pub(super) fitted: Arc<dyn Surrogate>,
     /// For the force of the body's motion, where that is another.
     pub(super) fitted_body: Option<Arc<dyn Surrogate>>,
-    /// Stopped mass and crush force behind both forces; `None` where the runs do not tell them.
+    /// Stopped mass and crush force behind both forces; `None` if the runs do not determine them.
     pub crush_law: Option<CrushLaw>,
     /// The curves of `cases`, made when the model is fitted or read.
     pub(super) curves: Curves,
@@ -179,7 +179,7 @@ impl Model {
         self.fitted.forest()
     }
 
-    /// The largest crush of its runs, in m.
+    /// The maximum crush of its runs, in m.
     pub(crate) fn largest_crush_m(&self) -> f64 {
         self.cases.iter().map(|case| case.max_deflection_m).fold(0.0, f64::max)
     }
@@ -310,7 +310,7 @@ impl Model {
         if kept.step_m == step_m { kept.most_n } else { most(curves) }
     }
 
-    /// What a query here must say, for any mass and rule.
+    /// Warnings of a query here, for any mass and rule.
     pub(crate) fn warnings(&self, at: &QueryPoint<'_>) -> Vec<Warning> {
         let v = at.speed_m_per_s;
         let (low, high) = self.range_m_per_s();
@@ -338,7 +338,7 @@ impl Model {
         warnings
     }
 
-    /// What is said of the training runs: of a few of them if it is said of many.
+    /// Warnings of the training runs, shortened if there are many.
     pub(crate) fn case_warnings(&self) -> Vec<Warning> {
         let of_case = |c: &ModelCase| Warning::of_case(&c.name, c.truncated, &c.warnings);
         let mut warnings: Vec<Warning> = self.cases.iter().flat_map(of_case).collect();
@@ -355,7 +355,7 @@ impl Model {
     }
 }
 
-/// The crush law of a group whose runs may tell a stopped mass.
+/// The crush law of a group whose runs may determine a stopped mass.
 fn crush_law(set: &TrainingSet, contact: &[CaseCurve]) -> Option<CrushLaw> {
     set.stopped_mass().map(|stopped| CrushLaw::of(stopped, contact))
 }

@@ -25,10 +25,10 @@ use crate::unit::{Speed, SpeedKind, UnitSystem};
 const FORMAT: &str = "crumple model";
 /// Version of the model files that this program writes and reads.
 pub(super) const VERSION: u32 = 4;
-/// Most bytes of a model file: a forest of 500 trees has some ten million.
+/// Maximum number of bytes of a model file: a forest of 500 trees has some ten million.
 const MAX_BYTES: u64 = 1 << 30;
 
-/// What tells a model file from others.
+/// What identifies a model file.
 #[derive(Deserialize)]
 struct Head {
     format: String,
@@ -101,7 +101,7 @@ impl Model {
     /// Parses and checks the bytes of a model file; `path` is for messages.
     ///
     /// # Errors
-    /// As of [`read`](Self::read).
+    /// As for [`read`](Self::read).
     pub fn parse(path: &Path, text: &[u8]) -> Result<Self, Error> {
         let no_model = |line, column, detail| {
             error!(
@@ -162,14 +162,14 @@ impl Model {
             Some(fingerprint) if !is_as_written(text, fingerprint) && !file::accepts_changed() => {
                 Err(error!(
                     Model,
-                    "{}: the model is not the one that was written, by its fingerprint: train it again with crumple train, or go on with --accept-changed",
+                    "{}: the model does not match its fingerprint: train it again with crumple train, or use --accept-changed",
                     path.display()
                 ))
             }
             None if !file::accepts_changed() => match model.impossible_case() {
                 Some(found) => Err(error!(
                     Model,
-                    "{}: {found}: a mass, speed or force was changed in it, and the file has no fingerprint that would say so: train the model again with crumple train, or go on with --accept-changed",
+                    "{}: {found}: a mass, speed or force was changed in it, and the file has no fingerprint that would show it: train the model again with crumple train, or use --accept-changed",
                     path.display()
                 )),
                 None => Ok(model),
@@ -213,7 +213,7 @@ impl Model {
             return Err("its cases have not as many features as it names".into());
         }
         if !self.cases.iter().all(|c| c.max_deflection_m > 0.0 && c.max_deflection_m.is_finite()) {
-            return Err("a maximal deflection is not above 0".into());
+            return Err("a maximum deflection is not above 0".into());
         }
         for case in &self.cases {
             case.check().map_err(|detail| format!("case \"{}\": {detail}", case.name))?;

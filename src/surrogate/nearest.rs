@@ -1,4 +1,4 @@
-//! `nearest` (FDRM): the one FE curve measured at the nearest speed, used as it is.
+//! `nearest` (FDRM): the FE curve at the nearest speed, unchanged.
 
 use std::sync::Arc;
 
@@ -34,7 +34,7 @@ impl Surrogate for Nearest {
     }
 }
 
-/// Index of the case nearest in speed and features, each in ratio to its range; of equally
+/// Index of the case nearest in speed and features, each relative to its range; of equally
 /// near ones the first.
 fn nearest(cases: &[CaseCurve], at: &QueryPoint<'_>) -> usize {
     let value = |case: &CaseCurve, k: usize| match k {

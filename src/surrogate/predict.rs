@@ -1,19 +1,19 @@
-//! Prediction in stages: what is asked → the body's motion → the declared force and the maximal
+//! Prediction in stages: query → motion of the body → the declared force and the maximum
 //! crush by every rule → the curve to one of them, with its audit and warnings.
 //!
-//! Order of work: body force → motion u(d) → largest crush → declared force at these speeds → band → audit. The motion
-//! is what makes `rate` more than an interpolation.
+//! Order of work: body force → motion u(d) → maximum crush → declared force at these speeds → band → audit. The motion
+//! makes `rate` more than an interpolation.
 //!
 //! A model has two forces. The **declared** one is the recipe's: it is exported and compared along FE's crush. The
-//! **body's**, −m dv/dt of the recorded closing speed with CFC 60 (`curve/body`), moves a body of one mass. FE's own
-//! contact force in a one-mass model misses FE's velocity by 1.7 to 2.9 % in the mean of a group, because the crush zone
+//! **body force**, −m dv/dt of the recorded closing speed with CFC 60 (`curve/body`), drives a body of one mass. FE's own
+//! contact force in a one-mass model misses FE's velocity by 1.7 to 2.9 % on average over a group, because the crush zone
 //! stops part of the mass early.
 //!
-//! Unloading: FE curves begin with a flank far steeper than the line of the rebound. One stiffness for both would have
-//! to be the steep one (else a deflection creates energy) and would lose most of the rebound. A predicted curve has one
-//! stiffness per force, from its largest crush, which gives the measured speed of separation (`rebound`). The body force
+//! Unloading: FE curves begin with a rise far steeper than the line of the rebound. One stiffness for both would have
+//! to be the steep one (otherwise a deflection creates energy) and would lose most of the rebound. A predicted curve has one
+//! stiffness per force, from its maximum crush, which gives the measured separation speed (`rebound`). The body force
 //! of the bundled runs rises less steeply than that, so tools with one constant get the rebound and create no energy.
-//! Exports take the body force by default and state its steepest rise beside it.
+//! Exports take the body force by default and also state its steepest rise.
 
 use super::band::{self, Band};
 use super::max_crush::{MaxCrush, MaxCrushRule, chosen};
@@ -34,16 +34,16 @@ const REACH: f64 = 1.5;
 ///
 /// # Errors
 /// If the speed is not above 0 or far outside the training speeds, a parameter is missing, the rule gives no
-/// maximal crush, or an energy correction is out of bounds.
+/// maximum crush, or an energy correction is out of bounds.
 pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, Error> {
     let prediction = Prediction::new(model, query)?;
     prediction.curve(prediction.rule())
 }
 
-/// The curve of one force that drives an interface, with what lies beyond its maximal crush;
+/// The curve of one force that drives an interface, with what lies beyond its maximum crush;
 /// `member` of its band's half width added, from −1 (lower edge) to 1.
 ///
-/// For the body's own force the declared one is not looked at: many interfaces of a train or a
+/// For the body's own force the declared one is not examined: many interfaces of a train or a
 /// sweep ask for the former alone.
 ///
 /// # Errors
@@ -67,7 +67,7 @@ pub fn predict_driving(
     Ok((curve.driving_member(force, member)?, curve.warnings))
 }
 
-/// The motion that the body's force gives, beyond any maximal crush.
+/// The motion that the body force gives, beyond any maximum crush.
 struct Motion<'a> {
     asked: ResolvedQuery<'a>,
     query: &'a Query,
@@ -102,7 +102,7 @@ impl<'a> Motion<'a> {
         without_spikes(model, deflection_m, model.force_n(&at, deflection_m), false)
     }
 
-    /// The body's force to the maximal crush and how it unloads, without the declared force.
+    /// The body's force to the maximum crush and how it unloads, without the declared force.
     fn driving(self) -> Result<(ForceCurve, Vec<Warning>), Error> {
         let Self { asked, body: beyond, .. } = &self;
         let model = asked.model;
@@ -129,7 +129,7 @@ impl<'a> Motion<'a> {
     }
 }
 
-/// What a prediction is before a rule for the maximal crush is chosen: the forces beyond any
+/// What a prediction is before a rule for the maximum crush is chosen: the forces beyond any
 /// crush, and the crush by every rule. One such serves all rules.
 pub(crate) struct Prediction<'a> {
     motion: Motion<'a>,
@@ -138,14 +138,14 @@ pub(crate) struct Prediction<'a> {
     crush: MaxCrush,
 }
 
-/// Both forces to the maximal crush.
+/// Both forces to the maximum crush.
 struct Forces {
     declared: Envelope,
     body: Option<Envelope>,
 }
 
 impl<'a> Prediction<'a> {
-    /// The stages that no rule for the maximal crush changes.
+    /// The stages that no rule for the maximum crush changes.
     pub(crate) fn new(model: &'a Model, query: &'a Query) -> Result<Self, Error> {
         Self::of(Motion::new(model, query)?)
     }
@@ -157,12 +157,12 @@ impl<'a> Prediction<'a> {
         Ok(Self { motion, declared, crush })
     }
 
-    /// The rule that the query asks for, or the model's own.
+    /// The rule that the query names, or the model's own.
     pub(crate) fn rule(&self) -> MaxCrushRule {
         self.motion.rule()
     }
 
-    /// The curve to the maximal crush of one rule.
+    /// The curve to the maximum crush of one rule.
     pub(crate) fn curve(&self, rule: MaxCrushRule) -> Result<PredictedCurve, Error> {
         let deflection_m = evenly(chosen(&self.crush, rule)?);
         let motion = &self.motion;
@@ -178,7 +178,7 @@ impl<'a> Prediction<'a> {
         Ok(self.report(rule, Forces { declared: declared.envelope, body }, warnings))
     }
 
-    /// The force over these deflections, scaled to the impact's energy if that is asked for.
+    /// The force over these deflections, scaled to the impact's energy if that is requested.
     fn corrected(&self, deflection_m: &[f64], force_n: Vec<f64>) -> Result<Corrected, Error> {
         let level = envelope(deflection_m.to_vec(), force_n)?;
         if !self.motion.query.energy_correct {
@@ -188,7 +188,7 @@ impl<'a> Prediction<'a> {
         if !(CORRECTION.0..=CORRECTION.1).contains(&factor) {
             return Err(error!(
                 Prediction,
-                "the energy correction would multiply the force by {factor:.3}, outside {low} to {high}: the scale is not what is wrong; look at mass, speed and the rule for the maximal crush",
+                "the energy correction would multiply the force by {factor:.3}, outside {low} to {high}: scaling is not the remedy; check mass, speed and the rule for the maximum crush",
                 low = CORRECTION.0,
                 high = CORRECTION.1
             ));
@@ -198,7 +198,7 @@ impl<'a> Prediction<'a> {
         Ok(Corrected { envelope, factor: Some(factor) })
     }
 
-    /// The forces from a maximal crush on; `None` if it is as far as the motion is followed.
+    /// The forces from a maximum crush on; `None` if it is as far as the motion is followed.
     fn beyond(&self, max_crush_m: f64) -> Option<Beyond> {
         let Motion { asked, body, .. } = &self.motion;
         // Whole intervals of the curve, so that what goes on with it keeps its table even.
@@ -219,7 +219,7 @@ impl<'a> Prediction<'a> {
         })
     }
 
-    /// The band around one force; what was said of the other force is not said again.
+    /// The band around one force; what was reported for the other force is not repeated.
     fn banded(&self, force: ForceKind, envelope: &Envelope, warnings: &mut Vec<Warning>) -> Banded {
         let asked = &self.motion.asked;
         let band = asked.model.band(&asked.at(), force).unwrap_or_else(|warning| {

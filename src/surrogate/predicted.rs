@@ -1,4 +1,4 @@
-//! The predicted curve: the master format of exports, and what can be made of it.
+//! The predicted curve: the master format of exports, and its conversions.
 
 use std::collections::BTreeMap;
 
@@ -16,7 +16,7 @@ use crate::unit::{SpeedKind, UnitSystem};
 /// A predicted curve: the master format of exports (JSON).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PredictedCurve {
-    /// Loading branch from (0, 0) to the maximal crush.
+    /// Loading branch from (0, 0) to the maximum crush.
     pub deflection_m: Vec<f64>,
     /// Force in N, one value per deflection; which force it is says `provenance.force_kind`.
     #[serde(rename = "force_N")]
@@ -39,10 +39,10 @@ pub struct PredictedCurve {
     #[serde(rename = "body_force_high_N", default, skip_serializing_if = "Option::is_none")]
     pub body_force_high_n: Option<Vec<f64>>,
     /// Forces between which the members of a forest's leaves lie, if the model keeps them. They
-    /// tell how the training points scatter, not how far FE lies off.
+    /// show how the training points scatter, not the distance from FE.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub forest_quantiles: Option<ForestQuantiles>,
-    /// Unloading stiffness that belongs to `force_N`, from its maximal crush: that of the
+    /// Unloading stiffness that belongs to `force_N`, from its maximum crush: that of the
     /// rebound where one is known, else the measured one, at least the steepest rise.
     #[serde(rename = "unloading_stiffness_N_per_m")]
     pub unloading_stiffness_n_per_m: f64,
@@ -59,10 +59,10 @@ pub struct PredictedCurve {
     /// Which runs `body_force_N` may drive.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_drives: Option<String>,
-    /// The rebound from the maximal crush.
+    /// The rebound from the maximum crush.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rebound: Option<Rebound>,
-    /// Maximal crush, in m: the last deflection.
+    /// Maximum crush, in m: the last deflection.
     pub max_deflection_m: f64,
     /// Speed that the curve is for, in m/s.
     pub speed_m_per_s: f64,
@@ -70,7 +70,7 @@ pub struct PredictedCurve {
     pub speed_kind: SpeedKind,
     /// Mass of the body, or of each body of a pair.
     pub mass_kg: f64,
-    /// How the forces go on beyond the maximal crush; absent for a recorded curve.
+    /// How the forces go on beyond the maximum crush; absent for a recorded curve.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beyond: Option<Beyond>,
     /// Integral of force over deflection.
@@ -84,13 +84,13 @@ pub struct PredictedCurve {
     pub provenance: Provenance,
 }
 
-/// The forces beyond the maximal crush, along faster runs: neighbours in a train push on where a
+/// The forces beyond the maximum crush, along faster runs: neighbours in a train push on where a
 /// body by itself would have stopped. They are continued at the level with which the curve ends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Beyond {
     /// Largest crush of the model's runs, in m: further on the forces are an assumption.
     pub data_end_m: f64,
-    /// Rising, from the maximal crush on.
+    /// Rising, from the maximum crush on.
     pub deflection_m: Vec<f64>,
     /// Force in N, one value per deflection.
     #[serde(rename = "force_N")]
@@ -113,13 +113,13 @@ pub struct ForestQuantiles {
     pub high_n: Vec<f64>,
 }
 
-/// How the bodies part after the maximal crush.
+/// How the bodies part after the maximum crush.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Rebound {
     /// In m/s; interpolated as a power of the impact speed, since the share that comes back
     /// falls with it.
     pub speed_m_per_s: f64,
-    /// Unloading stiffness from the maximal crush that gives this speed: `F²/(m v²)` with the
+    /// Unloading stiffness from the maximum crush that gives this speed: `F²/(m v²)` with the
     /// force and mass of the body.
     #[serde(rename = "stiffness_N_per_m")]
     pub stiffness_n_per_m: f64,
@@ -150,10 +150,10 @@ pub struct Provenance {
     pub nearest_training_speed_m_per_s: f64,
     /// Distance to it, in m/s.
     pub distance_to_nearest_m_per_s: f64,
-    /// How the maximal crush was found; absent for a recorded curve, which has its own.
+    /// How the maximum crush was found; absent for a recorded curve, which has its own.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_crush_rule: Option<MaxCrushRule>,
-    /// The maximal crush by every rule.
+    /// The maximum crush by every rule.
     pub max_crush: MaxCrush,
     /// `mv²/2` against a wall, `μ v_r²/2` of a pair.
     #[serde(rename = "kinetic_energy_J")]
@@ -166,7 +166,7 @@ pub struct Provenance {
     /// The band around the declared force at this speed, and what it rests on.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub band: Option<Band>,
-    /// The same of the body force, where it is another.
+    /// The same for the body force, where it is another.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_band: Option<Band>,
     /// Values of the model's further parameters.
@@ -253,7 +253,7 @@ impl PredictedCurve {
         self.own_beyond().map_or(self.max_deflection_m, |beyond| beyond.data_end_m)
     }
 
-    /// What lies beyond the maximal crush, if it belongs to these points and not to others that they
+    /// What lies beyond the maximum crush, if it belongs to these points and not to others that they
     /// have replaced.
     fn own_beyond(&self) -> Option<&Beyond> {
         let begins =
@@ -261,7 +261,7 @@ impl PredictedCurve {
         self.beyond.as_ref().filter(|b| begins(b).is_some_and(|at| (at - 1.0).abs() <= SAME_END))
     }
 
-    /// The force `force_N` beyond the maximal crush, as an envelope from (0, 0).
+    /// The force `force_N` beyond the maximum crush, as an envelope from (0, 0).
     pub(crate) fn beyond_envelope(&self) -> Result<Option<Envelope>, Error> {
         self.own_beyond().map(|beyond| beyond.envelope(&beyond.force_n)).transpose()
     }
@@ -413,7 +413,7 @@ impl PredictedCurve {
             let mut why =
                 format!("there is no band around its {} force: remove band", force.name());
             if self.force_low_n.is_some() {
-                why += ", or train the model anew";
+                why += ", or train the model again";
             }
             error!(Prediction, "{}", why)
         })?;
@@ -438,7 +438,7 @@ impl PredictedCurve {
     }
 }
 
-/// The last point may differ by this share from the maximal crush beside it.
+/// The last point may differ by this share from the stated maximum crush.
 const SAME_END: f64 = 1e-6;
 
 /// An envelope of the forces called `name`, none of which pulls.

@@ -1,4 +1,4 @@
-//! Queries: what is asked of a model, and what follows from that alone.
+//! Queries to a model, and what follows from the query alone.
 
 use std::collections::BTreeMap;
 
@@ -16,25 +16,25 @@ use crate::unit::Speed;
 
 /// Deviation of the mass from the training runs' that needs no warning.
 const SAME_MASS: f64 = 1e-3;
-/// Share of a curve over which the force before its largest crush is averaged.
+/// Share of a curve over which the force before its maximum crush is averaged.
 const LAST_SHARE_OF_CRUSH: f64 = 0.05;
-/// Power of that force with which the speed of separation goes: the energy given back with its root.
+/// Power of that force with which the separation speed goes: the energy returned with its root.
 const SEPARATION_SPEED_EXPONENT: f64 = 0.25;
 
-/// What is asked of a model.
+/// A query to a model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Query {
     /// Speed before contact in m/s, of the model's kind.
     pub speed_m_per_s: f64,
     /// Mass of the body, or of each body of a pair; the training runs' if absent.
     pub mass_kg: Option<f64>,
-    /// How the maximal crush is found; the model's own way if absent.
+    /// How the maximum crush is found; the model's own way if absent.
     pub rule: Option<MaxCrushRule>,
     /// Values of the model's further parameters.
     pub parameters: BTreeMap<String, Parameter>,
-    /// Scale the force so that the curve takes up the impact's energy.
+    /// Scale the force so that the curve absorbs the impact's energy.
     pub energy_correct: bool,
-    /// Answer further outside the training speeds than a third of their range.
+    /// Allow speeds outside the training speeds by more than a third of their range.
     pub extrapolate: bool,
 }
 
@@ -51,7 +51,7 @@ impl Query {
         }
     }
 
-    /// The same with a rule for the maximal crush.
+    /// The same with a rule for the maximum crush.
     pub fn with_rule(self, rule: MaxCrushRule) -> Self {
         Self { rule: Some(rule), ..self }
     }
@@ -84,7 +84,7 @@ impl<'a> ResolvedQuery<'a> {
         if !query.extrapolate && is_far_outside(v, low, high) {
             return Err(error!(
                 Prediction,
-                "{outside}: more than a third of the range outside, where the error of a curve is unknown: run FE at such a speed, or use --extrapolate to get it all the same",
+                "{outside}: more than a third of the range outside, where the error of a curve is unknown: run FE near this speed, or use --extrapolate to predict it anyway",
                 outside = outside_of(v, low, high)
             ));
         }
@@ -144,7 +144,7 @@ impl<'a> ResolvedQuery<'a> {
         }
     }
 
-    /// The rule for the maximal crush.
+    /// The rule for the maximum crush.
     pub(crate) fn rule(&self, query: &Query) -> MaxCrushRule {
         let (low, high) = self.model.range_m_per_s();
         query.rule.unwrap_or(match self.model.max_crush_rule {
@@ -158,7 +158,7 @@ impl<'a> ResolvedQuery<'a> {
         })
     }
 
-    /// The rebound from the end of the body's force over its deflection.
+    /// The rebound from the end of the body force over its deflection.
     pub(crate) fn rebound(&self, body: &Envelope) -> Option<Rebound> {
         // Another mass gets the same energy back: the structure's, not the car's.
         let trained_kg = self.model.masses().effective_kg();
@@ -172,12 +172,12 @@ impl<'a> ResolvedQuery<'a> {
         })
     }
 
-    /// The maximal crush by every rule.
+    /// The maximum crush by every rule.
     pub(crate) fn max_crush(&self, declared: &Envelope, body: &Envelope) -> MaxCrush {
         max_crush::by_all_rules(self.model, self.v, declared, body, self.kinetic_energy_j)
     }
 
-    /// What must be said of unloading, mass, and of an energy over the kinetic energy.
+    /// Warnings on unloading, mass, and energy over kinetic energy.
     pub(crate) fn warnings(&self, unloading: Option<f64>, energy: f64) -> Vec<Warning> {
         let mut warnings = Vec::new();
         if unloading.is_none() {
@@ -195,10 +195,10 @@ impl<'a> ResolvedQuery<'a> {
     }
 }
 
-/// The speed of separation: `F^¼ (a + b v)` with the mean force `F` before the largest crush, `a` and `b` by
-/// least squares of the runs' ratios to it. A structure behind one fold gives back the same energy whatever
-/// the force of that fold, the fold itself in proportion to it; the runs cannot tell how much is whose, and
-/// the root lies between. What a run has beside the line fades with the square of the nearness in speed.
+/// The separation speed: `F^¼ (a + b v)` with the mean force `F` before the maximum crush, `a` and `b` by
+/// least squares of the runs' ratios to it. A structure behind one fold returns the same energy whatever
+/// the force of that fold, the fold itself in proportion to it; the runs cannot separate the two, and
+/// the root lies between. The residual of a run fades with the square of the proximity in speed.
 fn rebound_speed(model: &Model, v: f64, last_n: f64) -> Option<f64> {
     let (declared, body) = model.curves();
     let curves = if body.is_empty() { declared } else { body };
@@ -255,7 +255,7 @@ pub(super) fn over_speed(
     over(model.cases.iter().filter_map(|c| Some((c.speed_m_per_s, value(c)?))), v)
 }
 
-/// The same of points in order of x.
+/// The same for points in order of x.
 fn over(points: impl Iterator<Item = (f64, f64)>, x: f64) -> Option<f64> {
     interpolate_held(&means(points), x)
 }

@@ -1,15 +1,14 @@
 //! `rate`: a force that depends on deflection and on the speed at that deflection.
 //!
-//! `F = Q(d; v) (1 + β√ḋ)`: the training curves are divided by the factor of their own falling speed, blended linearly
-//! over the speed, and multiplied by the factor of the query's own motion.
+//! `F = Q(d; v) (1 + β√ḋ)`: the training curves are divided by the factor of their own decreasing speed, blended linearly
+//! over speed, and multiplied by the factor of the motion of the query.
 //!
-//! Why β√ḋ: strain rate and the inertia of folds both raise the force, less than in proportion to the speed. The root
-//! lies between the power 1/4 of Cowper and Symonds and 1. Why half of the β that fits best: two runs that overlap also
-//! differ by how they fold and by the nose that is stopped at impact speed, and the curves cannot tell these causes
-//! apart.
+//! Why β√ḋ: strain rate and the inertia of folds both raise the force, less than proportionally to speed. The root
+//! lies between the power 1/4 of Cowper and Symonds and 1. Why half of the best-fit β: overlapping runs also
+//! differ by how they fold and by the nose that is stopped at impact speed, and the curves cannot separate these causes.
 //!
 //! Tried in prototypes and dropped, because none was better on the bundled runs: a Gaussian process over {d, v} and over
-//! {d, v, ḋ}; blending in √v, log v and v²; more than two neighbours; carrying a slower curve on for longer.
+//! {d, v, ḋ}; blending in √v, log v and v²; more than two neighbours; extending a slower curve further.
 
 use std::sync::Arc;
 
@@ -41,7 +40,7 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 /// `F = Q(d; v) R(ḋ)` with `R(u) = 1 + β √u`.
 ///
 /// A run that hits slower passes the same deflection at a lower closing speed ḋ, and stands
-/// there at its own largest crush: a curve measured at a higher speed is too strong for it.
+/// there at its own maximum crush: a curve measured at a higher speed is too strong for it.
 /// Each training curve is divided by R of its own decreasing speed, the quotients Q are
 /// interpolated linearly in impact speed at equal deflection, and the query's own motion
 /// `m ḋ dḋ/dd = −F` brings R back. So crush and energy come out together, other masses and
@@ -103,7 +102,7 @@ impl Rate {
     /// The same deflection is passed at two speeds there, so β can be seen; but two runs
     /// also differ in how they fold, and by what is stopped at the nose at impact speed,
     /// which no ḋ explains. Half of the β that makes the quotients most alike is taken: the
-    /// curves cannot tell the two causes apart.
+    /// curves cannot distinguish the two causes.
     pub(crate) fn fit(cases: &[CaseCurve]) -> Self {
         Self::of(SHARE * Self::best_sensitivity(cases), None)
     }
@@ -244,7 +243,7 @@ impl Rate {
         }
     }
 
-    /// The levels, kept for the first curves that are asked for.
+    /// The levels, kept for the first curves that are requested.
     fn levels(&self, cases: &[CaseCurve]) -> Vec<f64> {
         let of = || cases.iter().map(|c| [c.speed_m_per_s, c.end_m(), c.envelope().work()]);
         let kept = self
@@ -331,7 +330,7 @@ impl Overlap {
     }
 }
 
-/// Mean difference of neighbouring quotients over their overlaps, in ratio to their level.
+/// Mean difference of neighbouring quotients over their overlaps, relative to their level.
 fn disagreement(overlaps: &[Overlap], sensitivity: f64) -> f64 {
     let mut sum = 0.0;
     for Overlap { end_m, points } in overlaps {
@@ -342,7 +341,7 @@ fn disagreement(overlaps: &[Overlap], sensitivity: f64) -> f64 {
             level += 0.5 * (a.abs() + b.abs());
         }
         if level > 0.0 {
-            // Long overlaps say more than short ones.
+            // Long overlaps count more than short ones.
             sum += end_m * difference / level;
         }
     }

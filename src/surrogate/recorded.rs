@@ -1,4 +1,4 @@
-//! A recorded case in the form of a predicted curve, so that it exports like one.
+//! A recorded case in the form of a predicted curve, so that it is exported like one.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Spikes: points of a predicted force that stand alone as none of a training curve does.
+//! Spikes: isolated points of a predicted force that no training curve has.
 
 use super::Model;
 use crate::error::{Error, error};
@@ -8,7 +8,7 @@ use crate::error::{Error, error};
 const SPIKE: f64 = 1.05;
 /// Most rounds of taking points back.
 const ROUNDS: usize = 100;
-/// Most places of a training curve that are looked at.
+/// Most places of a training curve that are examined.
 const PROBES: f64 = 4_000.0;
 
 /// Forces of a physical loading branch: 0 at 0, never negative, and no point that stands
@@ -22,7 +22,7 @@ pub(super) fn without_spikes(
     if force_n.iter().any(|f| !f.is_finite()) {
         return Err(error!(
             Prediction,
-            "the {model} model has no answer at this speed: train another one",
+            "the {model} model cannot predict this speed: train another one",
             model = model.name()
         ));
     }

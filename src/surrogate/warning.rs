@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::plural::counted;
-use crate::unit::km_per_h;
+use crate::unit::{Shown, km_per_h};
 
 /// Something to know before trusting a predicted curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -27,7 +27,7 @@ pub enum WarningCode {
     NearSplitMidpoint,
     /// The curve takes up another energy than the impact has.
     EnergyMismatch,
-    /// A training run ended while loading; it is left out of the maximal crush.
+    /// A training run ended while loading; it is left out of the maximum crush.
     TruncatedTrainingRun,
     /// No training run holds an unloading branch.
     NoUnloading,
@@ -37,13 +37,13 @@ pub enum WarningCode {
     FarFromTraining,
     /// The collapse changes its mode between the neighbouring training speeds.
     ModeSwitch,
-    /// Too few curves to say how good the model is.
+    /// Too few curves to assess the model.
     TooFewCurves,
-    /// The force was scaled so that the curve takes up the impact's energy.
+    /// The force was scaled so that the curve absorbs the impact's energy.
     EnergyCorrected,
-    /// Nothing that was left out tells how far FE may lie from this curve.
+    /// Nothing that was left out shows how far FE may be from this curve.
     NoBand,
-    /// What the build said of a training run, or of the recorded one.
+    /// A warning of the build of a training run, or of the recorded one.
     CaseWarning,
 }
 
@@ -157,7 +157,7 @@ impl Warning {
         Self {
             code: WarningCode::ModeSwitch,
             message: format!(
-                "peaks of the training curves jump between {} and {}: the collapse changes its mode there, and a curve between the two may be of either",
+                "peaks of the training curves jump between {} and {}: the collapse mode changes there, and a curve between the two may follow either",
                 km_per_h(below),
                 km_per_h(above)
             ),
@@ -168,7 +168,7 @@ impl Warning {
         Self {
             code: WarningCode::TooFewCurves,
             message: format!(
-                "the model rests on {}: with fewer than 3 no speed can be left out to see how good it is",
+                "the model rests on {}: with fewer than 3, no speed can be left out to assess it",
                 counted(curves, "training curve")
             ),
         }
@@ -178,7 +178,7 @@ impl Warning {
         Self {
             code: WarningCode::EnergyCorrected,
             message: format!(
-                "the force was multiplied by {factor:.4}, so that the curve takes up the impact's kinetic energy"
+                "the force was multiplied by {factor:.4}, so that the curve absorbs the impact's kinetic energy"
             ),
         }
     }
@@ -187,13 +187,13 @@ impl Warning {
         Self {
             code: WarningCode::EnergyMismatch,
             message: format!(
-                "the curve takes up {:.1} % of the impact's kinetic energy",
+                "the curve absorbs {:.1} % of the impact's kinetic energy",
                 ratio * 100.0
             ),
         }
     }
 
-    /// What is said of a recorded case: that it ended while loading, and what its build warned of.
+    /// Warnings of a recorded case: that it ended while loading, and those of its build.
     pub(crate) fn of_case(name: &str, truncated: bool, warnings: &[String]) -> Vec<Self> {
         let own = warnings.iter().filter(|w| !truncated || !w.starts_with("truncated:"));
         let own = own.map(|warning| Self {
@@ -207,7 +207,7 @@ impl Warning {
         Self {
             code: WarningCode::TruncatedTrainingRun,
             message: format!(
-                "training run \"{name}\" ended while loading: it is left out of the maximal crush"
+                "training run \"{name}\" ended while loading: it is left out of the maximum crush"
             ),
         }
     }
@@ -223,9 +223,9 @@ impl Warning {
         Self {
             code: WarningCode::OtherMass,
             message: format!(
-                "the mass of {:.3} t differs from the training runs' {:.3} t: rate effects are those of the training mass",
-                mass_kg / 1e3,
-                trained_kg / 1e3
+                "the mass of {} differs from the training runs' {}: rate effects are those of the training mass",
+                Shown::one_mass(mass_kg),
+                Shown::one_mass(trained_kg)
             ),
         }
     }

@@ -1,4 +1,4 @@
-//! The journal of a run: CSV beside the output, taken up again where it ends, renamed or
+//! The journal of a run: CSV next to the output, resumed where it ends, renamed or
 //! converted when it is complete.
 
 use std::ffi::OsString;
@@ -44,7 +44,7 @@ fn beside(path: &Path, suffix: &str) -> PathBuf {
 /// Rows go to `OUTPUT.part` first. If that is there from an earlier run of the same sweep, its
 /// rows are kept as far as they are whole and the sums in `OUTPUT.part.sums` are theirs, and the run goes
 /// on after them; if `output` itself is there and is this
-/// sweep's, nothing is run. `progress` is told the number of rows there are, before the first
+/// sweep's, nothing is run. `progress` receives the number of existing rows, before the first
 /// run and after each chunk, and may break: then `OUTPUT.part` stays for the next time.
 ///
 /// # Errors
@@ -148,8 +148,8 @@ fn sum(line: &[u8]) -> String {
 /// Bytes of a checksum with its line feed.
 const SUM: usize = 17;
 
-/// Opens the file under work behind the last row that is whole and as it was written, and that of the
-/// sums; makes them if they are not there.
+/// Opens the file under work after the last row that is whole and as it was written, and that of the
+/// sums; makes them if they are missing.
 fn resume(
     part: &Path,
     sums: &Path,

@@ -1,4 +1,4 @@
-//! Files of shards: their head, and how all are joined.
+//! Files of shards: their headers, and how they are joined.
 
 use std::collections::BTreeSet;
 use std::io::{BufWriter, Read, Write};
@@ -18,7 +18,7 @@ const LISTED: usize = 10;
 /// without shards: CSV, or HDF5 by the extensions `.h5` and `.hdf5`.
 ///
 /// # Errors
-/// It names what is missing, twice or foreign, the first row that is not there, or another writer. The
+/// It names what is missing, twice or foreign, the first row that is missing, or another writer. The
 /// output is then unchanged.
 pub fn merge(inputs: &[PathBuf], output: &Path) -> Result<Report, Error> {
     let _lock = WriterLock::take(output)?;
@@ -97,7 +97,7 @@ fn ordered(files: &mut [ShardFile]) -> Result<ShardHeader, Error> {
         if count != first_count {
             return Err(error!(
                 Sweep,
-                "{path} is one of {count} shards, {first_path} one of {first_count}: merge those of one division"
+                "{path} is one of {count} shards, {first_path} one of {first_count}: merge shards of one division"
             ));
         }
     }

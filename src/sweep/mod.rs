@@ -1,23 +1,23 @@
 //! Sweeps: many runs of one scenario, one row of results each.
 //!
-//! Item `k` has the same row whatever the threads, the pieces or the share of the work
-//! (`shard`) it is run in. Rows stand in order of items and are written as they come, so
-//! nothing grows with their number. The file under work is its own journal: a run that was
-//! stopped goes on after its last whole row.
+//! Item `k` has the same row whatever the threads, the chunks or the shard
+//! (`shard`) it is run in. Rows are in order of items and are written immediately, so
+//! memory does not grow with their number. The unfinished file is its own journal: a run that was
+//! stopped continues after its last complete row.
 //!
 //! Item k is a function of plan and k alone: grids by division, draws by a stream keyed by seed, variable and item, the strata
-//! of a Latin hypercube by a permutation that is computed (a Feistel network) and never held. So threads, pieces and shards
+//! of a Latin hypercube by a permutation that is computed (a Feistel network) and never stored. So threads, chunks and shards
 //! cannot change a row. Quantiles are inverse distribution functions with `libm`'s logarithm and exponential, so that the nodes of
 //! a cluster agree to the last bit.
 //!
-//! Rows are written in order, as CSV, to `OUT.part`; this file is the journal. Its head holds a hash of the plan, the scenario,
-//! the files it names and the program's version. A run that finds it keeps every whole row that is the next one, removes what
-//! follows (a torn line, blocks of zeros) and goes on; at the end the file is renamed. A journal beside the result could contradict
-//! it. HDF5 is made of the complete CSV, which is read twice: the sizes of datasets and the widths of texts are then known, and
-//! nothing is held.
+//! Rows are written in order, as CSV, to `OUT.part`; this file is the journal. Its header holds a hash of the plan, the scenario,
+//! the files it names and the program's version. A run that finds it keeps every complete row in sequence, removes what
+//! follows (a torn line, blocks of zeros) and continues; at the end the file is renamed. A separate journal could contradict
+//! the result. HDF5 is written from the complete CSV, which is read twice: the sizes of datasets and the widths of texts are then known, and
+//! nothing is kept in memory.
 //!
 //! If only masses, speeds and gaps vary, an item needs no new force law: each thread keeps chains by the values that decided their
-//! laws and only changes the numbers in them (`scenario::adjust`). `cargo bench --bench sweep` prints what that saves.
+//! laws and only changes the numbers in them (`scenario::adjust`). `cargo bench --bench sweep` prints the saving.
 
 mod journal;
 mod merge;
@@ -200,7 +200,7 @@ impl Sweep {
         self.variables.iter().zip(self.design.spreads()).map(|(v, s)| v.summary(s)).collect()
     }
 
-    /// The varied values of an item, as they stand in its row.
+    /// The varied values of an item, as they are in its row.
     pub fn values(&self, item: u64) -> Vec<String> {
         let mut values = Vec::new();
         self.design.values(item, &mut values);

@@ -1,4 +1,4 @@
-//! A row of results as numbers and as a line of CSV, and what stands above the rows.
+//! A row of results as numbers and as a line of CSV, and the header above the rows.
 
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
@@ -45,7 +45,7 @@ pub(crate) struct Row {
     pub message: String,
 }
 
-/// A value as it stands in a file: shortest digits that read back the same, a name, or nothing.
+/// A value as it is in a file: shortest digits that read back the same, a name, or nothing.
 pub(crate) fn text(value: f64, names: &[String]) -> String {
     let mut bytes = Vec::new();
     push(&mut bytes, value, names);
@@ -126,7 +126,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// What stands above the rows: which sweep and which part of it they are.
+/// What is above the rows: which sweep and which part of it they are.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ShardHeader {
     /// Version of the program that wrote it.
@@ -167,7 +167,7 @@ impl ShardHeader {
         name.starts_with("curve[") || column + 2 >= self.columns.len()
     }
 
-    /// The head as it stands above the rows.
+    /// The head as it is above the rows.
     pub(crate) fn text(&self) -> String {
         let Shard { index, count } = self.shard;
         let rows = self.rows();
@@ -247,7 +247,7 @@ impl ShardHeader {
         let path = path.display();
         Err(error!(
             Sweep,
-            "{path} belongs to another sweep: {differs}; --restart drops it, another -o keeps it"
+            "{path} belongs to another sweep: {differs}; --restart replaces it, another -o keeps it"
         ))
     }
 }
@@ -297,7 +297,7 @@ pub(super) fn read_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> io::Re
     io::Read::take(reader, MAX_LINE_BYTES).read_until(b'\n', line)
 }
 
-/// Hands on every row behind the head.
+/// Hands on every row after the head.
 fn each_line(
     path: &Path,
     reader: &mut impl BufRead,
@@ -320,7 +320,7 @@ fn each_line(
         0 => Ok(()),
         _ => Err(damaged(
             path,
-            "there is something behind the last row: run its sweep again with --restart",
+            "there is unexpected data after the last row: run its sweep again with --restart",
         )),
     }
 }

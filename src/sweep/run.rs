@@ -147,7 +147,7 @@ impl<'a> Worker<'a> {
         row
     }
 
-    /// Appends the results of the scenario as it stands; gives back warnings, or why it failed.
+    /// Appends the results of the scenario as it stands; returns warnings, or why it failed.
     fn results(&mut self, values: &mut Vec<f64>) -> Result<Vec<String>, Error> {
         let sweep = self.sweep;
         let prepared = self.prepared()?;
@@ -156,7 +156,7 @@ impl<'a> Worker<'a> {
         let run = simulate(&prepared.chain, &settings)
             .map_err(|error| Error::below(ErrorCode::Simulation, error))?;
         push_results(&sweep.results, prepared, &run, values);
-        // What holds for the scenario as written has been said once; here it has other numbers.
+        // Warnings on the scenario as written were given once; here it has other numbers.
         let said = |w: &String| {
             sweep.base.warnings.iter().any(|b| without_numbers(b).eq(without_numbers(w)))
         };

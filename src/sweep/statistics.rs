@@ -1,4 +1,4 @@
-//! What the columns of a sweep hold, followed row by row.
+//! Statistics of the columns of a sweep, updated row by row.
 
 use serde::Serialize;
 

@@ -20,7 +20,7 @@ const MESSAGE: &str = "message";
 /// Rows that are held at once.
 const ROWS: u64 = 4096;
 
-/// What is known of the text columns before the file is laid out.
+/// What is known about the text columns before the file is laid out.
 struct Widths {
     columns: Vec<usize>,
     message: usize,

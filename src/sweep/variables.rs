@@ -1,4 +1,4 @@
-//! What the variables of a plan do to a scenario.
+//! The effect of a plan's variables on a scenario.
 
 use serde::Serialize;
 
@@ -307,12 +307,12 @@ fn unknown<'a>(key: &str, what: &str, name: &str, known: impl Iterator<Item = &'
     error!(Sweep at key, "there is no {what} \"{name}\": the scenario has").names(name, known)
 }
 
-/// Names stand in the columns of the result.
+/// Names appear in the columns of the result.
 fn check_name(key: &str, name: &str) -> Result<(), Error> {
     let breaks = |c: char| c.is_control() || [',', '|', '[', ']', '"', '#'].contains(&c);
     if name.is_empty() || name.contains(breaks) {
         Err(
-            error!(Sweep at key, "the name \"{}\" stands in the result and may not be empty or contain , | [ ] # or quotes",
+            error!(Sweep at key, "the name \"{}\" appears in the result and may not be empty or contain , | [ ] # or quotes",
                 name.escape_debug()
             ),
         )

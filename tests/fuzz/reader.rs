@@ -3,7 +3,7 @@
 use crumple::solver::{Selection, read_from};
 
 pub fn target(format: &'static str, bytes: &[u8]) {
-    // One selection each, told by the input, so that an execution is one reading.
+    // One selection each, recognised by the input, so that an execution is one reading.
     let selection = match bytes.last().map_or(0, |last| last % 4) {
         0 | 1 => Selection::all(),
         2 => Selection::nothing(),

@@ -71,7 +71,7 @@ def exudyn(path, run):
     curve = json.loads(pathlib.Path(path).read_text())
     deflection = numpy.array(curve["deflection_m"])
     force = numpy.array(curve["body_force_N"])
-    # Beyond the maximal crush the force follows faster runs, at the level with which the curve ends.
+    # Beyond the maximum crush the force follows faster runs, at the level with which the curve ends.
     beyond = curve["beyond"]
     further = numpy.array(beyond["body_force_N"])
     deflection = numpy.append(deflection, beyond["deflection_m"][1:])

@@ -3,7 +3,7 @@
     python exports_points.py CURVE.json FILE...
 
 Prints, for each file, the largest difference of its force from the curve's body force at 200
-deflections (linear, over the largest force), and the energy to the maximal crush over the curve's,
+deflections (linear, over the largest force), and the energy to the maximum crush over the curve's,
 minus 1, as the points are interpolated linearly, by Akima's and by cubic splines.
 """
 

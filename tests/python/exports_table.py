@@ -10,7 +10,7 @@ with h5py.File(sys.argv[1]) as file:
     shape = list(file["force_N"].shape)
     speeds, deflections = len(file["speed_m_per_s"]), len(file["deflection_m"])
     assert isinstance(file.attrs["force_kind"], str)
-    # Each row's work to its maximal crush, against the curve that crumple gives at that speed.
+    # Each row's work to its maximum crush, against the curve that crumple gives at that speed.
     curves = json.load(open(sys.argv[3]))
     deflection = file["deflection_m"][:]
     worst = 0.0

@@ -4,7 +4,7 @@
 
 Each CURVE (.csv, .k, .json) says itself its points, units, mass, speed and unloading stiffness. scipy
 integrates the mass along it to rest, and back along the straight unloading line. Prints a JSON
-object with, per file, sum|v - v_FE| / sum|v_FE| until 30 ms after FE's largest crush, and the speed of separation over FE's largest. Where FE's
+object with, per file, sum|v - v_FE| / sum|v_FE| until 30 ms after FE's maximum crush, and the separation speed over FE's largest. Where FE's
 bodies hook and pull each other back (lead-car-pair), no spring that only pushes can follow: there
 it ends when the separation has slowed down by a tenth.
 NODE is one id, or two joined by "-" whose difference is the motion. SCALE makes it the closure in m

@@ -1,4 +1,4 @@
-//! The methods in a train: what each makes of the scenario and its sources.
+//! The methods in a train: scenario and sources of each.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -54,7 +54,7 @@ pub(super) fn methods(
     settings: &ComparisonSettings,
 ) -> Result<Vec<Method>, Error> {
     let groups = groups(path, scenario)?;
-    // Every curve with the body's force, or with the recipe's.
+    // Every curve with the body force, or with the recipe's.
     let with_body = || {
         let mut scenario = scenario.clone();
         scenario.curves.values_mut().for_each(|table| table.force = None);
@@ -82,7 +82,7 @@ pub(super) fn methods(
 
     let start = Instant::now();
     let forests = with_models(sources, &groups, |group, cases| {
-        // Beyond the paper's speeds and masses the motion is asked for the maximal crush.
+        // Beyond the paper's speeds and masses the maximum crush follows from the motion.
         ddtcm_model(&TrainingSet::new(group, cases)?, settings.seed)
     })?;
     let mut paper = with_declared();

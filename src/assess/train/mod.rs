@@ -28,7 +28,7 @@ pub struct TrainComparison {
     pub time_s: Vec<f64>,
     /// FE's speeds in m/s.
     pub fe: BTreeMap<String, Vec<f64>>,
-    /// Time by the clock that FE took for the train, in s, if the run's folder tells.
+    /// Wall-clock time of FE for the train, in s, if the run's folder has it.
     pub fe_time_s: Option<f64>,
     /// What of the reference does not fit the scenario.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -43,7 +43,7 @@ pub struct TrainRow {
     /// `fe_body`, `fdrm` (FE's curves of the scenario, of the body's motion and of the recipe's
     /// force), `nsdm`, `ddtcm`, `best_train`, `best_local` (curves for the trains' speed and for
     /// each interface's own), `rate_live` (the force follows the run's closing speeds), `split_ends`
-    /// (each vehicle with two ends of the models). The last two only where every group tells its
+    /// (each vehicle with two ends of the models). The last two only if every group has a
     /// crush law.
     pub method: String,
     /// What drives its interfaces: `body force`, `recipe's force`, `spring and damper`, `crush
@@ -94,7 +94,7 @@ pub struct VehicleErrors {
 pub struct InterfaceCrush {
     /// `A1|A2`.
     pub interface: String,
-    /// Largest approach of the two vehicles less the gap, in m: both ends together.
+    /// Maximum approach of the two vehicles minus the gap, in m: both ends together.
     pub crush_m: f64,
     /// FE's, from the speeds of its nodes; null where the reference does not name both vehicles.
     pub fe_crush_m: Option<f64>,
@@ -146,7 +146,7 @@ fn compared(
             let m_per_s = train.speed.0;
             if (fe_m_per_s - m_per_s).abs() > SAME_SPEED * m_per_s.abs().max(1.0) {
                 let vehicle = name.clone();
-                return Err(error!(Comparison, "in FE's record {vehicle} begins at {fe_m_per_s:.3} m/s, in the scenario at {m_per_s:.3} m/s: check units, nodes and speeds").at(KeyPath::of("reference.nodes").key(name)));
+                return Err(error!(Comparison, "in FE's record {vehicle} starts at {fe_m_per_s:.3} m/s, in the scenario at {m_per_s:.3} m/s: check units, nodes and speeds").at(KeyPath::of("reference.nodes").key(name)));
             }
         }
     }
@@ -176,7 +176,7 @@ fn compared(
     })
 }
 
-/// Another order of the nodes, or another time of the contact, that fits so much better is said.
+/// Another order of the nodes, or another time of the contact, that fits so much better is reported.
 const SWAPPED: f64 = 0.5;
 const SHIFTED: f64 = 0.6;
 /// Times by which FE's record is shifted to see whether it fits better, in s.
@@ -196,7 +196,7 @@ fn misfits(fe: &FeTrain, time_s: &[f64], row: &TrainRow) -> Vec<String> {
             let (straight, crossed) = (off(own, a) + off(others, b), off(own, b) + off(others, a));
             if crossed < SWAPPED * straight {
                 warnings.push(format!(
-                    "reference: FE's record of {one} fits the run's {other}, and that of {other} its {one}: their nodes may be swapped"
+                    "reference: FE's record of {one} matches {other} in the run, and that of {other} matches {one}: their nodes may be swapped"
                 ));
             }
         }
@@ -221,7 +221,7 @@ fn misfits(fe: &FeTrain, time_s: &[f64], row: &TrainRow) -> Vec<String> {
         .min_by(|a, b| a.0.total_cmp(&b.0));
     if let Some((error, shift_s)) = best.filter(|(error, _)| *error < SHIFTED * shifted(0.0)) {
         warnings.push(format!(
-            "reference: FE's record fits better by {:.0} % when it is moved by {:+.0} ms: look at contact in [reference]",
+            "reference: FE's record fits better by {:.0} % when it is shifted by {:+.0} ms: check contact in [reference]",
             100.0 * (1.0 - error / shifted(0.0)),
             shift_s * 1e3
         ));
@@ -236,7 +236,7 @@ pub(crate) struct FeTrain {
     pub time_s: Vec<f64>,
     /// Vehicle, as the scenario names it, and its speed in m/s at each time.
     pub velocities: Vec<(String, Vec<f64>)>,
-    /// Time by the clock that FE took, in s.
+    /// Wall-clock time of FE, in s.
     pub wall_time_s: Option<f64>,
 }
 
@@ -274,7 +274,7 @@ impl FeTrain {
         let mut velocities = Vec::new();
         for (name, &node) in &reference.nodes {
             let missing = || {
-                error!(Comparison, "{path}: node {node} has no complete {component}: look with crumple inspect, and name another node or component in [reference]", component = reference.component, path = file.display()).at(KeyPath::of("reference.nodes").key(name))
+                error!(Comparison, "{path}: node {node} has no complete {component}: see crumple inspect, and name another node or component in [reference]", component = reference.component, path = file.display()).at(KeyPath::of("reference.nodes").key(name))
             };
             let history = read.history(Some(EntityId::new(node)), &reference.component);
             let values = &history.ok_or_else(missing)?.values[first..];

@@ -1,4 +1,4 @@
-//! One method in a train: its run, held against FE's.
+//! One method in a train: its run, compared with FE's.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -94,7 +94,7 @@ fn vehicle_errors(
 
 /// Crush and work between each two vehicles, or a vehicle and the wall, until the comparison ends.
 ///
-/// An interface whose two bodies are vehicles stands for itself; the plates of ends, and the crush
+/// An interface whose two bodies are vehicles is counted by itself; the plates of ends, and the crush
 /// zones that follow the same two vehicles, belong together.
 fn between_vehicles(chain: &Chain, run: &Run, fe: &FeTrain, time_s: &[f64]) -> Vec<InterfaceCrush> {
     let until_s = time_s[time_s.len() - 1];
@@ -127,7 +127,7 @@ fn between_vehicles(chain: &Chain, run: &Run, fe: &FeTrain, time_s: &[f64]) -> V
     crushes
 }
 
-/// FE's largest approach of two vehicles, or a vehicle and the wall, less the gap.
+/// FE's maximum approach of two vehicles, or a vehicle and the wall, minus the gap.
 fn fe_crush_m(
     fe: &FeTrain,
     time_s: &[f64],

@@ -17,13 +17,13 @@ use super::row::CaseRow;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
 use output::ListedFormat;
 
-/// Files, the group they join, and what they do not say of themselves.
+/// Files, the group they join, and data missing from them.
 #[derive(clap::Args)]
 pub(super) struct Args {
-    /// Curve database; made if it is not there
+    /// Curve database; created if it does not exist
     #[arg(required_unless_present = "list")]
     database: Option<PathBuf>,
-    /// Curves: tables (CSV and the like), JSON, LS-DYNA, Radioss, Modelica, MAT v4, ISO-MME (a folder)
+    /// Curves: tables (CSV and similar), JSON, LS-DYNA, Radioss, Modelica, MAT v4, ISO-MME (a folder)
     #[arg(required_unless_present = "list")]
     files: Vec<PathBuf>,
     /// List the formats that are read
@@ -32,20 +32,20 @@ pub(super) struct Args {
     /// Group of the database
     #[arg(long, required_unless_present = "list")]
     group: Option<String>,
-    /// Impact speed, one for each file in their order; repeated or after commas [default: what the
-    /// file says]
+    /// Impact speed, one for each file in the same order; repeated or separated by commas [default: as the
+    /// file states]
     #[arg(long, value_parser = speed, value_delimiter = ',', allow_hyphen_values = true)]
     speed: Vec<f64>,
-    /// Mass of the body [default: what the file says]
+    /// Mass of the body [default: as the file states]
     #[arg(long, value_parser = mass, allow_hyphen_values = true)]
     mass: Option<f64>,
-    /// Which force the curves are [default: what the file says, else contact]
+    /// Which force the curves hold [default: as the file states, else contact]
     #[arg(long, value_parser = one_of(FORCES))]
     force: Option<ForceKind>,
-    /// Units of values that do not say their own, such as mm-t-s or SI
+    /// Units of values that state none, such as mm-t-s or SI
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
-    /// Name of the case, once for each file in their order [default: the file's name]
+    /// Name of the case, once for each file in the same order [default: the file's name]
     #[arg(long)]
     case: Vec<String>,
     /// Further parameter of the cases: NAME=NUMBER or NAME=CATEGORY
@@ -89,7 +89,7 @@ fn items(args: &Args) -> Result<Vec<Item>, Failure> {
     for (option, given) in [("--speed", args.speed.len()), ("--case", args.case.len())] {
         if given != 0 && given != files {
             return Err(Failure::Usage(format!(
-                "{option} is given {} for {}: give it once for each file, in their order",
+                "{option} is given {} for {}: give it once for each file, in the same order",
                 counted(given, "time"),
                 counted(files, "file")
             )));

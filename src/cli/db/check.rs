@@ -1,4 +1,4 @@
-//! `crumple db check`: every value read, and held against what follows from it.
+//! `crumple db check`: every stored value checked against the others.
 
 use std::path::Path;
 

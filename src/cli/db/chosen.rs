@@ -36,7 +36,7 @@ impl Chosen {
         let selection = self.selection();
         if selection.is_all() {
             Err(Failure::Usage(format!(
-                "say which cases are {what}: with --group, --case, --speed or --tag"
+                "choose the cases to be {what} with --group, --case, --speed or --tag"
             )))
         } else {
             Ok(selection)

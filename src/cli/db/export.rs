@@ -17,7 +17,7 @@ pub(super) struct Args {
     database: PathBuf,
     #[command(flatten)]
     chosen: Chosen,
-    /// Folder to write to; made if it is not there
+    /// Folder to write to; created if it does not exist
     #[arg(short, long)]
     output: PathBuf,
     /// Also write originals.csv, the curves at the solver's rate

@@ -14,13 +14,13 @@ use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
 /// What happens to a case whose name another curve has, and whether anything is written.
 #[derive(clap::Args)]
 struct How {
-    /// Give a new case whose name another curve has another name, such as 36kmh_2
+    /// Rename a new case whose name is taken by a different curve, such as 36kmh_2
     #[arg(long, conflicts_with = "replace")]
     rename: bool,
-    /// Let a new case take the place of another curve of its name
+    /// Replace a different curve of the same name by the new case
     #[arg(long)]
     replace: bool,
-    /// Only say what would be done
+    /// Only show what would be done
     #[arg(long)]
     dry_run: bool,
 }
@@ -65,7 +65,7 @@ pub(super) struct CopyArgs {
     database: PathBuf,
     #[command(flatten)]
     chosen: Chosen,
-    /// Database to copy to; made if it is not there [default: the same]
+    /// Database to copy to; created if it does not exist [default: the same]
     #[arg(long, value_name = "DATABASE")]
     to: Option<PathBuf>,
     /// Group to copy to [default: the case's own]
@@ -78,8 +78,7 @@ pub(super) struct CopyArgs {
 pub(super) fn copy(args: &CopyArgs, options: GlobalOptions) -> CommandResult {
     if args.to.is_none() && args.to_group.is_none() {
         return Err(Failure::Usage(
-            "say where the cases are copied: with --to-group, --to (another database) or both"
-                .into(),
+            "name the destination with --to-group, --to (another database) or both".into(),
         ));
     }
     let selection = args.chosen.some("copied")?;
@@ -123,7 +122,7 @@ impl From {
 fn report(joined: &Joined, path: &Path, dry_run: bool, options: GlobalOptions) -> CommandResult {
     for (from, items) in &joined.not_taken {
         options.warn(&format!(
-            "{} holds what crumple has not written and does not take along: {items}",
+            "{} holds objects that crumple did not write and does not copy: {items}",
             from.display()
         ));
     }
@@ -148,9 +147,9 @@ fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
     print_together(out, "added", added)?;
     let (own, other): (Vec<&From>, Vec<&From>) =
         equal.iter().partition(|case| case.now.as_ref() == Some(&case.case));
-    print_together(out, "there already:", own)?;
+    print_together(out, "already present:", own)?;
     for (what, cases) in [
-        ("there already:", other),
+        ("already present:", other),
         ("renamed", renamed.iter().collect()),
         ("replaced", replaced.iter().collect()),
     ] {
@@ -162,7 +161,7 @@ fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
     let did = if *dry_run { "would write" } else { "wrote" };
     writeln!(
         out,
-        "{did} {database}: {} added, {} replaced, {} there already",
+        "{did} {database}: {} added, {} replaced, {} already present",
         output::counted(added.len() + renamed.len(), "case"),
         replaced.len(),
         equal.len()

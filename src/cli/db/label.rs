@@ -1,4 +1,4 @@
-//! `crumple db tag` and `note`: what users say of cases.
+//! `crumple db tag` and `note`: users' tags and notes on cases.
 
 use std::path::{Path, PathBuf};
 
@@ -16,10 +16,10 @@ pub(super) struct TagArgs {
     database: PathBuf,
     #[command(flatten)]
     chosen: Chosen,
-    /// Tag to add; repeated or after commas
+    /// Tag to add; repeated or separated by commas
     #[arg(long, value_name = "TAG", value_delimiter = ',')]
     add: Vec<String>,
-    /// Tag to remove; repeated or after commas
+    /// Tag to remove; repeated or separated by commas
     #[arg(long, value_name = "TAG", value_delimiter = ',')]
     remove: Vec<String>,
     /// Remove all tags that they have
@@ -71,7 +71,7 @@ struct Document {
     cases: Vec<Labelled>,
 }
 
-/// A case with what users say of it now.
+/// A case with its current tags and notes.
 #[derive(Serialize)]
 struct Labelled {
     group: String,
@@ -87,7 +87,7 @@ fn run(
     options: GlobalOptions,
 ) -> CommandResult {
     if *labels == Labels::default() {
-        return Err(Failure::Usage("say what is changed: with --add, --remove or --clear".into()));
+        return Err(Failure::Usage("nothing to do: give --add, --remove or --clear".into()));
     }
     let cases = curate::label(database, selection, labels)?;
     let database = database.display().to_string();

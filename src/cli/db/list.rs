@@ -56,7 +56,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         let beside = siblings::remarks(database.cases(group)).into_iter();
         let beside = beside.filter(|(name, ..)| is_listed(name));
         warnings.extend(beside.map(|(name, _, words)| format!("{group}/{name}: {words}")));
-        // What the builds said, which the rows of the document have.
+        // Warnings of the builds, which the rows of the document have.
         let of_row = |row: &CaseRow| {
             let name = row.name.clone();
             row.warnings.clone().into_iter().map(move |w| format!("{group}/{name}: {w}"))

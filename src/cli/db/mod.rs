@@ -1,4 +1,4 @@
-//! `crumple db`: look into a curve database, and curate it. One file for commands that belong
+//! `crumple db`: show and edit a curve database. One file for commands that belong
 //! together.
 
 mod add;
@@ -28,7 +28,7 @@ pub(super) use row::CaseRow;
   crumple db tag curves.h5 --group lead-car-wall --add reviewed
   crumple db merge curves.h5 others.h5 -o all.h5
   crumple db export curves.h5 -o tables
-Commands that change a database lock it; whenever they are stopped, the old or the new file is there.")]
+Commands that change a database lock it; if one is interrupted, the old or the new file is intact.")]
 pub(super) struct Args {
     #[command(subcommand)]
     command: Command,
@@ -42,21 +42,21 @@ enum Command {
   crumple db ls curves.h5 --group lead-car-wall --speed 20km/h..50km/h
   crumple db ls curves.h5 --tag reviewed --json")]
     Ls(list::Args),
-    /// Show cases with their curves, or beside each other
+    /// Show cases with their curves, or side by side
     #[command(after_help = "Examples:
   crumple db show curves.h5 --group lead-car-wall --case 36kmh
   crumple db show curves.h5 --json > curves.json
   crumple db show curves.h5 --compare --case lead-car-wall/36kmh --case lead-car-wall/48kmh
   crumple db show curves.h5 --compare --tag reviewed
-Differences are shares of the first case. force L1 is sum|F-F0|/sum|F0| of the loading branches, over even
-steps of the deflection up to which both have one.")]
+Differences are relative to the first case. force L1 is sum|F-F0|/sum|F0| of the loading branches, in
+equal steps of deflection over their common range.")]
     Show(show::Args),
-    /// Read every value and hold what is stored against what follows from it
+    /// Check every stored value against what follows from the others
     ///
-    /// Finds values that are not those that were written, not finite or out of order, holes in
-    /// time, energies, ends of loading and stiffnesses that are not the curve's, two kinds of
+    /// Finds values that were changed, are not finite or out of order, gaps in
+    /// time, energies, ends of loading and stiffnesses that differ from the curve's, two kinds of
     /// speed in a group, runs that ended while loading, and repeats the warnings of the
-    /// extraction. Indices count from 0, as in HDF5's tools.
+    /// extraction. Indices start at 0, as in HDF5's tools.
     #[command(after_help = "Examples:
   crumple db check curves.h5
   crumple db check curves.h5 --strict    # exit code 3 if there is a finding")]
@@ -67,15 +67,15 @@ steps of the deflection up to which both have one.")]
     /// Add measured and legacy curves from files
     ///
     /// Every file becomes a case of the study "imported", with its path, size and hash. A curve
-    /// without times is given the motion that its own force asks for: its largest deflection is
-    /// taken as the largest crush. All files are read before anything is written.
+    /// without times is given the motion that its own force implies: its maximum deflection is
+    /// taken as the maximum crush. All files are read before anything is written.
     #[command(after_help = "Examples:
   crumple db add curves.h5 test.csv --group tests --speed 36km/h --kind wall --mass 24t
   crumple db add curves.h5 25.json 36.json 50.json --group legacy
   crumple db add curves.h5 a.k b.k --group pairs --speed 36km/h,54km/h --kind closing --mass 24t --units mm-t-s
   crumple db add curves.h5 T123.mme --group tests --speed 36km/h --mass 24t
   crumple db add --list
-Headers of columns name quantity and unit: d_mm, displacement [mm], F_kN, Force [N], time (ms).")]
+Column headers name quantity and unit: d_mm, displacement [mm], F_kN, Force [N], time (ms).")]
     Add(Box<add::Args>),
     /// Remove cases or whole groups
     #[command(after_help = "Examples:
@@ -83,11 +83,11 @@ Headers of columns name quantity and unit: d_mm, displacement [mm], F_kN, Force 
   crumple db rm curves.h5 --group lead-car-wall --speed ..15km/h --dry-run
   crumple db rm curves.h5 --tag doubtful
   crumple db rm curves.h5 --group tests
-A build adds the runs of its study again; take a run out of the study to be rid of its case.")]
+A build adds the runs of its study again: to drop a case for good, remove its run from the study.")]
     Rm(rename::RemoveArgs),
     /// Give a case or a group another name
     ///
-    /// A build of the study that a renamed case is from goes on with it under its new name.
+    /// The next build of its study keeps a renamed case under its new name.
     #[command(after_help = "Examples:
   crumple db rename curves.h5 --group lead-car-wall --to nose
   crumple db rename curves.h5 --group lead-car-wall --case 36kmh --to reference
@@ -96,7 +96,7 @@ A build adds the runs of its study again; take a run out of the study to be rid 
     /// Join databases
     ///
     /// Equal curves of a group are taken once, with the tags and notes of both. Different curves
-    /// of one name are refused unless --rename or --replace says what to do with them.
+    /// with the same name are refused unless --rename or --replace says what to do with them.
     #[command(after_help = "Examples:
   crumple db merge a.h5 b.h5 -o all.h5
   crumple db merge a.h5 b.h5 c.h5 -o a.h5 --dry-run    # into the first
@@ -104,7 +104,7 @@ A build adds the runs of its study again; take a run out of the study to be rid 
     Merge(join::MergeArgs),
     /// Copy cases to another group or database
     ///
-    /// A copy in another group is no longer its study's: building that leaves it as it is.
+    /// A copy in another group no longer belongs to its study: builds leave it as it is.
     #[command(after_help = "Examples:
   crumple db copy curves.h5 --group lead-car-wall --speed 20km/h..50km/h --to-group inner-speeds
   crumple db copy curves.h5 --tag reviewed --to approved.h5

@@ -17,7 +17,7 @@ pub(super) struct RemoveArgs {
     database: PathBuf,
     #[command(flatten)]
     chosen: Chosen,
-    /// Only say what would be removed
+    /// Only show what would be removed
     #[arg(long)]
     dry_run: bool,
 }

@@ -1,4 +1,4 @@
-//! `crumple db show`: cases with their curves, or beside each other.
+//! `crumple db show`: cases with their curves, or side by side.
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
@@ -22,7 +22,7 @@ pub(super) struct Args {
     database: PathBuf,
     #[command(flatten)]
     chosen: Chosen,
-    /// Hold the cases against the first of them, in the order of --case
+    /// Compare the cases with the first of them, in the order of --case
     #[arg(long)]
     compare: bool,
 }

@@ -1,4 +1,4 @@
-//! What the histories of one record say of each other along time: impulse against momentum, displacement against velocity,
+//! Consistency of the histories of one record along time: impulse against momentum, displacement against velocity,
 //! force against motion, the output interval against the curve.
 
 use super::error::ExtractError;
@@ -9,12 +9,13 @@ use crate::curve::contact::milliseconds;
 use crate::curve::energy::{IMPOSSIBLE_ALONG_TIME, ImpossibleRun, POSSIBLE};
 use crate::curve::{Curve, Masses, loading};
 use crate::signal::interpolate;
+use crate::unit::Shown;
 
 /// Impulse and lost momentum of clean FE runs differ by 1 to 4 % of the impact's momentum at any
 /// time; a clock that is 10 ms off makes it 11 to 45 %.
 const IMPULSE: f64 = 0.08;
 /// Displacement and the integral of the velocity differ by 0.02 % of the range in clean runs, by
-/// 0.07 % where only each 6 ms are written.
+/// 0.07 % where only every 6 ms are written.
 const DISPLACEMENT: f64 = 0.005;
 /// A force after the contact counts from this share of the peak on, and from this share of the
 /// momentum.
@@ -22,14 +23,13 @@ const LATE_FORCE: (f64, f64) = (0.15, 0.02);
 /// A body that has lost less than this share of its speed, under an impulse of half its momentum,
 /// does not move by that force.
 const SLOWED: f64 = 0.05;
-/// Fewer output intervals up to the largest crush than this may cut peaks.
+/// Fewer output intervals up to the maximum crush than this may cut peaks.
 const STATES: usize = 100;
 /// Effect of the sampling on the curve, as a share of its mean force, that deserves a warning.
 const SAMPLED_OFF: f64 = 0.02;
 /// Where two histories of one record cannot be one run's.
-const OTHER_FILES: &str =
-    "likely files of two runs, another node or wall, or a clock that was changed";
-/// A peak is a spike above these multiples of the states beside it and of all others.
+const OTHER_FILES: &str = "likely files of two runs, the wrong node or wall, or shifted times";
+/// A peak is a spike above these multiples of its neighbours and of all others.
 const SPIKE: (f64, f64) = (2.5, 1.2);
 /// Free flight in fewer states says nothing of gravity.
 const FLIGHT: usize = 5;
@@ -87,18 +87,18 @@ pub(super) fn displacement(record: &Record) -> Result<Notes, ImpossibleRun> {
     let Difference { largest, since_s } = Difference::of((0..t.len()).map(off), DISPLACEMENT);
     let Some(since_s) = since_s else { return Ok(remarks) };
     let found = format!(
-        "displacement: from {} on it is not the integral of the velocity, by up to {:.1} % of its range",
+        "displacement: from {} on it deviates from the integral of the velocity by up to {:.1} % of its range",
         milliseconds(since_s),
         largest * 100.0
     );
     if largest > IMPOSSIBLE_ALONG_TIME {
         return Err(ImpossibleRun::of_histories(found, OTHER_FILES));
     }
-    remarks.warn(format!("{found}: one of the two is damaged, scaled or of another node"));
+    remarks.warn(format!("{found}: one of the two is damaged, scaled or from another node"));
     Ok(remarks)
 }
 
-/// A peak that is a single state, far above those beside it and above all others: damage, or an output
+/// A peak that is a single state, far above its neighbours and all others: damage, or an output
 /// interval that is too long.
 pub(super) fn spike(time_s: &[f64], force_n: &[f64]) -> Option<String> {
     let peak = (0..force_n.len()).max_by(|&a, &b| force_n[a].total_cmp(&force_n[b]))?;
@@ -107,11 +107,11 @@ pub(super) fn spike(time_s: &[f64], force_n: &[f64]) -> Option<String> {
     let others = others.fold(0.0, f64::max);
     (force_n[peak] > SPIKE.0 * beside && force_n[peak] > SPIKE.1 * others).then(|| {
         format!(
-            "force: the peak of {:.3} MN is a single state, at {}; the states beside it have up to {:.3} MN, all others up to {:.3} MN: look whether it is damaged",
-            force_n[peak] / 1e6,
+            "force: the peak of {} is a single state, at {}; its neighbours reach {}, all other states {}: check whether it is damaged",
+            Shown::one_force(force_n[peak]),
             milliseconds(time_s[peak]),
-            beside / 1e6,
-            others / 1e6
+            Shown::one_force(beside),
+            Shown::one_force(others)
         )
     })
 }
@@ -120,7 +120,7 @@ pub(super) fn spike(time_s: &[f64], force_n: &[f64]) -> Option<String> {
 pub(super) struct Motion<'a> {
     pub contact: &'a FromContact,
     pub masses: Masses,
-    /// First state after the largest deflection at which the force is gone.
+    /// First state after the maximum deflection at which the force is gone.
     pub end: usize,
 }
 
@@ -157,14 +157,14 @@ impl<'a> Motion<'a> {
             return Ok(());
         }
         Err(ExtractError::Prescribed(format!(
-            "the motion is prescribed: the body keeps its {:.4} m/s up to the largest deflection, though the force would have stopped it {:.1} times",
+            "the motion is prescribed: the body keeps its {:.4} m/s up to the maximum deflection, though the force would have stopped it {:.1} times",
             closing[0],
             impulse / self.momentum_ns()
         )))
     }
 
     /// The impulse of the force against the lost momentum, at every state of the contact, and of
-    /// each spell of force after it.
+    /// each force pulse after it.
     pub(super) fn momentum(&self) -> Result<Notes, ImpossibleRun> {
         let mut remarks = Notes::default();
         let (time_s, force_n) = (self.contact.curve.time_s(), self.contact.curve.force_n());
@@ -177,7 +177,7 @@ impl<'a> Motion<'a> {
         let Difference { largest, since_s } = Difference::of((0..=self.end).map(off), IMPULSE);
         if let Some(since_s) = since_s {
             let found = format!(
-                "impulse: from {} on the force does not give the body's change of momentum, by up to {:.1} % of the impact's",
+                "impulse: from {} on it deviates from the body's change of momentum by up to {:.1} % of the impact's momentum",
                 milliseconds(since_s),
                 largest * 100.0
             );
@@ -185,7 +185,7 @@ impl<'a> Motion<'a> {
                 return Err(ImpossibleRun::of_histories(found, OTHER_FILES));
             }
             remarks.warn(format!(
-                "{found}: the times of force and motion differ, the force is another body's, or not all of it is in the recipe"
+                "{found}: the times of force and motion differ, the force acts on another body, or the recipe lacks part of it"
             ));
         }
         let peak_n = force_n[..=self.end].iter().copied().fold(0.0, f64::max);
@@ -198,12 +198,14 @@ impl<'a> Motion<'a> {
             let lost_ns = self.lost_ns(first - 1, last);
             if given_ns > LATE_FORCE.1 * whole_ns && (given_ns - lost_ns).abs() > 0.5 * given_ns {
                 remarks.warn(format!(
-                    "force: between {} and {}, after the contact, it gives {:.3} kN·s, and the momentum changes by {lost:.3} kN·s: this force, of up to {:.3} MN, does not act on this body",
+                    "force: between {} and {}, after the contact, its impulse is {}, but the momentum changes by {lost}: this force, of up to {}, does not act on this body",
                     milliseconds(self.at(first)),
                     milliseconds(self.at(last)),
-                    given_ns / 1e3,
-                    force_n[first..=last].iter().copied().fold(0.0, f64::max) / 1e6,
-                    lost = lost_ns / 1e3,
+                    Shown::one_impulse(given_ns),
+                    Shown::one_force(
+                        force_n[first..=last].iter().copied().fold(0.0, f64::max)
+                    ),
+                    lost = Shown::one_impulse(lost_ns),
                 ));
             }
             from = last + 1;
@@ -211,7 +213,7 @@ impl<'a> Motion<'a> {
         Ok(remarks)
     }
 
-    /// The mass that the contact force beside a body force asks for: mass times acceleration is in
+    /// The mass that the contact force implies for a body force: mass times acceleration is in
     /// balance with every mass.
     pub(super) fn mass(&self, record: &Record) -> Result<Notes, ImpossibleRun> {
         let mut remarks = Notes::default();
@@ -230,9 +232,9 @@ impl<'a> Motion<'a> {
         }
         let ratio = integral(&times, &force_n)[times.len() - 1] / lost_ns;
         let found = format!(
-            "mass: up to the largest crush the contact force gives {ratio:.3} times the momentum that {:.4} t lose; it asks for {:.4} t",
-            self.masses.body_kg / 1e3,
-            ratio * self.masses.body_kg / 1e3
+            "mass: up to the maximum crush the impulse of the contact force is {ratio:.3} times the momentum lost by {}; it would fit {}",
+            Shown::one_mass(self.masses.body_kg),
+            Shown::one_mass(ratio * self.masses.body_kg)
         );
         // Other contacts may act as well, but none pulls.
         if ratio > POSSIBLE.1 {
@@ -242,7 +244,7 @@ impl<'a> Motion<'a> {
             ));
         }
         if (ratio - 1.0).abs() > IMPULSE {
-            let or = if ratio < 1.0 { ", or more acts than this contact" } else { "" };
+            let or = if ratio < 1.0 { ", or other forces act besides this contact" } else { "" };
             remarks.warn(format!("{found}: the mass of the run is wrong{or}"));
         }
         Ok(remarks)
@@ -263,7 +265,7 @@ impl<'a> Motion<'a> {
         let share = rate * crush_m / energy;
         if share.abs() > OTHER_WORK {
             remarks.warn(format!(
-                "free flight: before contact the speed changes by {rate:.2} m/s² (gravity, brakes, friction); energy and stopped mass leave this force out, whose work over the crush is {:.1} % of the kinetic energy",
+                "free flight: before contact the speed changes by {rate:.2} m/s² (gravity, brakes, friction); energy and stopped mass neglect this force, whose work over the crush is {:.1} % of the kinetic energy",
                 share * 100.0
             ));
         }
@@ -271,7 +273,7 @@ impl<'a> Motion<'a> {
     }
 }
 
-/// Whether the output interval is short enough for the curve, by what it would be without each second
+/// Whether the output interval is short enough for the curve, by what it would be without every second
 /// state; and what the recipe's common times make of it.
 pub(super) fn sampling(original: &Curve, sampled: &Curve) -> Notes {
     let mut remarks = Notes::default();
@@ -281,19 +283,19 @@ pub(super) fn sampling(original: &Curve, sampled: &Curve) -> Notes {
     let halved = off_at(original, &halved).unwrap_or(0.0);
     if end < STATES && end > 0 {
         let found = format!(
-            "sampling: the record has {end} states up to the largest crush, one each {:.3} ms; without each second of them the curve changes by {:.1} % of its mean force",
+            "sampling: the record has {end} states up to the maximum crush, one every {:.3} ms; dropping every second one changes the curve by {:.1} % of its mean force",
             interval_ms(original.time_s(), end),
             halved * 100.0
         );
         if halved > SAMPLED_OFF {
-            remarks.warn(format!("{found}: about as much may lie between those that were written, and peaks are cut; write histories more often"));
+            remarks.warn(format!("{found}: a similar error may remain between the recorded states, and peaks are cut off; write histories at shorter intervals"));
         } else {
             remarks.note(found);
         }
     }
     if let Some(off) = off_at(original, sampled.time_s()).filter(|&off| off > SAMPLED_OFF) {
         remarks.warn(format!(
-            "sampling: the recipe's times, one each {:.3} ms, change the curve by {:.1} % of its mean force: shorten interval_ms",
+            "sampling: the recipe's times, one every {:.3} ms, change the curve by {:.1} % of its mean force: shorten interval_ms",
             interval_ms(sampled.time_s(), sampled.time_s().len() - 1),
             off * 100.0
         ));

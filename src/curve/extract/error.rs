@@ -5,7 +5,7 @@ use crate::curve::energy;
 use crate::error::Error;
 use crate::signal::cfc;
 
-/// Why a run gives no curve.
+/// Reasons why a run has no curve.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ExtractError {
     /// A history has fewer than two states.
@@ -18,7 +18,7 @@ pub enum ExtractError {
         /// Number of its states.
         states: usize,
     },
-    /// A value is infinite or no number.
+    /// A value is not a finite number.
     #[error(
         "{what} of state {state} is {value}: expected a finite number; look for the problem with crumple inspect"
     )]
@@ -42,7 +42,7 @@ pub enum ExtractError {
     NoOverlap,
     /// A time of the manifest lies outside the record.
     #[error(
-        "{key} = {at} lies outside the record, which goes from {first} to {last}",
+        "{key} = {at} lies outside the record, which runs from {first} to {last}",
         at = milliseconds(*time_s), first = milliseconds(*first_s), last = milliseconds(*last_s)
     )]
     OutsideRecord {
@@ -57,7 +57,7 @@ pub enum ExtractError {
     },
     /// The bodies never close the gap that the manifest states.
     #[error(
-        "gap = {gap_mm} mm is never closed: the bodies move towards each other by {most_mm:.3} mm at most",
+        "gap = {gap_mm} mm is never closed: the bodies approach each other by at most {most_mm:.3} mm",
         gap_mm = gap_m * 1e3, most_mm = most_m * 1e3
     )]
     GapStaysOpen {
@@ -80,20 +80,20 @@ pub enum ExtractError {
     /// No crash can have such a curve.
     #[error("{0}")]
     ImpossibleRun(#[from] energy::ImpossibleRun),
-    /// The body moves as it was told to, whatever the force.
+    /// The motion of the body is prescribed, whatever the force.
     #[error(
-        "{0}. Such a curve belongs to no impact of this mass and speed; crumple histories gives its force and displacement"
+        "{0}. No impact of this mass and speed has such a curve; crumple histories writes its force and displacement"
     )]
     Prescribed(String),
     /// The deflection does not grow after contact.
     #[error("the deflection does not grow after contact: check node, component and direction")]
     NoDeflection,
-    /// Neither manifest nor file tell the speed.
+    /// Neither manifest nor file contains the speed.
     #[error(
         "the manifest gives no speed and the file has no {component} to take it from: add speed = \"…km/h\""
     )]
     NoSpeed {
-        /// Component that would have told it.
+        /// Component that would have given it.
         component: String,
     },
     /// The body does not move in the first state.

@@ -62,7 +62,7 @@ impl FromContact {
     }
 }
 
-/// When the bodies have moved by `slack_m` behind contact: where the surfaces meet later than
+/// When the bodies have moved by `slack_m` after contact: where the surfaces meet later than
 /// found, the curve begins where they do.
 fn closed_s(
     record: &Record,

@@ -1,4 +1,4 @@
-//! What an extraction starts from: the run's histories, and what the manifest says of it.
+//! The input of an extraction: the run's histories, and its settings in the manifest.
 
 use crate::curve::Masses;
 use crate::curve::recipe::{Filter, RecordedMotion, Sampling};
@@ -7,7 +7,7 @@ use crate::unit::{SpeedKind, UnitSystem};
 
 /// The histories of one run, in the solver's units.
 pub struct Measured<'a> {
-    /// Those of the solver's files.
+    /// Those of the solver files.
     pub units: UnitSystem,
     /// Of the recipe's node.
     pub displacement: &'a History,
@@ -19,19 +19,19 @@ pub struct Measured<'a> {
     pub minus_velocity: Option<&'a History>,
     /// The force of the curve.
     pub force: MeasuredForce<'a>,
-    /// Contact force that tells when contact begins, where the force is a body force.
+    /// Contact force that marks the start of contact for a body force.
     pub contact: Option<&'a History>,
 }
 
 /// The force, or what makes it.
 pub enum MeasuredForce<'a> {
-    /// What the obstacle feels.
+    /// The force on the obstacle.
     Contact(&'a History),
     /// Acceleration or velocity of the body's node, to be multiplied by its mass.
     Body(&'a History, RecordedMotion),
 }
 
-/// What the manifest says of a run.
+/// Settings of a run in the manifest.
 #[derive(Clone, Debug)]
 pub struct Setup<'a> {
     /// Of the force.
@@ -49,9 +49,9 @@ pub struct Setup<'a> {
     pub manifest_speed_m_per_s: Option<f64>,
     /// Of the run, if its deck gives it.
     pub deck_speed: Option<DeckSpeed>,
-    /// Share of the largest force above which a record is in contact.
+    /// Share of the peak force above which a record is in contact.
     pub contact_threshold: f64,
-    /// What the run's entry says of its record.
+    /// Settings of the record in the run's entry.
     pub stated: Stated,
     /// Names and speeds of the study's other runs, to name what was mistaken for what.
     pub others: &'a [(String, f64)],
@@ -73,11 +73,11 @@ pub struct Stated {
     pub contact: Option<StatedContact>,
     /// Deflection at contact.
     pub offset_m: f64,
-    /// Solver's time behind which the record is not used.
+    /// Solver's time after which the record is not used.
     pub truncate_s: Option<f64>,
     /// 1 or −1: factor that makes the file's force positive in compression.
     pub force_sign: Option<f64>,
-    /// Take the run whatever its energy and impulse say.
+    /// Accept the run whatever its energy and impulse.
     pub accept_energy: bool,
 }
 

@@ -144,25 +144,23 @@ fn filter(class: u32, record: &mut Record) -> Result<Notes, ExtractError> {
     Ok(remarks)
 }
 
-/// What energy, impulse and the loading branch say of a curve.
+/// Notes on energy, impulse and the loading branch of a curve.
 fn audited(curve: &Curve, balance: energy::EnergyBalance) -> Notes {
     let mut remarks = Notes::default();
     // Of a run that ended while loading: of what it had stopped by then.
     if let Some(work) = balance.work.filter(|w| (w - 1.0).abs() > EnergyAudit::TOLERANCE) {
-        remarks.warn(format!(
-            "energy: the curve takes up {:.1} % of the kinetic energy",
-            work * 100.0
-        ));
+        remarks
+            .warn(format!("energy: the curve absorbs {:.1} % of the kinetic energy", work * 100.0));
     }
     if let Some(impulse) = balance.impulse.filter(|i| (i - 1.0).abs() > energy::IMPULSE_TOLERANCE) {
         remarks.warn(format!(
-            "impulse: the force gives {:.1} % of the recorded change of momentum",
+            "impulse: the force accounts for {:.1} % of the recorded change of momentum",
             impulse * 100.0
         ));
     }
     if loading::loading_end(curve) + 1 == curve.time_s().len() {
         remarks.warn(
-            "truncated: the largest deflection is the last state, so the run ended while loading",
+            "truncated: the maximum deflection is at the last state, so the run ended while loading",
         );
     }
     if let Ok(branch) = loading::loading_branch(curve)

@@ -30,7 +30,7 @@ pub(crate) struct Record {
     /// Name of the velocity that the files do not have: the rate is then a derivative.
     pub missing_velocity: Option<String>,
     pub force_kind: ForceKind,
-    /// Contact force that shows when contact begins, beside a body force.
+    /// Contact force that marks the start of contact for a body force.
     pub contact: Option<Signal>,
     /// Of the files, to name what was mistaken.
     pub units: UnitSystem,
@@ -126,7 +126,7 @@ impl Record {
         let lost = impulse(&force.time_s[..lead], &force.values[..lead]);
         if lost.abs() > LEFT_OUT * whole.abs() {
             remarks.warn(format!(
-                "times: the force begins at {}, the motion at {}: {:.1} % of the force's impulse lie before it and are left out; the clocks of the two files differ, or the first states of the motion are missing",
+                "times: the force starts at {}, the motion at {}: {:.1} % of the impulse precede the motion and are left out; the time origins of the two files differ, or the first states of the motion are missing",
                 milliseconds(force.time_s[0]),
                 milliseconds(from),
                 100.0 * lost / whole
@@ -153,7 +153,7 @@ impl Record {
         Ok((record, remarks))
     }
 
-    /// Removes the states behind the manifest's end of the record; says how many.
+    /// Removes the states after the manifest's end of the record; says how many.
     fn truncate(&mut self, until_s: f64) -> Result<String, ExtractError> {
         let kept = self.time_s.iter().take_while(|&&t| t <= until_s).count();
         if kept < 2 {
@@ -359,7 +359,7 @@ pub(super) fn sample(
             times.len(),
             sampling.states
         );
-        // A record that was cut on purpose is as short as was asked for, and one that begins with
+        // A record that was cut on purpose is as short as was requested, and one that begins with
         // some states of flight ends as much earlier.
         let missing = sampling.states - times.len();
         match setup.stated.truncate_s {
@@ -371,7 +371,7 @@ pub(super) fn sample(
     if window_s < end_s && times.len() == sampling.states && setup.stated.truncate_s.is_none() {
         return Err(error!(
             Run at "sampling",
-            "recipe.sampling has {sampling}, which ends {} after contact, before the largest crush at {}: raise states to {:.0} or more, or say truncate in the run",
+            "recipe.sampling has {sampling}, which ends {} after contact, before the maximum crush at {}: raise states to {:.0} or more, or set truncate in the run",
             milliseconds(window_s),
             milliseconds(end_s),
             (end_s / sampling.interval_s).ceil() + 1.0

@@ -1,11 +1,11 @@
-//! What is said of a run besides its numbers.
+//! Notes and warnings on a run.
 
-/// Choices that were made, and what the user should look at.
+/// Choices that were made, and what the user should check.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Notes {
     /// Choices made, for the record.
     pub notes: Vec<String>,
-    /// What the user should look at.
+    /// What the user should check.
     pub warnings: Vec<String>,
 }
 
@@ -25,13 +25,13 @@ impl Notes {
         self.warnings.push(warning.into());
     }
 
-    /// Adds other remarks behind these.
+    /// Adds other remarks after these.
     pub(crate) fn append(&mut self, other: Self) {
         self.notes.extend(other.notes);
         self.warnings.extend(other.warnings);
     }
 
-    /// The result of a step, whose remarks are added behind these.
+    /// The result of a step, whose remarks are added after these.
     pub(crate) fn take<T>(&mut self, (result, remarks): (T, Self)) -> T {
         self.append(remarks);
         result

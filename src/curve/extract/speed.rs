@@ -6,10 +6,10 @@ use super::record::Record;
 use super::remarks::Notes;
 use crate::unit::{Speed, km_per_h};
 
-/// Two speeds of one impact may differ by this share before it is said.
+/// Two speeds of one impact may differ by this share before it is reported.
 const SAME_SPEED: f64 = 0.01;
 
-/// Who says the impact speed.
+/// Source of the impact speed.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum SpeedBy {
     Manifest,
@@ -27,7 +27,7 @@ pub(super) struct ImpactSpeed {
 
 impl ImpactSpeed {
     /// The manifest's speed, else the record's, else the deck's. Where two of them differ, both
-    /// are said. `before`: the last state that contact has not changed.
+    /// are reported. `before`: the last state that contact has not changed.
     pub(crate) fn of(
         setup: &Setup<'_>,
         record: &Record,
@@ -41,7 +41,7 @@ impl ImpactSpeed {
             && differ(first, recorded)
         {
             remarks.warn(format!(
-                "speed: the first state moves at {}, the last before contact at {}; the latter is the record's",
+                "speed: the first state moves at {}, the last before contact at {}; the latter is used",
                 km_per_h(first),
                 km_per_h(recorded)
             ));
@@ -63,7 +63,7 @@ impl ImpactSpeed {
         for (who, other) in of_record.into_iter().chain(of_deck) {
             if differ(m_per_s, other) {
                 remarks.warn(format!(
-                    "speed: {who} says {}, the {name} {} is used",
+                    "speed: {who} states {}; the {name} {} is used",
                     km_per_h(other),
                     km_per_h(m_per_s)
                 ));

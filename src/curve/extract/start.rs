@@ -1,4 +1,4 @@
-//! Where contact begins in a record.
+//! Start of contact in a record.
 
 use super::error::ExtractError;
 use super::from_contact::FromContact;
@@ -7,6 +7,7 @@ use super::record::{Record, impulse};
 use super::remarks::Notes;
 use crate::curve::contact::{self, milliseconds};
 use crate::curve::{Curve, ForceKind, loading};
+use crate::unit::Shown;
 
 /// A beginning of the crush, as a share of it, that brings less than this share of the impulse
 /// is doubtful: light noses of real runs bring twice as much and more.
@@ -31,7 +32,7 @@ enum StartBy {
     FirstState { missing_m: f64 },
     /// A crossing within an output interval of this length.
     Crossing { interval_s: f64 },
-    /// The body's slowing down, which is later: said where it is found.
+    /// The deceleration of the body, which starts later: reported where it is found.
     Body,
 }
 
@@ -68,7 +69,7 @@ impl Start {
         let of_body = record.contact.is_none() && record.force_kind == ForceKind::Body;
         if of_body {
             remarks.warn(format!(
-                "contact: found at {} where the body slows down; what touches first is stopped earlier by some milliseconds, and the crush is too short by as much times the speed: name the contact force in the recipe (contact = {{ file = \"rwforc\", id = 1, component = \"normal_force\" }}), or say contact_time in the run",
+                "contact: found at {}, where the body starts to slow down; the first touch is some milliseconds earlier, and the crush is too short by the distance travelled in between: name the contact force in the recipe (contact = {{ file = \"rwforc\", id = 1, component = \"normal_force\" }}), or set contact_time in the run",
                 milliseconds(onset.time_s)
             ));
         }
@@ -95,7 +96,7 @@ impl Start {
                 if impulse_share_to(curve, BEGINNING.0 * crush_m) < BEGINNING.1 =>
             {
                 remarks.warn(format!(
-                    "contact: the first {:.0} % of the crush ({:.0} mm) bring less than {} % of the impulse: if that is not the contact yet, say contact_time or gap in the run",
+                    "contact: the first {:.0} % of the crush ({:.0} mm) contribute less than {} % of the impulse: if contact starts later, set contact_time or gap in the run",
                     BEGINNING.0 * 100.0,
                     BEGINNING.0 * crush_m * 1e3,
                     BEGINNING.1 * 100.0
@@ -103,7 +104,7 @@ impl Start {
             }
             StartBy::Crossing { interval_s } if step_m(interval_s) > CERTAIN_SHARE * crush_m => {
                 remarks.warn(format!(
-                    "contact: it lies in a step of {:.2} mm, so the crush is uncertain by up to {:.1} % (contact_time or gap in the run says where)",
+                    "contact: it lies between two states {:.2} mm apart, so the crush is uncertain by up to {:.1} % (contact_time or gap in the run sets it)",
                     step_m(interval_s) * 1e3,
                     100.0 * step_m(interval_s) / crush_m
                 ));
@@ -113,7 +114,7 @@ impl Start {
                     && (missing_m - setup.stated.offset_m).abs() > MISSING_SHARE * crush_m =>
             {
                 remarks.warn(format!(
-                    "contact: offset = {:.1} mm, but by its first state the record, which begins in contact, lacks {:.1} mm of the crush",
+                    "contact: offset = {:.1} mm, but by its first state the record, which starts in contact, lacks {:.1} mm of the crush",
                     setup.stated.offset_m * 1e3,
                     missing_m * 1e3
                 ));
@@ -122,7 +123,7 @@ impl Start {
                 if missing_m > MISSING_SHARE * crush_m && setup.stated.offset_m == 0.0 =>
             {
                 remarks.warn(format!(
-                    "contact: the record begins at {}, in contact: the first {:.1} mm of the crush ({:.1} %) are missing; say offset = \"{:.1}mm\" in the run, or give its first states",
+                    "contact: the record starts at {}, in contact: the first {:.1} mm of the crush ({:.1} %) are missing; set offset = \"{:.1}mm\" in the run, or provide the earlier states",
                     milliseconds(self.time_s),
                     missing_m * 1e3,
                     100.0 * missing_m / (crush_m + missing_m),
@@ -130,7 +131,7 @@ impl Start {
                 ));
             }
             StartBy::FirstState { .. } => remarks.note(
-                "contact: the record begins in contact, so the deflection counts from its first state",
+                "contact: the record starts in contact, so deflection counts from its first state",
             ),
             StartBy::Crossing { .. } | StartBy::Manifest | StartBy::Body => {}
         }
@@ -154,10 +155,10 @@ impl Start {
         let rest_ns = impulse(&contact.curve.time_s()[..=end], &contact.curve.force_n()[..=end]);
         if early_ns > EARLY_SHARE * (early_ns + rest_ns) {
             remarks.warn(format!(
-                "contact: before {}, where the manifest has it begin, the force is up to {:.3} MN and gives {:.3} kN·s, {:.1} % of the impulse up to the largest crush: the curve leaves it out; look at contact_time, gap and offset",
+                "contact: before {}, the start set in the manifest, the force reaches {} and its impulse {}, {:.1} % of that up to the maximum crush: the curve leaves it out; check contact_time, gap and offset",
                 milliseconds(contact.time_s),
-                force_n[..before].iter().copied().fold(0.0, f64::max) / 1e6,
-                early_ns / 1e3,
+                Shown::one_force(force_n[..before].iter().copied().fold(0.0, f64::max)),
+                Shown::one_impulse(early_ns),
                 100.0 * early_ns / (early_ns + rest_ns)
             ));
         }
@@ -180,7 +181,7 @@ fn found_elsewhere(record: &Record, stated_s: f64, setup: &Setup<'_>) -> Option<
     let is_elsewhere = (found.time_s - stated_s).abs() > found.interval_s.unwrap_or(0.0);
     is_elsewhere.then(|| {
         format!(
-            "contact: {} as the manifest has it; the force begins at {}",
+            "contact: {} as set in the manifest; the force starts at {}",
             milliseconds(stated_s),
             milliseconds(found.time_s)
         )

@@ -1,4 +1,4 @@
-//! The archive of an FMU: which file lies where.
+//! The archive of an FMU and the places of its files.
 
 use crate::error::{Error, error};
 use std::io::{Cursor, Write};
@@ -29,7 +29,7 @@ pub(super) fn pack(
     let compiled: Vec<&str> =
         sources.iter().map(|(file, _)| *file).filter(|file| file.ends_with(".c")).collect();
 
-    // One date for all, or the same input would give other bytes tomorrow.
+    // A fixed date, so that the same input always gives the same bytes.
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
         .last_modified_time(DateTime::default())

@@ -10,7 +10,7 @@ enum Role {
     /// With the variables that it follows from: always those of initialization; the parameter is
     /// none of the others, since it is set at events only.
     Output(&'static [u32]),
-    /// Changes its sign where a straight piece of the law ends.
+    /// Changes sign where a linear segment of the law ends.
     EventIndicator,
 }
 
@@ -61,7 +61,7 @@ const VARIABLES: [Variable; 8] = [
         reference: 6,
         role: Role::Output(&[DEFLECTION]),
         unit: Some("m"),
-        description: "Largest deflection so far",
+        description: "Maximum deflection so far",
     },
     Variable {
         name: "force_scale",
@@ -165,7 +165,7 @@ fn units(with_time: bool) -> String {
     format!("  <UnitDefinitions>\n{}  </UnitDefinitions>\n", each.collect::<String>())
 }
 
-/// Causality and the rest of what a role asks for, and the start value.
+/// Causality and the other attributes of a role, and the start value.
 fn role(role: &Role) -> (&'static str, Option<&'static str>) {
     match role {
         Role::Input => (r#"causality="input" variability="continuous""#, Some("0")),

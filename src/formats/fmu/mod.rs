@@ -1,8 +1,8 @@
 //! FMUs: a force law as a component for any tool that imports FMI 2.0 or 3.0, by model exchange or by
-//! co-simulation. Of all exports they alone carry the whole law with its memory.
+//! co-simulation. They are the only exports with the complete law and its memory.
 //!
 //! The component is written in C (`c/`) and compiled when crumple is built. One binary serves both
-//! versions; an export writes the curve into a marked block of it, so that nobody needs a compiler.
+//! versions; an export writes the curve into a marked block of it, so that users need no compiler.
 //! The same sources go into the archive, with the curve as a C file.
 
 mod archive;
@@ -31,7 +31,7 @@ pub struct Spring<'a> {
     pub description: &'a str,
     /// What it computes.
     pub law: &'a ForceLaw,
-    /// What is known of the curve, for documentation/ and extra/.
+    /// Data of the curve, for documentation/ and extra/.
     pub facts: &'a [(&'static str, String)],
 }
 
@@ -46,7 +46,7 @@ struct Binary {
 /// What build.rs could compile.
 const BINARIES: &[Binary] = &include!(concat!(env!("OUT_DIR"), "/fmu_binaries.rs"));
 
-/// Sources of the component beside the table, as they go into the archive.
+/// Sources of the component, besides the table, for the archive.
 const SOURCES: [(&str, &str); 13] = [
     ("derivative.c", include_str!("c/derivative.c")),
     ("fmi2.c", include_str!("c/fmi2.c")),
@@ -75,18 +75,18 @@ pub fn binaries() -> impl Iterator<Item = &'static str> {
 /// The FMU as the bytes of its archive. The same input gives the same bytes.
 ///
 /// Deflection is in m, compression positive; the outputs are the law's force and energies, and the
-/// largest deflection so far. Beyond the curve's end [`crate::multibody::EnvelopeEnd::Error`] holds
+/// maximum deflection so far. Beyond the curve's end [`crate::multibody::EnvelopeEnd::Error`] holds
 /// the force.
 ///
 /// # Errors
-/// If the curve has more points than the FMU has room for.
+/// If the curve has too many points for the FMU.
 pub fn archive(spring: &Spring<'_>, version: FmiVersion) -> Result<Vec<u8>, Error> {
     let token = token(spring, version, &Table::new(spring.law, "")?);
     let table = Table::new(spring.law, &token)?;
     archive::pack(spring, version, &table, &token)
 }
 
-/// GUID of FMI 2 and instantiation token of FMI 3: a hash of all that the FMU is made of.
+/// GUID of FMI 2 and instantiation token of FMI 3: a hash of the content of the FMU.
 fn token(spring: &Spring<'_>, version: FmiVersion, table: &Table) -> String {
     let mut hash = blake3::Hasher::new();
     let mut add = |text: &[u8]| {

@@ -101,7 +101,7 @@ impl Table {
         envelope.chain(self.shape.iter().map(|column| (column, SHAPE)))
     }
 
-    /// As `crumple_table_sum` in c/sum.c: tells a damaged table.
+    /// As `crumple_table_sum` in c/sum.c: detects a damaged table.
     fn sum(&self) -> u64 {
         let mix = |sum: u64, word: u64| {
             let sum = (sum ^ word).wrapping_mul(0x9E37_79B9_7F4A_7C15);
@@ -142,7 +142,7 @@ impl Table {
         let mut found = memchr::memmem::find_iter(binary, MARK);
         let (Some(at), None) = (found.next(), found.next()) else { return Err(no_place) };
         let block = self.bytes();
-        // The version and the room for points are what the blank block says.
+        // The version and the capacity are those of the blank block.
         let layout = 24..36;
         let is_fit = binary.get(at + layout.start..at + layout.end) == block.get(layout)
             && binary.len() >= at + block.len();

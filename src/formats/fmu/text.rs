@@ -3,7 +3,7 @@
 /// Longest identifier: importers unpack into folders of that name, and paths have their limits.
 const LONGEST: usize = 60;
 
-/// An identifier of C made of a name: its ASCII letters and digits, and one `_` for what lies between.
+/// A C identifier made from a name: its ASCII letters and digits, and one `_` for what lies between.
 pub(super) fn identifier(name: &str) -> String {
     let mut plain = String::new();
     for c in name.chars() {

@@ -4,7 +4,7 @@ use super::super::text::{Lines, nine_digits, title};
 use super::super::{ExportCurve, NUMBER_OF_STATES, run_time_s};
 use super::{InUnits, Material, TITLE_WIDTH};
 
-/// Everything beside curves and material. The moving body is node 2 at +x and moves towards −x.
+/// Everything besides curves and material. The moving body is node 2 at +x and moves towards −x.
 pub(crate) fn write(
     lines: &mut Lines,
     curve: &ExportCurve,
@@ -83,7 +83,7 @@ fn masses(lines: &mut Lines, curve: &ExportCurve, units: InUnits) {
     }
 }
 
-/// Speed of the moving body, and what holds both to their line.
+/// Speed of the moving body, and the constraints that guide both.
 fn supports(lines: &mut Lines, curve: &ExportCurve, units: InUnits) {
     let speed = curve.predicted.speed_m_per_s / units.0.speed();
     lines.add(format_args!("*INITIAL_VELOCITY_NODE"));

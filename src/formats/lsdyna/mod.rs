@@ -10,7 +10,7 @@ use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
 const TITLE_WIDTH: usize = 80;
-/// Most points to which LS-DYNA is asked to resample a curve.
+/// Maximum number of points to which LS-DYNA resamples a curve.
 const MOST_RESAMPLED: usize = 20_000;
 
 /// Spring materials of LS-DYNA.
@@ -44,7 +44,7 @@ impl InUnits {
         n_per_m * self.0.length_m / self.0.force()
     }
 
-    /// The lines that say the units, for a header.
+    /// The lines that state the units, for a header.
     pub(super) fn stated(self) -> String {
         format!(
             "units of the points: {} (length {} m, force {} N)",
@@ -94,7 +94,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
     Ok(Exported { files: vec![(name, lines.into_bytes())], notes, ..Exported::default() })
 }
 
-/// What the material's unloading gives beside ours.
+/// The material's restitution compared with ours.
 fn note(curve: &ExportCurve, material: Material) -> Vec<String> {
     let own = TargetUnloading::Line(curve.stiffness_n_per_m());
     match material {
@@ -107,12 +107,12 @@ fn note(curve: &ExportCurve, material: Material) -> Vec<String> {
     }
 }
 
-/// What is lost of an uneven curve, which LS-DYNA resamples evenly.
+/// Loss by resampling an unevenly spaced curve in LS-DYNA.
 fn resampling_note(curve: &ExportCurve) -> Option<String> {
     let points = points(curve);
     (resampling(&points) == MOST_RESAMPLED).then(|| {
         format!(
-            "{}: its points are uneven, so LCINT is {MOST_RESAMPLED}, the most that is asked for: LS-DYNA resamples it evenly every {:.3} mm, and what lies closer together is evened out",
+            "{}: its points are unevenly spaced, so LCINT is {MOST_RESAMPLED}, the largest used: LS-DYNA resamples the curve every {:.3} mm and smooths what is finer",
             curve.headline(),
             curve.loading.end_m() / (MOST_RESAMPLED - 1) as f64 * 1e3
         )
@@ -148,7 +148,7 @@ fn inelastic(lines: &mut Lines, curve: &ExportCurve, units: InUnits, ids: Ids) {
 }
 
 /// MAT_121 takes compression in the third quadrant, unloads with K until the unloading curve,
-/// which has no force, and goes on without force.
+/// which has no force, and continues without force.
 fn discrete_beam(lines: &mut Lines, curve: &ExportCurve, units: InUnits, ids: Ids) {
     let points = third_quadrant(&points(curve));
     let text = curve.headline();
@@ -162,7 +162,7 @@ fn discrete_beam(lines: &mut Lines, curve: &ExportCurve, units: InUnits, ids: Id
     lines.add(format_args!(
         "{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
         ids.material,
-        // A discrete beam needs a mass of its own: with VOL 1, a millionth of the body's.
+        // A discrete beam needs its own mass: with VOL 1, a millionth of the body's.
         ten_columns(1e-6 * curve.predicted.mass_kg / units.0.mass_kg),
         ten_columns(units.stiffness(curve.stiffness_n_per_m())),
         "2.0",
@@ -193,8 +193,8 @@ fn general(lines: &mut Lines, curve: &ExportCurve, units: InUnits, ids: Ids) {
     ));
 }
 
-/// Deflection in m and force in N of each point. They begin at the origin, else LS-DYNA carries the
-/// first slope on into tension.
+/// Deflection in m and force in N of each point. They begin at the origin, otherwise LS-DYNA extrapolates the
+/// first slope into tension.
 fn points(curve: &ExportCurve) -> Vec<(f64, f64)> {
     let force = std::iter::once(0.0).chain(curve.force_n().iter().copied().skip(1));
     curve.deflection_m().iter().copied().zip(force).collect()
@@ -230,7 +230,7 @@ fn define_curve(
 }
 
 /// Points to which LS-DYNA resamples a curve evenly, 100 by default: a curve with more would
-/// lose its peaks. As many as the smallest interval asks for keep every point of an even curve.
+/// lose its peaks. The number that the smallest interval requires keeps every point of an even curve.
 fn resampling(points: &[(f64, f64)]) -> usize {
     let smallest = points.windows(2).map(|w| w[1].0 - w[0].0).fold(f64::INFINITY, f64::min);
     let reach = points[points.len() - 1].0 - points[0].0;

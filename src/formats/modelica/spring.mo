@@ -37,7 +37,7 @@
     end for;
   end lostUpTo;
 
-  function stored "Energy that comes back from the largest deflection, J"
+  function stored "Energy that comes back from the maximum deflection, J"
     input Real largest "m";
     output Real y;
   protected
@@ -55,7 +55,7 @@
 
   function force "Force, N, after the deflection has once been the largest"
     input Real x "Deflection, m, compression positive";
-    input Real largest "Largest deflection so far, m";
+    input Real largest "Maximum deflection so far, m";
     output Real y;
   protected
     Real top;
@@ -77,7 +77,7 @@
     input Real v "Rate of the deflection, m/s";
     parameter Real force_scale = 1.0 "Factor of the force";
     output Real F "Force that pushes the bodies apart, N";
-    discrete Real largest(start = 0.0, fixed = true) "Largest deflection so far, m";
+    discrete Real largest(start = 0.0, fixed = true) "Maximum deflection so far, m";
   equation
     when v < 0.0 then
       largest = max(pre(largest), x);
@@ -91,7 +91,7 @@
     Real x(start = 0.0, fixed = true) "Deflection, m";
     Real v(start = v0, fixed = true) "Its rate, m/s";
     Real F "Force, N";
-    discrete Real largest(start = 0.0, fixed = true) "Largest deflection so far, m";
+    discrete Real largest(start = 0.0, fixed = true) "Maximum deflection so far, m";
   equation
     der(x) = v;
     m * der(v) = -F;

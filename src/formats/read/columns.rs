@@ -11,10 +11,10 @@ use super::curve::{Place, shown};
 use crate::curve::{Envelope, ForceCurve};
 use crate::unit::UnitSystem;
 
-/// Most points of a curve: guards memory. Test records have some ten thousand.
+/// Maximum number of points of a curve: guards memory. Test records have some ten thousand.
 pub(super) const MAX_POINTS: usize = 1_000_000;
 
-/// Most curves of a file: guards memory, which a curve takes even without points.
+/// Maximum number of curves of a file: guards memory, which a curve takes even without points.
 pub(super) const MAX_CURVES: usize = 10_000;
 
 /// Refuses one curve more than a file may have.
@@ -23,7 +23,7 @@ pub(super) fn check_curves(curves: usize) -> Result<(), Error> {
         let most = MAX_CURVES;
         return Err(error!(
             CurveFile,
-            "the file has more than {most} curves: take out the one that is meant"
+            "the file has more than {most} curves: extract the one you need"
         ));
     }
     Ok(())
@@ -33,7 +33,7 @@ pub(super) fn check_curves(curves: usize) -> Result<(), Error> {
 pub(super) fn check_points(points: usize) -> Result<(), Error> {
     if points > MAX_POINTS {
         let most = MAX_POINTS;
-        return Err(error!(CurveFile, "the curve has more than {most} points: thin it"));
+        return Err(error!(CurveFile, "the curve has more than {most} points: thin it out"));
     }
     Ok(())
 }
@@ -41,7 +41,7 @@ pub(super) fn check_points(points: usize) -> Result<(), Error> {
 /// Curves and columns that a message lists.
 pub(super) const LISTED: usize = 20;
 
-/// Which of a file's curves was asked for by its name, else the only one; each with its name and title.
+/// Which of a file's curves was requested by its name, else the only one; each with its name and title.
 pub(super) fn choose(
     curves: impl Iterator<Item = (String, String)> + Clone,
     asked: Option<&str>,
@@ -83,7 +83,7 @@ const ZERO_SHARE: f64 = 1e-9;
 /// Distances of two guard points that agree this well are one.
 const SAME_DISTANCE: f64 = 1e-6;
 
-/// Points of one deflection are set apart by this share of the largest: next to nothing in energy, and less steep than
+/// Points of one deflection are set apart by this share of the largest: negligible in energy, and less steep than
 /// would ask runs for tiny steps.
 const STEP_WIDTH_SHARE: f64 = 1e-4;
 /// Jumps of the force that a note names.
@@ -95,17 +95,17 @@ pub(super) struct Columns {
     pub deflection_m: Vec<f64>,
     pub force_n: Vec<f64>,
     pub time_s: Option<Vec<f64>>,
-    /// Where each point stands, for messages.
+    /// Place of each point, for messages.
     pub places: Places,
     pub facts: Metadata,
     pub title: Option<String>,
     pub units: Option<UnitSystem>,
     pub notes: Vec<String>,
-    /// Files that were read beside the one that was given.
+    /// Files that were read besides the given one.
     pub files: Vec<ReadFile>,
 }
 
-/// Where the points of a curve stand.
+/// Places of the points of a curve.
 #[derive(Clone, Debug)]
 pub(super) enum Places {
     Lines(Vec<u64>),
@@ -145,13 +145,13 @@ impl Columns {
         match envelope.first_pulling_point() {
             Some(point) => Err(error!(
                 CurveFile,
-                "the force of point {point} is below 0: an interface only pushes, so write compression positive and pull as 0"
+                "the force of point {point} is below 0: an interface only pushes, so write compression positive and tension as 0"
             )),
             None => Ok(self.facts.driving(envelope)),
         }
     }
 
-    /// The curve of these columns. A record over time keeps its signs, which its motion tells.
+    /// The curve of these columns. A record over time keeps its signs, which follow from its motion.
     pub(super) fn curve(mut self) -> Result<ReadCurve, Error> {
         let points = self.force_n.len();
         if points < MIN_POINTS {
@@ -212,7 +212,7 @@ struct Point {
 /// The points of a table without times; deflection and force have the file's signs at first.
 struct Points {
     list: Vec<Point>,
-    /// Largest deflection and force, without signs.
+    /// Maximum deflection and force, without signs.
     most: (f64, f64),
 }
 
@@ -231,7 +231,7 @@ impl Points {
     }
 
     /// The loading branch from (0, 0), then the unloading branch if there is one.
-    /// `crush_m`: the largest crush, if the file says it.
+    /// `crush_m`: the maximum crush, if the file states it.
     fn loading_then_unloading(
         &mut self,
         crush_m: Option<f64>,
@@ -251,7 +251,9 @@ impl Points {
         self.check_order()?;
         if self.list[0].d > 0.0 {
             let (d, place) = (self.list[0].d, self.list[0].place.clone());
-            notes.push(format!("points: the curve begins at {d} m, a point (0, 0) is put before"));
+            notes.push(format!(
+                "points: the curve starts at {d} m; a point (0, 0) is added in front"
+            ));
             self.list.insert(0, Point { d: 0.0, f: 0.0, place });
         }
         Ok(std::mem::take(&mut self.list))
@@ -264,9 +266,11 @@ impl Points {
         let push = on_side.map(|p| p.f).sum::<f64>();
         let push = if push < 0.0 { -1.0 } else { 1.0 };
         let what = match (side < 0.0, push < 0.0) {
-            (true, true) => "the curve lies in the third quadrant; deflection and force are turned",
-            (true, false) => "the deflection is turned",
-            (false, true) => "the force is turned",
+            (true, true) => {
+                "the curve lies in the third quadrant; deflection and force are reversed"
+            }
+            (true, false) => "the deflection is reversed",
+            (false, true) => "the force is reversed",
             (false, false) => return,
         };
         notes.push(format!("sign: {what}, positive in compression"));
@@ -277,7 +281,7 @@ impl Points {
         }
     }
 
-    /// Refuses pull, and forces beyond zero deflection.
+    /// Refuses tension, and forces beyond zero deflection.
     fn check_sides(&mut self) -> Result<(), Error> {
         let (most_d, most_f) = self.most;
         for point in &mut self.list {
@@ -296,7 +300,7 @@ impl Points {
             if point.f < -ZERO_SHARE * most_f {
                 return Err(error!(
                     CurveFile,
-                    "{place}: the force is {force_n} N against the others' sign: an interface only pushes, so write pull as 0",
+                    "{place}: the force is {force_n} N, opposite in sign to the others: an interface only pushes, so write tension as 0",
                     force_n = point.f,
                     place = place()
                 ));
@@ -306,18 +310,18 @@ impl Points {
         Ok(())
     }
 
-    /// A table that falls from its largest deflection is a loading branch from behind.
+    /// A table that falls from its maximum deflection is a reversed loading branch.
     fn put_in_order(&mut self, notes: &mut Vec<String>) {
         if self.list.windows(2).all(|w| w[1].d <= w[0].d) {
             self.list.reverse();
             notes.push(
-                "points: in reverse order, from the largest deflection to the smallest".into(),
+                "points: in reverse order, from the maximum deflection to the smallest".into(),
             );
         }
     }
 
-    /// Removes what tools that extrapolate are given: points below zero deflection, and the last
-    /// force once more, as far behind the end as the first lies before the beginning.
+    /// Removes the guard points for tools that extrapolate: points below zero deflection, and the last
+    /// force once more, as far beyond the end as the first lies before the start.
     fn remove_guards(&mut self, notes: &mut Vec<String>) {
         let before = self.list.len();
         let first = self.list.first().map_or(0.0, |p| p.d);
@@ -335,7 +339,7 @@ impl Points {
             && ((held.d - last.d) / -first - 1.0).abs() < SAME_DISTANCE
         {
             notes.push(format!(
-                "points: the last, at {} m, repeats the force before and is removed (guard point)",
+                "points: the last, at {} m, repeats the previous force and is removed (guard point)",
                 held.d
             ));
             self.list.pop();
@@ -347,11 +351,11 @@ impl Points {
         self.list.dedup_by(|b, a| a.d == b.d && a.f == b.f);
         let removed = before - self.list.len();
         if removed > 0 {
-            notes.push(format!("points: {removed} that repeat the one before removed"));
+            notes.push(format!("points: {removed} removed (repeats of the previous one)"));
         }
     }
 
-    /// Removes the points beyond the largest crush, which our exports add for other tools.
+    /// Removes the points beyond the maximum crush, which our exports add for other tools.
     fn remove_tail(&mut self, crush_m: Option<f64>, notes: &mut Vec<String>) {
         let Some(crush_m) = crush_m else { return };
         // As many digits as exports have.
@@ -362,18 +366,18 @@ impl Points {
         self.list.retain(|p| !is_beyond(p));
         let removed = before - self.list.len();
         notes.push(format!(
-            "points: {removed} beyond the maximal crush of {crush_m} m, which the file states, removed"
+            "points: {removed} removed beyond the maximum crush of {crush_m} m that the file states"
         ));
         if last.d < crush_m * (1.0 - SAME_DISTANCE) {
             let f = last.f + (next.f - last.f) * (crush_m - last.d) / (next.d - last.d);
             self.list.insert(first, Point { d: crush_m, f, place: next.place });
-            notes.push("points: one put at the maximal crush, between its neighbours".into());
+            notes.push("points: one interpolated at the maximum crush".into());
         }
     }
 
-    /// Sets points of one deflection a hair apart: forces that jump there stay, and the deflection still goes on.
-    /// Up to the largest deflection the later ones go forward; where the force has its peak at the largest
-    /// deflection, those behind the peak are unloading and go back, as all behind it do.
+    /// Sets points of one deflection slightly apart: forces that jump there are kept, and the deflection still increases.
+    /// Up to the maximum deflection the later ones go forward; where the force has its peak at the maximum
+    /// deflection, those after the peak are unloading and go back, as all after it do.
     fn set_steps_apart(&mut self, notes: &mut Vec<String>) {
         let largest_m = self.list.iter().map(|p| p.d).fold(0.0, f64::max);
         let end = self.list.iter().position(|p| p.d == largest_m).unwrap_or(0);
@@ -386,7 +390,7 @@ impl Points {
             let mut step = outline(&self.list[first..first + count]);
             if step.len() > 1 {
                 steps.push((d, step[0].clone(), step[step.len() - 1].f));
-                // Behind the last point there is room, but none below zero.
+                // After the last point there is room, but none below zero.
                 let behind = if first > end { d } else { largest_m };
                 let room = next.map_or(behind, |next| (next.d - d).abs());
                 let hair = (STEP_WIDTH_SHARE * largest_m).min(0.5 * room) / (step.len() - 1) as f64;
@@ -406,7 +410,7 @@ impl Points {
         notes.extend(steps_note(&steps));
     }
 
-    /// Up to the largest deflection it must increase, behind it decrease.
+    /// Up to the maximum deflection it must increase, after it decrease.
     fn check_order(&self) -> Result<(), Error> {
         let d: Vec<f64> = self.list.iter().map(|p| p.d).collect();
         let end = (1..d.len()).fold(0, |best, i| if d[i] > d[best] { i } else { best });
@@ -414,12 +418,12 @@ impl Points {
             let (fits, way) = if i <= end {
                 (d[i] > d[i - 1], "increase up to the largest")
             } else {
-                (d[i] < d[i - 1], "decrease behind the largest")
+                (d[i] < d[i - 1], "decrease after the largest")
             };
             if !fits {
                 return Err(error!(
                     CurveFile,
-                    "{place}: the deflection must {way}, found {deflection_m} m after {before_m} m: give the loading branch and at most one unloading branch behind it, or a column of times",
+                    "{place}: the deflection must {way}, found {deflection_m} m after {before_m} m: give the loading branch and at most one unloading branch after it, or a time column",
                     before_m = d[i - 1],
                     deflection_m = d[i],
                     place = self.list[i].place
@@ -451,7 +455,7 @@ fn peak(points: &[Point]) -> usize {
     (1..points.len()).fold(0, |best, k| if points[k].f > points[best].f { k } else { best })
 }
 
-/// What was done where the deflection stands still: the first steps, and how many more.
+/// Changes where the deflection is constant: the first jumps, and how many more.
 fn steps_note(steps: &[(f64, Point, f64)]) -> Option<String> {
     let shown = steps.iter().take(STEPS).map(|(d, first, to_n)| {
         let shown_m = (d * 1e6).round() / 1e6;
@@ -464,7 +468,7 @@ fn steps_note(steps: &[(f64, Point, f64)]) -> Option<String> {
     };
     (!steps.is_empty()).then(|| {
         format!(
-            "points: the force jumps {}{more}: the points there are set apart by {STEP_WIDTH_SHARE} of the largest deflection, at most half the way to the next",
+            "points: the force jumps {}{more}: the points there are set apart by {STEP_WIDTH_SHARE} of the maximum deflection, at most halfway to the next",
             shown.join(", ")
         )
     })
@@ -517,7 +521,7 @@ mod tests {
             let curve = columns.curve().unwrap();
             let last = (curve.deflection_m.last(), curve.force_n.last());
             assert_eq!(last, (Some(&end.0), Some(&end.1)));
-            assert!(curve.notes[0].starts_with("points: 2 beyond the maximal crush"));
+            assert!(curve.notes[0].starts_with("points: 2 removed beyond the maximum crush"));
         }
     }
 
@@ -541,7 +545,7 @@ mod tests {
         t(
             &drop,
             &apart,
-            "the force jumps from 5 to 2 N at 1 m (line 2): the points there are set apart by 0.0001 of the largest deflection",
+            "the force jumps from 5 to 2 N at 1 m (line 2): the points there are set apart by 0.0001 of the maximum deflection",
         );
         // Of many points, the ends and the extremes; at contact, too.
         let many = [(0.0, 0.0), (0.0, 2.0), (1.0, 5.0), (1.0, 6.0), (1.0, 4.0), (1.0, 1.0)];
@@ -552,7 +556,7 @@ mod tests {
         // At most half the way to the next point.
         let close = [(0.0, 0.0), (1.0, 5.0), (1.0, 2.0), (1.0001, 3.0), (4.0, 3.0)];
         let halved = [(0.0, 0.0), (1.0, 5.0), (1.00005, 2.0), (1.0001, 3.0), (4.0, 3.0)];
-        t(&close, &halved, "at most half the way to the next");
+        t(&close, &halved, "at most halfway to the next");
         // At the end a rise is loading and a fall is unloading.
         let rise = [(0.0, 0.0), (1.0, 5.0), (2.0, 3.0), (4.0, 3.0), (4.0, 9.0)];
         t(&rise, &[&rise[..4], &[(4.0 + h, 9.0)]].concat(), "from 3 to 9 N at 4 m (line 4)");
@@ -566,7 +570,7 @@ mod tests {
         t(&behind, &[&plain_unloading()[..], &set].concat(), "from 1 to 0 N at 2 m");
     }
 
-    /// A loading branch and the first point behind it.
+    /// A loading branch and the first point after it.
     fn plain_unloading() -> [(f64, f64); 5] {
         [(0.0, 0.0), (1.0, 5.0), (2.0, 3.0), (4.0, 3.0), (3.0, 2.0)]
     }
@@ -584,13 +588,10 @@ mod tests {
         t(&plain.map(|(d, _)| (d, 0.0)), "the force is 0 in every point");
         t(&plain.map(|(_, f)| (0.0, f)), "the deflection is 0 in every point");
         let wave = [&plain[..], &[(2.5, 1.0), (2.8, 0.0)]].concat();
-        t(
-            &wave,
-            "line 6: the deflection must decrease behind the largest, found 2.8 m after 2.5 m",
-        );
+        t(&wave, "line 6: the deflection must decrease after the largest, found 2.8 m after 2.5 m");
         let back = [(0.0, 0.0), (2.0, 5.0), (1.0, 3.0), (3.0, 3.0)];
         t(&back, "line 3: the deflection must increase up to the largest, found 1 m after 2 m");
-        t(&[&plain[..], &[(3.5, -1.0)]].concat(), "line 5: the force is -1 N against");
+        t(&[&plain[..], &[(3.5, -1.0)]].concat(), "line 5: the force is -1 N, opposite in sign");
         t(&[&[(-1.0, -4.0)], &plain[..]].concat(), "line 1: the force is -4 N on the other side");
     }
 }

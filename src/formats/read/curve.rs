@@ -1,4 +1,4 @@
-//! A curve as its file has it, in SI, with what the file says of it.
+//! A curve as in its file, in SI, with the metadata of the file.
 
 use crate::error::{Error, error};
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use crate::curve::{Curve, CurveUnloading, Envelope, ForceCurve, ForceKind, unloa
 use crate::unit::{SpeedKind, UnitSystem};
 use std::fmt;
 
-/// A curve read from a file: the loading branch, behind it the unloading branch if the file has
+/// A curve read from a file: the loading branch, after it the unloading branch if the file has
 /// one; or a record over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadCurve {
@@ -23,13 +23,13 @@ pub struct ReadCurve {
     /// In N, one per deflection: the force that moves the body, where the file has it beside the
     /// one that the obstacle feels.
     pub body_force_n: Option<Vec<f64>>,
-    /// What the file says of the curve.
+    /// Metadata of the curve in the file.
     pub facts: Metadata,
     /// Title of the curve in the file.
     pub title: Option<String>,
     /// Units of the file, if they are one system.
     pub units: Option<UnitSystem>,
-    /// What was taken how.
+    /// How it was read.
     pub notes: Vec<String>,
     /// The files that were read.
     pub files: Vec<ReadFile>,
@@ -62,7 +62,7 @@ impl ReadCurve {
                 });
                 let deflection_m = rest.iter().map(|v| (v - rest[0]) * farthest.signum()).collect();
                 changes.push(format!(
-                    "it is a record over time: its loading branch from {:.2} ms on drives the interface (crumple db add takes all of it)",
+                    "it is a record over time: its loading branch from {:.2} ms on drives the interface (crumple db add keeps all of it)",
                     1e3 * time_s[first]
                 ));
                 changes.extend(onset.warnings);
@@ -73,7 +73,7 @@ impl ReadCurve {
         if let Some(point) = envelope.first_pulling_point() {
             return Err(error!(
                 CurveFile,
-                "the force of point {point} of its loading branch is below 0: an interface only pushes, so write compression positive and pull as 0"
+                "the force of point {point} of its loading branch is below 0: an interface only pushes, so write compression positive and tension as 0"
             ));
         }
         let known = self.facts.unloading_stiffness_n_per_m;
@@ -104,7 +104,7 @@ impl ReadFile {
     }
 }
 
-/// What a file says of its curve.
+/// Metadata of a curve in its file.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Metadata {
     /// Which force it is.
@@ -113,22 +113,22 @@ pub struct Metadata {
     pub speed_m_per_s: Option<f64>,
     /// What the speed is measured against.
     pub speed_kind: Option<SpeedKind>,
-    /// From the largest deflection, in N/m.
+    /// From the maximum deflection, in N/m.
     pub unloading_stiffness_n_per_m: Option<f64>,
-    /// The same of the force that moves the body, where that is another.
+    /// The same for the force that moves the body, where that is another.
     pub body_unloading_stiffness_n_per_m: Option<f64>,
     /// Mass of the body in kg.
     pub mass_kg: Option<f64>,
     /// Mass of the other body in kg.
     pub other_mass_kg: Option<f64>,
-    /// Largest crush in m; points behind it are what other tools need beyond it.
+    /// Maximum crush in m; points after it are what other tools need beyond it.
     pub max_deflection_m: Option<f64>,
     /// Where its runs' data end before that, in m.
     pub data_end_m: Option<f64>,
 }
 
 impl Metadata {
-    /// Takes what a comment `key: value` says; other comments say nothing. `mark` is the
+    /// Takes the metadata of a comment `key: value`; other comments are ignored. `mark` is the
     /// comment's, for messages.
     pub(super) fn take(&mut self, mark: &str, comment: &str, place: Place) -> Result<(), Error> {
         let Some((key, value)) = comment.split_once(':') else { return Ok(()) };
@@ -165,7 +165,7 @@ impl Metadata {
         Ok(())
     }
 
-    /// A loading branch with what drives need to know of it.
+    /// A loading branch with the data needed to drive an interface.
     pub(super) fn driving(&self, loading: Envelope) -> ForceCurve {
         ForceCurve {
             unloading: CurveUnloading::of(self.unloading_stiffness_n_per_m),
@@ -210,11 +210,11 @@ pub(super) fn units(
 ) -> Result<UnitSystem, Error> {
     match (stated, given) {
         (Some((units, line)), None) => {
-            notes.push(format!("units: {units} by line {line} of the file"));
+            notes.push(format!("units: {units} from line {line} of the file"));
             Ok(units)
         }
         (Some((stated, line)), Some(given)) if stated != given => {
-            notes.push(format!("units: {given} as given; line {line} of the file says {stated}"));
+            notes.push(format!("units: {given} as given; line {line} of the file states {stated}"));
             Ok(given)
         }
         (_, Some(given)) => {
@@ -223,7 +223,7 @@ pub(super) fn units(
         }
         (None, None) => Err(error!(
             CurveFile,
-            "the file does not say its units: give them with --units (of crumple export: --input-units), such as mm-t-s or SI{remedy}"
+            "the file does not state its units: give them with --units (of crumple export: --input-units), such as mm-t-s or SI{remedy}"
         )),
     }
 }
@@ -236,7 +236,7 @@ pub(super) fn content(path: &Path) -> impl Fn(Error) -> Error {
     }
 }
 
-/// Where something stands in a file; everything is counted from 1 but bytes, from 0.
+/// A place in a file, counted from 1; bytes from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Place {
     /// A whole line.
@@ -275,7 +275,7 @@ impl fmt::Display for Place {
     }
 }
 
-/// What should stand at a place, and what does.
+/// Expected and actual content of a place.
 pub(super) fn expected(place: Place, what: impl fmt::Display, found: &str) -> Error {
     let found = shown(found);
     error!(CurveFile, "{place}: expected {what}, found \"{found}\"")
@@ -286,8 +286,8 @@ pub(super) fn value(place: Place, text: &str) -> Result<f64, Error> {
     number(text).ok_or_else(|| expected(place, "a number", text))
 }
 
-/// What to do with a file that is shorter than it says.
-pub(super) const CUT: &str = "write the file anew, it may be cut";
+/// Remedy for a file that is shorter than it declares.
+pub(super) const CUT: &str = "write the file again: it may be truncated";
 
 /// Another number of values than the file declares.
 pub(super) fn miscounted(

@@ -1,4 +1,4 @@
-//! What the curves of solvers' decks share: comments that say something, points of two fields, fields of a line.
+//! What curves in solver decks share: comments with metadata, points of two fields, fields of a line.
 
 use super::columns::{Columns, Places, check_points};
 use super::curve::{Metadata, Place, expected, stated_units, title, units, value};
@@ -8,7 +8,7 @@ use crate::unit::UnitSystem;
 /// Columns of a point's field.
 pub(super) const WIDTH: usize = 20;
 
-/// What the comments so far say.
+/// Metadata of the comments so far.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Said {
     pub facts: Metadata,
@@ -28,7 +28,7 @@ impl Said {
 pub(super) struct DeckCurve {
     pub id: String,
     pub title: String,
-    /// What the comments in front of its points say.
+    /// Metadata of the comments before its points.
     pub said: Said,
     pub points: Vec<(f64, f64)>,
     pub notes: Vec<String>,
@@ -47,7 +47,7 @@ impl DeckCurve {
         check_points(self.points.len())
     }
 
-    /// The same in SI; `remedy` is a way to say the units in the file.
+    /// The same in SI; `remedy` is a way to state the units in the file.
     pub(super) fn columns(
         mut self,
         given: Option<UnitSystem>,
@@ -75,7 +75,7 @@ pub(super) struct Fields<'a> {
     is_free: bool,
 }
 
-/// Fields of a line that are looked at: card 1 has eight.
+/// Fields of a line that are examined: card 1 has eight.
 const FIELDS: usize = 8;
 
 impl<'a> Fields<'a> {
@@ -84,7 +84,7 @@ impl<'a> Fields<'a> {
             let list = text.split(',').take(FIELDS).collect();
             return Self { line, width, list, is_free: true };
         }
-        // By characters: a column of a text that is no ASCII may lie within one.
+        // By characters: a column of a text that is not ASCII may lie within one.
         let at = |k: usize| text.char_indices().nth(k * width).map_or(text.len(), |(at, _)| at);
         let list = (0..FIELDS).map(|k| &text[at(k)..at(k + 1)]).take_while(|f| !f.is_empty());
         Self { line, width, list: list.collect(), is_free: false }

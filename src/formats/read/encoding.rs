@@ -8,10 +8,10 @@ pub(super) struct Decoded<'a> {
     pub note: Option<&'static str>,
 }
 
-/// Bytes by which UTF-16 without a mark is told.
+/// Bytes by which UTF-16 without a mark is recognised.
 const BEGINNING: usize = 64;
 
-/// The text that the bytes are; bytes of no text become one, too.
+/// The bytes as text; invalid bytes are replaced.
 pub(super) fn decoded(bytes: &[u8]) -> Decoded<'_> {
     let of_pairs = |rest: &[u8], pair: fn([u8; 2]) -> u16, note| {
         let mut units: Vec<u16> = rest.chunks_exact(2).map(|two| pair([two[0], two[1]])).collect();
@@ -56,7 +56,7 @@ fn utf8_or_latin1(bytes: &[u8]) -> Decoded<'_> {
         // A character of Latin-1 has the number of its byte.
         Err(_) => Decoded {
             text: bytes.iter().copied().map(char::from).collect(),
-            note: Some("text: Latin-1, as it is no UTF-8"),
+            note: Some("text: Latin-1, because it is not UTF-8"),
         },
     }
 }

@@ -1,9 +1,9 @@
 //! Curve of an ISO-MME test (ISO/TS 13499): a channel of displacement and one of force over time.
 //!
-//! A channel file has lines `name :value`, then one value a line. Characters 13 and 14 of its
+//! A channel file has lines `name :value`, then one value per line. Characters 13 and 14 of its
 //! channel code are the dimension: `DS` for displacement, `FO` for force, `TI` for time. With the implicit
 //! reference channel, or without any, times are the time of the first sample and multiples of the interval, in s;
-//! with an explicit one they are the values of the channel that `Reference channel name` says.
+//! with an explicit one they are the values of the channel named by `Reference channel name`.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ use crate::error::{Error, error};
 use crate::file;
 use crate::signal::interpolate;
 
-/// Files of a folder that are looked at: a test has some hundred channels.
+/// Files of a folder that are examined: a test has some hundred channels.
 const MOST_FILES: usize = 1_000;
 
 /// The tests that a folder holds: its `.mme` files, else the folders in it that have one.
@@ -45,7 +45,7 @@ pub(super) fn check_one(folder: &Path, tests: &[PathBuf]) -> Result<(), Error> {
             let (tests, known) = (tests.len(), known.collect::<Vec<_>>().join(" "));
             Err(error!(
                 CurveFile,
-                "the folder holds {tests} ISO-MME tests: give those that are meant, each by itself: {known}"
+                "the folder holds {tests} ISO-MME tests: give each one you need separately: {known}"
             ))
         }
     }
@@ -104,7 +104,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
             .map_err(|e| error!(CurveFile, "expected common times, found {e}"))?;
     }
     columns.notes.push(format!(
-        "times: the channels differ in them; the displacement was interpolated to {} of the force's",
+        "times: they differ between the channels; the displacement was interpolated to {} of the force's",
         time_s.len()
     ));
     columns.force_n = common.iter().map(|&i| force.values[i]).collect();
@@ -114,7 +114,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     Ok(columns)
 }
 
-/// Takes what the test's `.mme` file says: of the folder, or the one that was given.
+/// Reads the `.mme` file of the test: that of the folder, or the given one.
 fn test_facts(input: &Input<'_>, columns: &mut Columns) -> Result<(), Error> {
     if !input.path.is_dir() {
         described(input.text, &mut columns.facts);
@@ -144,7 +144,7 @@ fn described(bytes: &str, facts: &mut Metadata) {
     facts.speed_m_per_s = closing.filter(|v| *v > 0.0);
 }
 
-/// What the first that says anything says.
+/// The first available value.
 fn merged(first: Metadata, others: &[Metadata]) -> Metadata {
     others.iter().fold(first, |a, b| Metadata {
         force: a.force.or(b.force),
@@ -172,7 +172,7 @@ fn has_extension(path: &Path, wanted: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted))
 }
 
-/// What stands in a folder, in order.
+/// Content of a folder, in order.
 fn names(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder)?.filter_map(Result::ok).take(MOST_FILES);
     let mut names: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
@@ -190,7 +190,7 @@ fn channel_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let is_folder = path.is_dir();
     if !is_folder && !has_extension(path, "mme") {
         let same = |p: &PathBuf| p.file_stem() == path.file_stem() && is_channel(p);
-        // What was named is a channel whatever it is called.
+        // A named file is a channel whatever its name.
         let mut beside: Vec<PathBuf> = names(parent)?.into_iter().filter(same).collect();
         if !beside.iter().any(|p| p.file_name() == path.file_name()) {
             beside.push(path.into());
@@ -274,7 +274,7 @@ impl Channel {
         }
     }
 
-    /// How its times were taken, where that is not the usual way.
+    /// How its times were read, if not in the usual way.
     fn note(&self) -> Option<String> {
         match &self.times {
             Times::Even { is_stated: true, .. } => None,
@@ -327,7 +327,7 @@ struct Header {
     entries: Vec<(u64, String, String)>,
 }
 
-/// What the standard has for an entry without a value.
+/// The standard's text for an entry without a value.
 const NO_VALUE: &str = "NOVALUE";
 /// Lines of a header: a few dozen.
 const HEADER_LINES: usize = 1_000;
@@ -365,7 +365,7 @@ impl Header {
         if !(is_stated || is("") || is(NO_VALUE)) {
             let name = self.text("reference channel name");
             let name = if name.eq_ignore_ascii_case(NO_VALUE) { "" } else { name };
-            // Some write the channel itself in its place.
+            // Some programs write the channel itself instead.
             let channel = if is("explicit") { name } else { reference };
             return Ok(Times::Of { channel: channel.into(), line });
         }
@@ -400,7 +400,7 @@ impl Header {
     }
 }
 
-/// The channels of the codes that were asked for, or the only ones.
+/// The channels of the codes that were requested, or the only ones.
 fn choose(found: Vec<Channel>, asked: Option<&str>) -> Result<(Channel, Channel), Error> {
     let codes = |quantity: Quantity, from: &[Channel]| {
         let of = from.iter().filter(|c| c.quantity == quantity);

@@ -35,7 +35,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     input.text.trim_ascii_start().starts_with('{')
 }
 
-/// The declared force, with the body's beside it where the file has both; or the force that was
+/// The declared force, with the body force if the file has both; or the force that was
 /// asked for, alone.
 pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     let damaged = |source| {
@@ -54,10 +54,10 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     if both {
         notes.push(match curve.body_force_n {
             Some(_) => "force: the contact force, and the body force for the motion".into(),
-            None => "force: the one that was asked for; the file has another beside it".into(),
+            None => "force: the requested one; the file also holds the other".into(),
         });
     }
-    // The body's force along the deflection is what tells the motion; a contact force alone is
+    // The body force along the deflection determines the motion; a contact force alone is
     // the best there is.
     let has_contact = curve.provenance.force_kind == ForceKind::Contact;
     let other_mass_kg = match curve.provenance.parameters.get(OTHER_MASS) {

@@ -14,7 +14,7 @@ pub(super) enum Quantity {
     Time,
 }
 
-/// What a quantity is called: words with blanks between, in lower case.
+/// Names of a quantity: words separated by blanks, in lower case.
 struct Terms {
     name: &'static str,
     example: &'static str,
@@ -72,7 +72,7 @@ fn is_one(word: &str, of: &str) -> bool {
 }
 
 impl Quantity {
-    /// In the order in which an axis is asked for them.
+    /// In the order in which they are matched with an axis.
     pub(super) const ALL: [Self; 3] = [Self::Deflection, Self::Force, Self::Time];
 
     fn terms(self) -> &'static Terms {
@@ -117,14 +117,14 @@ impl Quantity {
         Self::ALL.into_iter().find(is_named)
     }
 
-    /// The only quantity that words of a name are of.
+    /// The only quantity named by words of a name.
     fn within(name: &str) -> Option<Self> {
         let named = Self::all_within(name);
         let first = *named.first()?;
         named.iter().all(|other| *other == first).then_some(first)
     }
 
-    /// The quantities that words of a text are of; none if it speaks of an edge, a bound or a rate.
+    /// The quantities named by words of a text; none if it names an edge, a bound or a rate.
     pub(super) fn all_within(text: &str) -> Vec<Self> {
         let text = text.to_lowercase();
         let words = || text.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
@@ -146,7 +146,7 @@ impl Quantity {
             let is_its = is_one(&dimension.trim().to_ascii_lowercase(), self.terms().stated);
             return size.filter(|size| is_its && *size > 0.0);
         }
-        // Micro is a letter of its own in texts that are no ASCII.
+        // Micro is a separate letter in non-ASCII texts.
         self.terms().dimension.size_of(&unit.replace(['µ', 'μ'], "u"))
     }
 
@@ -200,7 +200,7 @@ impl Label {
         Self { quantity, unit: unit.map(Into::into) }
     }
 
-    /// What a text names; `None` if that is nothing of a curve.
+    /// What a text names; `None` if it is no quantity of a curve.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let text = text.trim().trim_matches('"').trim();
         if let Some((name, unit)) = in_brackets(text) {
@@ -238,7 +238,7 @@ impl Label {
     }
 }
 
-/// Neither the file nor the user says the unit.
+/// Neither the file nor the user gives the unit.
 pub(super) fn no_unit(place: Place, what: &str, found: &str, example: &str) -> Error {
     let found = shown(found);
     error!(
@@ -260,7 +260,7 @@ fn in_brackets(text: &str) -> Option<(&str, &str)> {
     Some((&text[..at], text[at + 1..text.len() - 1].trim()))
 }
 
-/// The name of a column and its unit: in brackets, or behind a slash, comma, blank or underscore.
+/// The name of a column and its unit: in brackets, or after a slash, comma, blank or underscore.
 fn name_and_unit(text: &str) -> (&str, Option<&str>) {
     let text = text.trim().trim_matches('"').trim();
     if let Some((name, unit)) = in_brackets(text) {

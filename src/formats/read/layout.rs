@@ -1,5 +1,5 @@
-//! Which columns of a table hold what: by their headers, by a row of units below, by the title, or as the user has named
-//! them.
+//! The meaning of the columns of a table: by their headers, by a row of units below, by the title, or as named by
+//! the user.
 
 use super::ColumnNames;
 use super::columns::LISTED;
@@ -9,7 +9,7 @@ use super::table::{Purpose, Row, Table, names_all, unit_of};
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 
-/// A column that is taken, or could be.
+/// A chosen or candidate column.
 #[derive(Clone, Debug)]
 pub(super) struct Column {
     /// Counted from 0.
@@ -59,7 +59,7 @@ impl Named {
     }
 }
 
-/// The columns of a table, in the units that were given where they do not say their own; notes say which. Also
+/// The columns of a table, in the given units if they state none; notes say which. Also
 /// whether a column took its unit from those.
 pub(super) fn layout(
     table: &Table<'_>,
@@ -76,7 +76,7 @@ pub(super) fn layout(
     let numbered = || (1..=table.columns).map(|k| (table.line(), format!("column {k}")));
     let names = if is_bare { numbered().collect() } else { table.names.clone() };
     let wanted = [Quantity::Deflection, Quantity::Force];
-    // What the label of an axis does not say is the deflection, then the force.
+    // Axes without labels are the deflection, then the force.
     let usual = |field: usize, name: &str| {
         let quantity = *wanted.get(field)?;
         Some(if is_bare { Label { quantity, unit: None } } else { Label::of_named(quantity, name) })
@@ -164,7 +164,7 @@ pub(super) fn layout(
                 let usual = names.get(usize::from(quantity == Quantity::Force));
                 return Err(error!(
                     CurveFile,
-                    "{place}: expected a column {wanted} with its unit, such as {example}, found \"{found}\"; or say which column it is with {option}",
+                    "{place}: expected a column {wanted} with its unit, such as {example}, found \"{found}\"; or choose the column with {option}",
                     example = quantity.example(),
                     found = shown(usual.map_or("", |(_, name)| name)),
                     option = quantity.option(),
@@ -178,7 +178,7 @@ pub(super) fn layout(
     if !others.is_empty() {
         let shown = |c: &Named| format!("\"{}\" ({})", shown(&c.name), c.label.quantity.name());
         let others: Vec<String> = others.iter().map(shown).collect();
-        notes.push(format!("columns: not taken: {}", others.join(", ")));
+        notes.push(format!("columns: not used: {}", others.join(", ")));
     }
     let (mut columns, mut said, mut are_used) = (Vec::new(), Vec::new(), false);
     for Named { field, name, label, line } in taken {
@@ -196,7 +196,7 @@ pub(super) fn layout(
     Ok((columns, are_used))
 }
 
-/// Whether a title says that the table has this quantity, as `Force vs displacement` does.
+/// Whether a title names this quantity, as `Force vs displacement` does.
 fn says(table: &Table<'_>, quantity: Quantity) -> bool {
     let says = |(_, title): &(u64, String)| Quantity::all_within(title).contains(&quantity);
     quantity != Quantity::Time && table.titles.iter().any(says)

@@ -3,7 +3,7 @@
 //! Card 1 has eight fields of 10 columns (20 in the long format, `*DEFINE_CURVE+` or `LONG=Y`):
 //! LCID, SIDR, SFA, SFO, OFFA, OFFO, DATTYP, LCINT; points have two fields of 20. Lines with a
 //! comma are free format. A value is `SFA (abscissa + OFFA)`, likewise the ordinate; a scale factor
-//! of 0 means 1. Lines that begin with `$` are comments, also where a title should stand.
+//! of 0 means 1. Lines that begin with `$` are comments, also in place of a title.
 
 use super::Input;
 use super::columns::{Columns, check_curves, choose};
@@ -34,17 +34,17 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
 /// Factors and offsets of card 1: of abscissas, then of ordinates.
 type Scale = [(f64, f64); 2];
 
-/// What the next line of a curve is.
+/// Kind of the next line of a curve.
 #[derive(Clone, Copy, PartialEq)]
 enum Next {
-    /// Nothing of a curve.
+    /// Not part of a curve.
     Other,
     Title,
     Card,
     Point,
 }
 
-/// The curves of a deck, and what its comments say.
+/// The curves of a deck, and the metadata of its comments.
 #[derive(Default)]
 struct Deck {
     curves: Vec<DeckCurve>,

@@ -44,7 +44,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let rows = table.head.rows;
     columns.deflection_m = table.values(0, rows).map(|v| v * system.length_m).collect();
     columns.force_n = table.values(rows, rows).map(|v| v * system.force()).collect();
-    // Further curves of one file have numbers behind their names.
+    // Further curves of one file have numbers after their names.
     let beside = |name: &str| {
         let name = format!("{name}{}", ours.unwrap_or_default());
         matrices.iter().find(move |m| m.name == name)
@@ -91,7 +91,7 @@ impl Matrix<'_> {
     }
 }
 
-/// Most lines and columns of a text that is read.
+/// Maximum number of lines and columns of a text that is read.
 const MOST_TEXT: usize = 1_000;
 
 impl Matrix<'_> {
@@ -107,7 +107,7 @@ impl Matrix<'_> {
     }
 }
 
-/// What the integers in front of a matrix say.
+/// The integers before a matrix.
 struct Head {
     is_big: bool,
     number: usize,
@@ -169,7 +169,7 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, Error> {
                 Place::Byte(at),
                 format_args!("matrix {}", shown(&name)),
                 format_args!("{} rows of {}", head.rows, head.columns),
-                format_args!("{} bytes behind its name", bytes.len().saturating_sub(begin)),
+                format_args!("{} bytes after its name", bytes.len().saturating_sub(begin)),
                 CUT,
             ));
         };
@@ -182,7 +182,7 @@ fn matrices(bytes: &[u8]) -> Result<Vec<Matrix<'_>>, Error> {
     Ok(found)
 }
 
-/// The matrix that was asked for, else ours, else the only one of two columns.
+/// The matrix that was requested, else ours, else the only one of two columns.
 fn chosen<'a>(matrices: &'a [Matrix<'_>], asked: Option<&str>) -> Result<&'a Matrix<'a>, Error> {
     let fitting: Vec<&Matrix> =
         matrices.iter().filter(|m| m.head.columns == 2 && !m.head.is_text).collect();

@@ -1,12 +1,12 @@
-//! Curves of other tools: one file per format, each giving a [`ReadCurve`] in SI that says what
-//! was taken how.
+//! Curves of other tools: one file per format, each giving a [`ReadCurve`] in SI that states how
+//! it was read.
 //!
 //! **Units** are those of the column's header (`d_mm`, `Force [kN]`), of a comment
 //! (`units: mm-t-s`), or those that are given ([`ReadOptions::units`]); without any, a file is
-//! refused. **Comments** `key: value` that our own exports write tell force kind, speed, speed
+//! refused. **Comments** `key: value` that our own exports write give force kind, speed, speed
 //! kind, mass and unloading stiffness. **Signs**: compression becomes positive. **Points** that
-//! repeat the one before, and guard points (below zero deflection with no force; the last force
-//! repeated as far behind the end) are removed. Each of these leaves a note.
+//! repeat the previous one, and guard points (below zero deflection with no force; the last force
+//! repeated equally far beyond the end) are removed. Each of these leaves a note.
 
 mod columns;
 pub(crate) mod curve;
@@ -55,7 +55,7 @@ pub struct Reader {
     read: Read,
 }
 
-/// What a reader gives.
+/// Result of a reader.
 #[derive(Debug)]
 enum Read {
     /// Columns of a binary file, of which the curve is made.
@@ -133,18 +133,18 @@ pub const READERS: &[Reader] = &[
     },
 ];
 
-/// What the user says beside the file.
+/// What the user gives besides the file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ReadOptions {
-    /// Name of a reader, where the content shall not tell.
+    /// Name of a reader, to override recognition by content.
     pub format: Option<String>,
-    /// Units of values that do not say their own.
+    /// Units of values that state none.
     pub units: Option<UnitSystem>,
-    /// Number or name of the curve in a file of several.
+    /// Number or name of the curve in a file that holds several.
     pub curve: Option<String>,
     /// The force, where the file has both.
     pub force: Option<ForceKind>,
-    /// The columns of a table, where its header does not tell.
+    /// The columns of a table whose header does not name them.
     pub columns: ColumnNames,
 }
 
@@ -208,7 +208,7 @@ const ZIP: &[u8] = b"PK\x03\x04";
 const BEGINNING: usize = 64 << 10;
 
 impl Input<'_> {
-    /// What is looked at to recognise a format.
+    /// The part of a file used to recognise its format.
     fn beginning(&self) -> &str {
         let fits = |end: &usize| self.text.is_char_boundary(*end);
         let end = (0..=self.text.len().min(BEGINNING)).rev().find(fits);
@@ -299,10 +299,10 @@ fn parse(path: &Path, options: &ReadOptions) -> Result<(Parsed, &'static Reader)
     Ok((found, reader))
 }
 
-/// A curve that can drive an interface, as its file has it.
+/// A curve that can drive an interface, as in its file.
 pub(crate) enum DrivingFile {
     Predicted(Box<PredictedCurve>),
-    /// With what was changed to make it drive.
+    /// With the changes needed to drive an interface.
     Curve(Box<ForceCurve>, Vec<String>),
 }
 
@@ -310,7 +310,7 @@ pub(crate) enum DrivingFile {
 /// stands; of a record over time the loading branch drives.
 ///
 /// # Errors
-/// As of [`read`], and if the curve cannot drive an interface.
+/// As for [`read`], and if the curve cannot drive an interface.
 pub(crate) fn driving(path: &Path, options: &ReadOptions) -> Result<DrivingFile, Error> {
     let (mut found, reader) = parse(path, options)?;
     if reader.name == JSON {
@@ -328,7 +328,7 @@ pub(crate) fn driving(path: &Path, options: &ReadOptions) -> Result<DrivingFile,
         Some(Err(error)) => Some(curve::content(path)(error).at_key("points")),
         None => None,
     };
-    // What lies beyond the maximal crush is of no use to a database; here it drives.
+    // What lies beyond the maximum crush is of no use to a database; here it drives.
     let crush_m = match &mut found {
         Parsed::Columns(columns) => columns.facts.max_deflection_m.take(),
         Parsed::Curve(_) => None,
@@ -359,7 +359,7 @@ fn reader(input: &Input<'_>) -> Result<&'static Reader, Error> {
         .iter()
         .find(|r| (r.recognise)(input))
         .or_else(|| READERS.iter().find(|r| r.extensions.contains(&&*extension)))
-        .ok_or_else(|| error!(CurveFile, "{path}: the format of this file follows neither from its content nor from its extension: expected one of {known}; name it with --from", known = known(), path = input.path.display()))
+        .ok_or_else(|| error!(CurveFile, "{path}: the format of this file cannot be recognised by its content or extension: expected one of {known}; name it with --from", known = known(), path = input.path.display()))
 }
 
 /// The bytes of a file, up to the bound, and what identifies them.

@@ -1,7 +1,7 @@
 //! Curve of a Modelica table file: `#1`, then `double name(rows,columns)` and the values.
 //!
 //! Values are separated by blanks, tabs, commas or semicolons, wherever lines end; `#` begins a
-//! comment. The first two columns are deflection and force. Units stand in a comment of the
+//! comment. The first two columns are deflection and force. Units are in a comment of the
 //! table's line (`# d [m], F [N]`); the table `fd_load` is ours and in SI.
 
 use super::Input;
@@ -15,7 +15,7 @@ use crate::unit::UnitSystem;
 /// Name of the table and of the matrix that our exports write, in SI.
 pub(super) const OURS: &str = "fd_load";
 
-const REMEDY: &str = " (or behind the table's size: \"# d [m], F [N]\")";
+const REMEDY: &str = " (or after the table's size: \"# d [m], F [N]\")";
 
 pub(super) fn recognise(input: &Input<'_>) -> bool {
     input.text.strip_prefix("#1").is_some_and(|rest| rest.starts_with(['\n', '\r', ' ']))
@@ -66,7 +66,7 @@ struct Table {
     columns: usize,
     /// SI values of the units in its comment: of deflection and force.
     sizes: Option<(f64, f64)>,
-    /// What the comments in front of it say.
+    /// Metadata of the comments before it.
     facts: Metadata,
     values: Vec<f64>,
     /// Line of each row's first value.
@@ -115,7 +115,7 @@ impl File {
         for (field, word) in words.enumerate() {
             let place = Place::Field { line, field: field + 1 };
             let Some(table) = self.tables.last_mut() else {
-                let what = "a table such as \"double fd_load(4,2)\" in front of values";
+                let what = "a table such as \"double fd_load(4,2)\" before the values";
                 return Err(expected(place, what, word));
             };
             let value = value(place.clone(), word)?;
@@ -149,7 +149,7 @@ impl File {
         ))
     }
 
-    /// The table that was asked for, else ours, else the only one that can be a curve.
+    /// The table that was requested, else ours, else the only one that can be a curve.
     fn choose(&self, asked: Option<&str>) -> Result<&Table, Error> {
         let fitting: Vec<&Table> = self.tables.iter().filter(|t| t.columns >= 2).collect();
         if fitting.is_empty() {

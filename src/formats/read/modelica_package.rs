@@ -1,6 +1,6 @@
 //! Curve of a Modelica package that `crumple export` wrote: its constants `d` and `f`, in SI.
 //!
-//! Comments `// key: value` in front of the package say force, speed, mass and unloading. The package keeps at most
+//! Comments `// key: value` before the package give force, speed, mass and unloading. The package keeps at most
 //! 200 points of a curve.
 
 use super::Input;
@@ -86,7 +86,7 @@ struct Package {
 /// The packages that hold a table.
 fn packages(text: &str) -> Result<Vec<Package>, Error> {
     let (mut packages, mut facts) = (Vec::<Package>::new(), Metadata::default());
-    // The array that goes on in the next line.
+    // The array that continues in the next line.
     let mut open: Option<&'static str> = None;
     for (at, line) in lines(text) {
         let line = line.trim();

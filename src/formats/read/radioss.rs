@@ -1,6 +1,6 @@
 //! Curve of a Radioss deck: a function `/FUNCT/id`.
 //!
-//! Behind the keyword stand a title and points of two fields of 20 columns; the next keyword ends them. A
+//! The keyword is followed by a title and points of two fields of 20 columns; the next keyword ends them. A
 //! `/MOVE_FUNCT/id` scales and then shifts the function of that number. Lines that begin with `#` or `$` are
 //! comments. Units are those of a comment (`units: mm-t-s`) or of `/BEGIN`, where
 //! the fourth line has mass, length and time, by name or by their size in SI.
@@ -24,7 +24,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
 pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let mut deck = Deck::read(input.text)?;
     if deck.functions.is_empty() {
-        let found = "none in this file (of a run's files the starter, _0000.rad, has them)";
+        let found = "none in this file (in a run, the starter, _0000.rad, has them)";
         return Err(error!(CurveFile, "expected a /FUNCT, found {found}"));
     }
     let names = deck.functions.iter().map(|f| (f.curve.id.clone(), f.curve.title.clone()));
@@ -33,7 +33,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     if keyword != FUNCTION || unit.is_some() {
         return Err(error!(
             CurveFile,
-            "{place}: expected /FUNCT/{id} with points between which it is straight, in the units of the deck, found /{keyword}/{id}{unit}: write it as such points",
+            "{place}: expected /FUNCT/{id} with linear interpolation between its points, in the units of the deck, found /{keyword}/{id}{unit}: write it as such points",
             id = curve.id,
             place = Place::Line(line),
             unit = unit.map(|unit| format!("/{unit}")).unwrap_or_default()
@@ -67,7 +67,7 @@ struct Function {
     curve: DeckCurve,
 }
 
-/// What `/MOVE_FUNCT/id` makes of a function: scaled first, then shifted.
+/// Effect of `/MOVE_FUNCT/id` on a function: scaled first, then shifted.
 struct Move {
     id: String,
     line: u64,
@@ -77,10 +77,10 @@ struct Move {
 
 const FUNCTION: &str = "FUNCT";
 
-/// What the next line is.
+/// Kind of the next line.
 #[derive(Clone, Copy, PartialEq)]
 enum Next {
-    /// Nothing of a function.
+    /// Not part of a function.
     Other,
     Title,
     Point,
@@ -90,7 +90,7 @@ enum Next {
     Move(u8),
 }
 
-/// The functions of a deck, and what its comments say.
+/// The functions of a deck, and the metadata of its comments.
 #[derive(Default)]
 struct Deck {
     functions: Vec<Function>,
@@ -136,7 +136,7 @@ impl Deck {
         }
     }
 
-    /// Takes a line that is neither comment nor keyword; gives what the one behind it is.
+    /// Takes a line that is neither comment nor keyword; gives what the one after it is.
     fn line(&mut self, next: Next, line: &str, at: u64) -> Result<Next, Error> {
         match (next, self.functions.last_mut(), self.moves.last_mut()) {
             (Next::Begin(0), None, _) => {

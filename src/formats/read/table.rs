@@ -1,11 +1,11 @@
 //! Tables of numbers in a text: titles, a header, a row of units, rows; or curves of two columns, one after the other.
 //!
-//! The header is the first line that names what is looked for and behind which a row of as many numbers follows, with or
-//! without a row of units between; else the first line above such a row. Columns are separated by tabs, semicolons,
+//! The header is the first line that names the required columns and is followed by a row with the same number of values, with or
+//! without a row of units in between; otherwise the first line above such a row. Columns are separated by tabs, semicolons,
 //! commas or blanks, whichever gives the header and the row below it the same number of fields. Lines that begin with
 //! `#` or `$` are comments.
 //!
-//! Curves of two columns stand below titles and labels: of four lines the second is the x axis and the third the y axis,
+//! Curves of two columns follow below titles and labels: of four lines the second is the x axis and the third the y axis,
 //! else those that name a quantity; without any, the last comment may name both. `CONTINUE` or `endcurve` ends a curve,
 //! and another may follow; `NAME #pts=N` begins one of a `Curveplot` file, whose labels are those of all its curves.
 
@@ -19,13 +19,13 @@ use crate::error::{Error, error};
 const MOST_TITLES: usize = 100;
 /// Columns of a table, at most: guards time.
 const MOST_COLUMNS: usize = 1_000;
-/// Characters of a unit, at most: to tell a row of units from a header.
+/// Maximum characters of a unit, to distinguish a row of units from a header.
 const UNIT: usize = 6;
-/// Lines in front of a curve of two columns: more are another kind of file.
+/// Lines before a curve of two columns; more mean another kind of file.
 const HEADS: usize = 20;
-/// Characters of such a line that are looked at.
+/// Characters of such a line that are examined.
 const LABEL: usize = 300;
-/// Words between two quantities of a title, the first of which stands in the second column.
+/// Words between two quantities of a title, the first of which is in the second column.
 const VERSUS: [&str; 6] = ["vs", "vs.", "versus", "over", "against", "über"];
 /// Titles that a note repeats.
 const TITLES: usize = 3;
@@ -125,7 +125,7 @@ impl Separator {
     }
 }
 
-/// What a table is read for.
+/// Purpose of reading a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Purpose {
     /// Force over deflection.
@@ -134,10 +134,10 @@ pub(super) enum Purpose {
     History,
 }
 
-/// How well a line fits as the header, best first.
+/// How well a line matches as the header, best first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Fit {
-    /// It names what is looked for, and numbers follow.
+    /// It names the required quantities, and numbers follow.
     Header,
     Named,
     /// Numbers follow.
@@ -162,7 +162,7 @@ pub(super) struct Table<'a> {
     declared: Option<(u64, String)>,
     pub columns: usize,
     separator: Separator,
-    /// From the first row on, and how many lines stand before that.
+    /// From the first row on, and how many lines are before that.
     rest: &'a str,
     before: u64,
 }
@@ -181,7 +181,7 @@ impl<'a> Row<'a> {
         self.fields.get(field).copied().unwrap_or_default()
     }
 
-    /// The finite number in a field, or the text that stands there.
+    /// The finite number in a field, or the text that is there.
     pub(super) fn number(&self, field: usize) -> Result<f64, &'a str> {
         let found = self.field(field);
         self.separator.any_number(found).filter(|value| value.is_finite()).ok_or(found)
@@ -200,10 +200,10 @@ impl<'a> Table<'a> {
                 let (fit, names) = fit(&first[k..], separator, &is_header)?;
                 Some((fit, k, separator, names))
             });
-        // A header above numbers wins wherever it stands; else the first line that fits at all.
+        // A header above numbers takes precedence; otherwise the first line that matches at all.
         let best = candidates.min_by_key(|(fit, k, ..)| (*fit != Fit::Header, *k, *fit));
         let (fit, k, separator, names) = best.unwrap_or_else(|| {
-            // Nothing fits: what is wrong with the first line is said of it.
+            // Nothing fits: report what is wrong with the first line.
             let line = first.first().map_or("", |(_, line)| line);
             let of = |c| Separator::OF_TABLES[..3].iter().copied().find(|s| s.separates(c));
             let separator = line.chars().find_map(of).unwrap_or(Separator::Comma);
@@ -238,7 +238,7 @@ impl<'a> Table<'a> {
         let mut tables: Vec<Self> = Vec::new();
         let (mut heads, mut shared): (Vec<(u64, String)>, Vec<_>) = Default::default();
         let (mut comment, mut declared, mut curves) = (None, None, 1);
-        // Whether rows of the last table go on.
+        // Whether rows of the last table continue.
         let mut is_open = false;
         let end = |tables: &mut Vec<Self>, is_open: &mut bool, line: &str| {
             if let Some(last) = tables.last_mut().filter(|_| *is_open) {
@@ -331,7 +331,7 @@ impl<'a> Table<'a> {
         self.names = names.into_iter().flatten().map(|name| (line, name)).collect();
     }
 
-    /// What was skipped, in one line; `None` if nothing was.
+    /// Skipped lines in one note; `None` if there are none.
     pub(super) fn note(&self) -> Option<String> {
         let ((first, _), (last, _)) = (self.titles.first()?, self.titles.last()?);
         let lines = if first == last {
@@ -342,7 +342,7 @@ impl<'a> Table<'a> {
         let shown = self.titles.iter().take(TITLES).map(|(_, title)| shown(title));
         let more = if self.titles.len() > TITLES { ", …" } else { "" };
         let shown: Vec<String> = shown.map(|title| format!("\"{title}\"")).collect();
-        Some(format!("titles: {lines} and no part of the table: {}{more}", shown.join(", ")))
+        Some(format!("titles: {lines}, not part of the table: {}{more}", shown.join(", ")))
     }
 
     /// The rows in their order; those of separators alone, as spreadsheets write them, are not.
@@ -365,7 +365,7 @@ impl<'a> Table<'a> {
             }
             let is_less = found < self.columns && self.separator == Separator::Blanks;
             if found > self.columns || is_less {
-                // A number that is missing is said by who takes it.
+                // A missing number is reported by its user.
                 if is_less {
                     take(&row)?;
                 }
@@ -423,7 +423,7 @@ pub(super) fn is_pair(line: &str) -> bool {
 }
 
 fn not_two(line: u64, found: &str) -> Error {
-    expected(Place::Line(line), "two numbers, or CONTINUE behind a curve", found)
+    expected(Place::Line(line), "two numbers, or CONTINUE after a curve", found)
 }
 
 /// How the first of these lines fits as the header of a table, and its names.
@@ -441,7 +441,7 @@ fn fit(
     let row = behind.get(usize::from(units)).filter(|(_, line)| separator.is_row(line));
     match row.and_then(|(_, row)| separator.names(first, row)) {
         Some(names) if is_header(&names) => Some((Fit::Header, names)),
-        // A title of two words stands above two columns as well as a header does.
+        // A title of two words is above two columns as well as a header does.
         Some(names) if separator == Separator::Blanks && !names.iter().any(|n| is_name(n)) => None,
         Some(names) => Some((Fit::Above, names)),
         None => {
@@ -499,7 +499,7 @@ pub(super) fn check_last(heads: &[(u64, String)]) -> Result<(), Error> {
     }
 }
 
-/// The names of the two axes of a curve, as far as the lines above its first row say them.
+/// The names of the two axes of a curve, as far as the lines above its first row name them.
 fn axes(heads: &[(u64, String)], comment: Option<(u64, String)>, row: &str) -> Vec<(u64, String)> {
     if let [_, x, y, _] = heads {
         return vec![x.clone(), y.clone()];
@@ -523,7 +523,7 @@ fn axes(heads: &[(u64, String)], comment: Option<(u64, String)>, row: &str) -> V
     axes
 }
 
-/// A text that names several columns, apart: behind a bracket or a unit.
+/// A text that names several columns, apart: after a bracket or a unit.
 fn pieces(text: &str) -> Vec<String> {
     let mut pieces: Vec<String> = vec![String::new()];
     for word in Separator::Any.fields(text).0 {

@@ -11,11 +11,11 @@ use super::text::lines;
 use crate::error::{Error, error};
 use crate::guess;
 
-/// Lines in front of the points of a curve of two columns, when a file is recognised.
+/// Lines before the points of a curve of two columns, when a file is recognised.
 const HEADS: usize = 20;
 
 /// Whether the extension says so, as that of no other tool's files does, or a header that names a
-/// deflection and a force stands above rows of numbers, or the first line is such a header or row. Two
+/// deflection and a force is above rows of numbers, or the first line is such a header or row. Two
 /// plain columns with blanks between are those of another reader.
 pub(super) fn recognise(input: &Input<'_>) -> bool {
     let has = |wanted| input.path.extension().is_some_and(|e| e.eq_ignore_ascii_case(wanted));
@@ -31,7 +31,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     fits && !table.is_plain_pair()
 }
 
-/// Whether two numbers stand below at most so many lines.
+/// Whether two numbers are below at most so many lines.
 pub(super) fn recognise_pairs(input: &Input<'_>) -> bool {
     let is_data = |line: &str| !line.trim().is_empty() && !line.starts_with(['$', '#']);
     let mut data = lines(input.beginning()).filter(|(_, line)| is_data(line)).take(HEADS);
@@ -65,7 +65,7 @@ pub(super) fn read_pairs(input: &Input<'_>) -> Result<Columns, Error> {
     columns(input, table, &table.name, Vec::new())
 }
 
-/// Which curve was asked for by its name or number, else the only one.
+/// Which curve was requested by its name or number, else the only one.
 fn chosen(tables: &[Table<'_>], asked: Option<&str>) -> Result<usize, Error> {
     let by_name = |asked: &&str| tables.iter().any(|table| table.name.trim() == asked.trim());
     if asked.filter(by_name).is_some() {
@@ -74,12 +74,12 @@ fn chosen(tables: &[Table<'_>], asked: Option<&str>) -> Result<usize, Error> {
     choose((1..).zip(tables).map(|(k, t)| (k.to_string(), t.name.clone())), asked)
 }
 
-/// The last comment in front of a table.
+/// The last comment before a table.
 fn last_comment<'a>(input: &Input<'a>, table: &Table<'_>) -> Option<(u64, &'a str)> {
     comments(input.text, table.begin()).last().map(|(line, _, comment)| (line, comment))
 }
 
-/// The comments in front of a line: their lines, marks and texts.
+/// The comments before a line: their lines, marks and texts.
 fn comments(text: &str, before: u64) -> impl Iterator<Item = (u64, &str, &str)> {
     lines(text).take_while(move |(line, _)| *line < before).filter_map(|(at, line)| {
         let line = line.trim();
@@ -145,7 +145,7 @@ pub(crate) struct History {
     pub values: Vec<f64>,
 }
 
-/// Reads the values called `wanted`; without a name, the only ones. Their times stand in the last column of times before
+/// Reads the values called `wanted`; without a name, the only ones. Their times are in the last column of times before
 /// them, else in the first column.
 pub(crate) fn history(bytes: &[u8], wanted: Option<&str>) -> Result<History, Error> {
     let text = decoded(bytes).text;
@@ -226,7 +226,7 @@ pub(crate) fn history(bytes: &[u8], wanted: Option<&str>) -> Result<History, Err
         if let Some(&before) = history.time.last().filter(|&&before| before >= at) {
             return Err(error!(
                 Rating,
-                "line {line}, column {column} (\"{name}\"): time {at} does not come after {before}: times must rise strictly, so cut or sort the file first",
+                "line {line}, column {column} (\"{name}\"): time {at} does not come after {before}: times must increase strictly, so cut or sort the file first",
                 column = time + 1,
                 name = name_of(time)
             ));
@@ -238,7 +238,7 @@ pub(crate) fn history(bytes: &[u8], wanted: Option<&str>) -> Result<History, Err
     Ok(history)
 }
 
-/// The column that was asked for, of those that hold values.
+/// The column that was requested, of those that hold values.
 fn column(
     names: &[String],
     mut values: impl Iterator<Item = usize> + Clone,
@@ -309,7 +309,7 @@ mod tests {
         t(
             "#\nt,a\n0,1\n2,1\n1,1\n",
             None,
-            "line 5, column 1 (\"t\"): time 1 does not come after 2: times must rise strictly, so cut or sort the file first",
+            "line 5, column 1 (\"t\"): time 1 does not come after 2: times must increase strictly, so cut or sort the file first",
         );
         t(
             "t,a\n0,1\n0,5,2\n",

@@ -1,11 +1,11 @@
-//! One interface on its law: which branch it is on, and what leaving a piece leads to.
+//! One interface on its law: its current branch, and what happens when it leaves a segment.
 
 use super::super::law::{Branch, ForceLaw, Piece};
 
 /// Where an interface is on its law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stage {
-    /// At the largest deflection so far.
+    /// At the maximum deflection so far.
     Loading,
     /// Below it: on an unloading branch, open, or not yet in contact.
     Below,
@@ -15,18 +15,18 @@ pub(super) enum Stage {
 #[derive(Clone, Debug)]
 pub(super) struct Contact {
     pub stage: Stage,
-    /// Piece of the envelope near the largest deflection; while loading, the current one.
+    /// Piece of the envelope near the maximum deflection; while loading, the current one.
     pub index: usize,
-    /// From the largest deflection, once the deflection has fallen.
+    /// From the maximum deflection, once the deflection has fallen.
     pub branch: Branch,
     /// Largest force, up to the end of the last step but one.
     pub peak_n: f64,
 }
 
-/// What leaving a piece led to.
+/// What happened when an interface left a segment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in super::super) struct Move {
-    /// From no force or an unloading branch to a new largest deflection.
+    /// From no force or an unloading branch to a new maximum deflection.
     pub loads: bool,
     /// From no contact to some, at this deflection.
     pub closed_m: Option<f64>,
@@ -57,7 +57,7 @@ impl Contact {
         Self { stage: Stage::Below, index: 0, branch: Branch::default(), peak_n: 0.0 }
     }
 
-    /// The piece of the envelope that holds a new largest deflection.
+    /// The piece of the envelope that holds a new maximum deflection.
     #[inline(always)]
     pub(crate) fn load(&mut self, law: &ForceLaw, deflection_m: f64) -> Piece {
         let before = self.index;

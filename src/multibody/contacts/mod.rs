@@ -1,7 +1,7 @@
-//! Contacts: all interfaces of a chain side by side, each on one straight piece of its law.
+//! Contacts: all interfaces of a chain side by side, each on one linear segment of its law.
 //!
 //! A step's forces are one pass of multiply-adds over arrays; only an interface that has left
-//! its piece is looked at by itself.
+//! its segment is treated separately.
 
 mod contact;
 mod work;
@@ -12,7 +12,7 @@ pub(super) use contact::Move;
 use contact::{Contact, Stage};
 use work::Totals;
 
-/// Which state of a step is meant.
+/// Which state of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum StepPoint {
     Start = 0,
@@ -332,7 +332,7 @@ impl<'a> Contacts<'a> {
         what
     }
 
-    /// Largest deflection so far.
+    /// Maximum deflection so far.
     pub(crate) fn largest_m(&self, at: StepPoint, k: usize) -> f64 {
         match self.contacts[k].stage {
             Stage::Loading => self.deflection_m(at, k),

@@ -1,11 +1,11 @@
-//! Work of the contacts, which only outputs and corrections ask for: exact from the laws' tables.
+//! Work of the contacts, needed only for outputs and corrections: exact from the laws' tables.
 
 use super::super::law::{OnEnvelope, Piece};
 use super::super::rows::{LANES, LaneIndex, Row, Rows, each, larger};
 use super::contact::{Contact, Stage};
 use super::{Contacts, StepPoint};
 
-/// A point of the current piece of a row of interfaces and the work done up to it; the largest
+/// A point of the current piece of a row of interfaces and the work done up to it; the maximum
 /// deflection and what is dissipated once the deflection has fallen from there.
 #[derive(Clone, Debug)]
 pub(super) struct Totals {

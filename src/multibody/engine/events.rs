@@ -1,4 +1,4 @@
-//! Events: what happens where an interface leaves its piece within a step.
+//! Events: corrections where an interface leaves its segment within a step.
 
 use super::super::contacts::{Direction, Move, StepPoint};
 use super::super::recorder::Moment;
@@ -239,7 +239,7 @@ impl Engine<'_> {
         if let Some(closed_m) = m.what.closed_m {
             part += ((end - closed_m) / (end - start)).clamp(0.0, 1.0) - 0.5;
         }
-        // What only pushes has no force any more when it opens.
+        // An interface that only pushes has no force when it opens.
         if m.what.opened && interface.tension.is_some() {
             part += ((contacts.opens_at_m(m.k) - start) / (end - start)).clamp(0.0, 1.0) - 0.5;
         }
@@ -251,7 +251,7 @@ impl Engine<'_> {
         }
     }
 
-    /// Tells the recorder whether forces act on the bodies at interface `k` from `time_s` on.
+    /// Notifies the recorder whether forces act on the bodies at interface `k` from `time_s` on.
     fn record_sides(&mut self, k: usize, time_s: f64) {
         let interfaces = self.fixed.chain.interfaces().len();
         for i in self.sides(k) {

@@ -124,7 +124,7 @@ impl Engine<'_> {
             let spring = net_n[slot];
             let mut force = spring + damping.at(closing) * closing;
             if interface.tension.is_none() {
-                // What only pushes does not pull when it opens fast.
+                // An interface that only pushes has no tension when it opens fast.
                 force = force.max(0.0);
             }
             net_n[slot] = force;

@@ -1,4 +1,4 @@
-//! Fixed steps over a chain: velocity Verlet, and a scheme of fourth order.
+//! Fixed steps over a chain: velocity Verlet, and a fourth-order scheme.
 //!
 //! Where an interface goes from one piece of its law to another within a step, the quadrature
 //! misses some of the impulse and of its moment. Both follow from the law's tables (`events.rs`):
@@ -7,8 +7,8 @@
 //!
 //! Every interface is kept on one straight piece of its law (`bank`), so that a step is a few passes of multiply-adds
 //! over arrays, as wide as the machine's vectors (`multiversion`; no fused operations, so the bits are the same for any
-//! width). The chain is laid out in stretches, one per lane (`rows`): neighbours stand in the same lane of the next row,
-//! and no load waits for two stores. Only an interface that leaves its piece is looked at (`events`): its piece is found
+//! width). The chain is laid out in stretches, one per lane (`rows`): neighbours are in the same lane of the next row,
+//! and no load waits for two stores. Only an interface that leaves its piece is examined (`events`): its piece is found
 //! next to the old one, extremes and phases are noted, and the impulse of the step and its moment are corrected.
 //!
 //! The correction: along a step the mean force is the work over the change of deflection, and the tables know the work
@@ -19,8 +19,8 @@
 //! the difference of two works is their rounding, and the correction is skipped. Where a deflection turns, its top is the
 //! vertex of the parabola through the step's start; memory has no error of the step.
 //!
-//! Velocity Verlet is the default: it takes every law, and everyone knows it. The scheme of fourth order (Chin's 4A: two
-//! forces and a gradient, which a piecewise linear law gives at no cost) takes up to 35 times the step with errors of about
+//! Velocity Verlet is the default: it works with every law and is well known. The fourth-order scheme (Chin's 4A: two
+//! forces and a gradient, which a piecewise linear law gives at no cost) takes steps up to 35 times as long with errors of about
 //! 1e-6 m/s, for forces that do not depend on speeds.
 //!
 //! Known limit: vehicles that touch without closing, behind a curve that begins above 0, chatter, and every method needs
@@ -146,7 +146,7 @@ impl Engine<'_> {
         self.on_wall(StepPoint::End, h / 3.0);
     }
 
-    /// Tells the recorder where forces on bodies have begun or changed their sign since the last
+    /// Notifies the recorder where forces on bodies have begun or changed their sign since the last
     /// look; `v` is `ahead_s` ahead.
     #[inline(always)]
     fn look<const N: usize>(&mut self, ahead_s: f64) {

@@ -40,7 +40,7 @@ pub(super) struct OutputRecorder {
     work_j: Rows,
     largest_m: Rows,
     dissipated_j: Rows,
-    /// The same of couplings.
+    /// The same for couplings.
     pulled: [Rows; 3],
 }
 

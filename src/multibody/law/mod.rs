@@ -17,7 +17,7 @@ pub(super) use pieces::{Branch, OnEnvelope, Piece};
 use unloading::{Memory, StoredBy};
 pub use unloading::{UnloadingChoice, UnloadingShape};
 
-/// What happens when the deflection falls.
+/// What happens when the deflection decreases.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Unloading {
     /// The envelope is followed back (the reference model, which has no memory).
@@ -39,7 +39,7 @@ pub enum EnvelopeEnd {
     Hold,
     /// The last segment is continued if it rises, else the last force is held.
     Slope,
-    /// The structure is taken as fully crushed at 1.5 times the maximal crush, or where faster runs
+    /// The structure is taken as fully crushed at 1.5 times the maximum crush, or where faster runs
     /// end: from there the force rises with the unloading stiffness. Of a law by itself: as `slope`.
     Bottom,
     /// The run ends with an error that names the interface.
@@ -51,7 +51,7 @@ pub enum EnvelopeEnd {
 /// Invariant: with memory, the dissipated energy never falls while the deflection grows, so
 /// that no deflection creates energy. One stiffness `k` for all deflections keeps to this
 /// only if it is at least the envelope's steepest rise `k_s`: FE curves begin with a spike
-/// whose flank is far steeper than the line on which the vehicle rebounds at the end, and
+/// whose rise is far steeper than the line on which the vehicle rebounds at the end, and
 /// one stiff line for both would lose most of the rebound. Therefore the branch from δ stores
 ///
 /// `stored = max(work − dissipated, storable(k_s))`, with
@@ -59,7 +59,7 @@ pub enum EnvelopeEnd {
 /// `dissipated = max over s ≤ δ of work(s) − storable(k)(s)`, not below 0.
 ///
 /// `F` is the envelope's force at δ and `work` its integral up to there; `c = ½` for a straight
-/// line, whose stiffness is `F²/(2 stored)`, and less for a shape that gives back less. The bound
+/// line, whose stiffness is `F²/(2 stored)`, and less for a shape that returns less. The bound
 /// `cδF` keeps the branch from reaching zero deflection with a force left, whose energy would be
 /// lost. With `k ≥ k_s` and an envelope from (0, 0) this is the law of one stiffness.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,7 +98,7 @@ impl ForceLaw {
     /// The law of a recorded motion: the unloading branch has its shape, and the energy of the
     /// line of the unloading stiffness from the envelope's end.
     ///
-    /// A recorded force swings, and what a structure has stored does not swing with it.
+    /// A recorded force oscillates, but the energy stored in a structure does not.
     /// Therefore the storable energy is taken from the mean force `work/δ`, scaled to that
     /// energy at the end, and only bounded by `cδF`.
     pub fn recorded(
@@ -159,7 +159,7 @@ impl ForceLaw {
         Self { envelope, shape, end, data_end_m, slope_n_per_m, sum_jm, memory }
     }
 
-    /// Whether the largest deflection changes the force.
+    /// Whether the maximum deflection changes the force.
     pub(super) fn has_memory(&self) -> bool {
         self.memory.is_some()
     }
@@ -259,7 +259,7 @@ pub struct MemoryTables<'a> {
     pub steepest_n_per_m: f64,
     /// A branch stores at most this share of force times deflection.
     pub largest_share: f64,
-    /// Whether what is stored follows from the mean force up to the largest deflection, and not
+    /// Whether what is stored follows from the mean force up to the maximum deflection, and not
     /// from the force there.
     pub is_by_mean_force: bool,
 }
@@ -316,7 +316,7 @@ mod tests {
         assert_eq!((stored, same), (0.0, dissipated));
     }
 
-    /// Softer than the spike's flank: the rebound at the end follows the stiffness asked
+    /// Softer than the rise of the spike: the rebound at the end follows the requested stiffness
     /// for, and on the way there no step of the deflection gives energy back.
     #[test]
     fn soft_unloading_never_creates_energy() {

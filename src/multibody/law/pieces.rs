@@ -12,14 +12,14 @@ pub(in super::super) struct OnEnvelope {
     pub work_j: f64,
 }
 
-/// The unloading branch from the largest deflection so far.
+/// The unloading branch from the maximum deflection so far.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(in super::super) struct Branch {
     pub largest_m: f64,
     pub top_n: f64,
     pub stored_j: f64,
     pub dissipated_j: f64,
-    /// Deflection given back until the force is zero.
+    /// Deflection returned until the force is zero.
     pub length_m: f64,
     /// Integral of the work over the deflection up to the top.
     pub sum_jm: f64,
@@ -103,7 +103,7 @@ impl ForceLaw {
         }
     }
 
-    /// Largest force of the envelope's points `from..=to`.
+    /// Peak force of the envelope's points `from..=to`.
     #[inline(always)]
     pub(in super::super) fn peak_between_n(&self, from: usize, to: usize) -> f64 {
         self.envelope.force_n()[from..=to].iter().copied().fold(0.0, f64::max)
@@ -118,7 +118,7 @@ impl ForceLaw {
         OnEnvelope { piece: i, deflection_m, force_n, work_j }
     }
 
-    /// Energy that would come back from a point of the envelope: all of it without memory.
+    /// Energy that is returned from a point of the envelope: all of it without memory.
     #[inline]
     pub(in super::super) fn stored_j(&self, top: &OnEnvelope) -> f64 {
         self.memory.as_ref().map_or(top.work_j, |memory| memory.stored_j(top))

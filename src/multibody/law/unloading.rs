@@ -1,4 +1,4 @@
-//! Unloading of a law: what of the work done on the envelope comes back, and along which branch.
+//! Unloading of a law: which part of the work done on the envelope is returned, and along which branch.
 
 use super::{EnvelopeEnd, ForceLaw, OnEnvelope, Unloading};
 use crate::curve::{CurveUnloading, ForceCurve};
@@ -6,9 +6,9 @@ use crate::curve::{CurveUnloading, ForceCurve};
 /// What the stored energy of a structure follows from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum StoredBy {
-    /// The force at the largest deflection.
+    /// The force at the maximum deflection.
     Force,
-    /// The mean force up to there: a recorded force swings, what is stored does not.
+    /// The mean force up to there: a recorded force oscillates, the stored energy does not.
     MeanForce,
 }
 
@@ -56,7 +56,7 @@ impl Memory {
         self.steepest_n_per_m
     }
 
-    /// Energy that comes back from a largest deflection.
+    /// Energy that is returned from a maximum deflection.
     #[inline]
     pub(super) fn stored_j(&self, top: &OnEnvelope) -> f64 {
         // Within a piece work − storable is monotone for either bound, so its ends and the top
@@ -90,7 +90,7 @@ impl Memory {
 }
 
 /// Shape of an unloading branch: share of the force at the top over the share of the
-/// branch's length that has been given back.
+/// branch's length that has been returned.
 ///
 /// Invariant: shares of the length rise from 0 to 1, those of the force are at least 0, begin
 /// at 1 and end at 0.
@@ -99,7 +99,7 @@ pub struct UnloadingShape {
     pub(super) length: Vec<f64>,
     pub(super) force: Vec<f64>,
     /// `∫` of the force from each point to the end; the first is the share of force × length that
-    /// is given back.
+    /// is returned.
     pub(super) rest: Vec<f64>,
     /// `∫` of `rest` from the first point to each.
     pub(super) rest_so_far: Vec<f64>,
@@ -157,7 +157,7 @@ impl UnloadingShape {
         Some(Self::new(length, points.iter().map(|p| p.1).collect()))
     }
 
-    /// Share of force × length that is given back: ½ for the line.
+    /// Share of force × length that is returned: ½ for the line.
     pub(super) fn share(&self) -> f64 {
         self.rest[0]
     }

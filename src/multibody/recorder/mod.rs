@@ -236,7 +236,7 @@ pub(super) fn moving_mean(speeds: &[f64], interval_s: f64) -> Option<f64> {
 /// No restitution of what meets more slowly, in m/s: it would be a ratio to nothing.
 const SLOWEST_APPROACH_M_PER_S: f64 = 0.1;
 
-/// What is known of an interface over all steps.
+/// What is known about an interface over all steps.
 #[derive(Clone, Debug, Default)]
 pub(in self::super) struct Extremes {
     peak_n: f64,

@@ -144,7 +144,7 @@ impl Phase {
     /// The span up to the end of the run.
     pub(crate) fn at_end_of_run(self, run_end: Moment) -> Option<Span> {
         match self {
-            // A force that was never looked at does not count as one that still acts.
+            // A force that was never examined does not count as one that still acts.
             Self::Free | Self::Announced { .. } => self.closed_at(run_end),
             Self::Pressed { begin, .. } => Some(Span { begin, end: run_end, is_cut: true }),
             Self::Fading { end, .. } => self.closed_at(end),

@@ -9,7 +9,7 @@ use super::super::law::ForceLaw;
 /// track, the damped and the resisted energy.
 pub(super) struct Motion<'a> {
     pub chain: &'a Chain,
-    /// Largest deflection and extension so far.
+    /// Maximum deflection and extension so far.
     pub pushed_m: Vec<f64>,
     pub pulled_m: Vec<f64>,
 }
@@ -146,7 +146,7 @@ impl<'a> Motion<'a> {
     }
 
     /// The share of a step from `y` to `next` up to the first turn of a law with memory at its
-    /// largest deflection, if one lies before the step's end.
+    /// maximum deflection, if one lies before the step's end.
     pub(crate) fn turn(&self, y: &[f64], next: &[f64], slow: f64) -> Option<f64> {
         let turn = |law: &ForceLaw, before: f64, now: f64, reached: bool| {
             let turned = law.has_memory() && reached && before > slow && now < -slow;

@@ -1,17 +1,17 @@
-//! The frame all LS-DYNA ASCII readers share: header, legend, then the file's own body.
+//! The frame shared by all LS-DYNA ASCII readers: header, legend, then the body of the file.
 //!
-//! # How a state of a text file is found
+//! # How states of a text file are found
 //!
-//! This module reads header and legend, and hands every other line to the file's own `Body`. The body recognises
+//! This module reads header and legend, and passes every other line to the `Body` of the file. The body recognises
 //! lines and says where their fields are. `solver/states` collects rows into states, parses only the selected
-//! fields, and decides whether a state is whole. A body never counts lines, because the number of blank lines
+//! fields, and decides whether a state is complete. A body never counts lines, because the number of blank lines
 //! differs between versions.
 //!
-//! - A state begins when the time changes, or when a row's entity is already there. (Times have six digits, so two
+//! - A state begins when the time changes, or when the entity of a row is already present. (Times have six digits, so two
 //!   states may print the same one.)
-//! - A row without labels must have the width that its id asks for. So a row that is cut or shifted cannot pass for
+//! - A row without labels must have the width that its id requires. So a row that is cut or shifted cannot pass for
 //!   another number.
-//! - Where labels stand (`label_values`), a number is what is between its label and the next one. It must be whole;
+//! - In rows with labels (`label_values`), a number is the text between its label and the next one. It must be complete;
 //!   labels and widths may differ between releases.
 //! - A legend that is not closed ends at the first line of the body.
 
@@ -29,7 +29,7 @@ use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
 
 /// What one kind of file adds to the frame: the meaning of its lines.
 pub(crate) trait Body {
-    /// Whether a line that is not the format's signature can only stand below the header.
+    /// Whether a line that is not the format's signature can only be below the header.
     fn is_signature(&self, _line: &[u8]) -> bool {
         false
     }
@@ -37,7 +37,7 @@ pub(crate) trait Body {
     /// One line below the header, outside a legend, with its line end.
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>);
 
-    /// A damaged line was left out: what was begun before it cannot go on after it.
+    /// A damaged line was left out: what was begun before it cannot continue after it.
     fn interrupt(&mut self) {}
 
     /// The file ends within `line`: ends the pending state if the line cannot belong to it.
@@ -47,7 +47,7 @@ pub(crate) trait Body {
     fn end(&mut self, _place: Place, _states: &mut StateReader<'_>) {}
 
     /// Offered after every line: reads the states from there on at once, if they are laid
-    /// out like the ones above, and says at which line to go on.
+    /// out like the ones above, and says at which line to continue.
     fn leap(
         &mut self,
         _source: &dyn Source,
@@ -62,7 +62,7 @@ pub(crate) trait Body {
     }
 }
 
-/// Lines between those that are read, which say nothing that is known: counted, and told at the end.
+/// Lines between those that are read, of unknown meaning: counted, and reported at the end.
 #[derive(Default)]
 pub(crate) struct Skipped {
     count: usize,
@@ -101,12 +101,12 @@ pub(crate) struct AsciiReader<'a> {
 const MAX_HEADER_LINE: usize = 132;
 /// Entries kept of a legend; real ones have one per entity.
 const MAX_LEGEND: usize = 2_000_000;
-/// Leading states that may be too damaged to tell the entities.
+/// Leading states that may be too damaged to show the entities.
 const MAX_SKIPPED: usize = 3;
 
 /// Reads a whole file through a body made by `body`.
 ///
-/// The first whole state tells which entities a state has. If more states disagree with it
+/// The first complete state determines which entities a state has. If more states disagree with it
 /// than agree, it is the damaged one: the file is read again without it.
 pub(crate) fn read<B: Body>(
     format: &'static Format,
@@ -138,7 +138,7 @@ pub(crate) fn read_default<B: Body + Default>(
 
 struct Attempt {
     file: SolverFile,
-    /// Whether more states disagree with the first whole state than agree.
+    /// Whether more states disagree with the first complete state than agree.
     disputed: bool,
 }
 

@@ -14,7 +14,7 @@ const LAYOUT: Layout = Layout {
 };
 
 /// Headings are "velocity boundary condition forces/…", "pressure boundary condition …",
-/// "discrete nodal point forces": the first word tells them apart.
+/// "discrete nodal point forces": the first word distinguishes them.
 fn heading(line: &[u8]) -> Option<String> {
     let text = std::str::from_utf8(line).ok()?;
     let first = text.split_whitespace().next()?;

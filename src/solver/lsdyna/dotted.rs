@@ -1,6 +1,6 @@
-//! One value per line behind a label with dots, as `deforc` and `jntforc` print them.
+//! One value per line after a label with dots, as `deforc` and `jntforc` print them.
 //!
-//! Never seen with data; read as the source of LSTC's converter `l2a` writes them.
+//! Never tested with real data; read as the source of LSTC's converter `l2a` writes them.
 
 use super::ascii::Body;
 use super::label_values::{Widths, is_number};

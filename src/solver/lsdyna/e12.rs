@@ -63,7 +63,7 @@ const HIGH_BITS: u64 = 0x8080_8080_8080_8080;
 pub(crate) fn parse(field: &[u8; 12]) -> Option<f64> {
     let [s, d, p, f0, f1, f2, f3, f4, e, es, e1, e2] = *field;
     let mantissa = u64::from_le_bytes([s, d, p, f0, f1, f2, f3, f4]);
-    // Two zeros, the digit before the point, the five behind it: eight digits.
+    // Two zeros, the digit before the point, the five after it: eight digits.
     let digits = (mantissa & 0xffff_ffff_ff00_0000) | ((mantissa & 0xff00) << 8) | 0x3030;
     let digits = digits ^ ZEROS;
     let not_digits = (digits.wrapping_add(ABOVE_NINE) | digits) & HIGH_BITS;

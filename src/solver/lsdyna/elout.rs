@@ -7,7 +7,7 @@
 //! `_ip2`, and so on, those of details with `_point1` or `_node7`. Elements may erode: their values
 //! are then NaN. Each kind of element has a block of its own in a state.
 //!
-//! Rows may come and go, because elements erode; what a state lacks is NaN. How much of it is bounded, so that damage
+//! Rows may come and go, because elements erode; missing values are NaN. Their number is limited, so that damage
 //! that looks like erosion cannot fill the memory.
 
 use super::ascii::{self, Body};
@@ -24,13 +24,13 @@ const BEAM: &[u8] = b" r e s u l t a n t s   a n d   s t r e s s e s";
 const NODAL_STRESS: &[u8] = b" n o d a l  s t r e s s";
 const NODAL_STRAIN: &[u8] = b" n o d a l  s t r a i n";
 const TENSOR: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "zx"];
-/// Behind 17 columns that tell integration point, surface and state: six numbers of 12, then
+/// After 17 columns with integration point, surface and state: six numbers of 12, then
 /// further ones of 14, at nodes of 12.
 const LABEL: usize = 17;
 const POINT: usize = 9;
 const WIDTH: usize = 12;
 const WIDE: usize = 14;
-/// Beams: resultants of 11 behind 11 columns; stresses of 15 behind 16.
+/// Beams: resultants of 11 after 11 columns; stresses of 15 after 16.
 static RESULTANTS: [&str; 7] =
     ["axial", "shear_s", "shear_t", "moment_s", "moment_t", "torsion", "pl_eps"];
 const RESULTANT_AT: usize = 11;
@@ -45,7 +45,7 @@ fn signature(line: &[u8]) -> bool {
     [STRESS, STRAIN, BEAM].iter().any(|heading| line.starts_with(heading))
 }
 
-/// Whether a line can only stand in an `eloutdet`.
+/// Whether a line can only be in an `eloutdet`.
 fn signature_of_details(line: &[u8]) -> bool {
     line.starts_with(NODAL_STRESS) || line.starts_with(NODAL_STRAIN)
 }
@@ -65,7 +65,7 @@ enum Quantity {
     NodalStrain,
 }
 
-/// What tells one kind of row from another.
+/// What distinguishes the kinds of rows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Key {
     quantity: Quantity,
@@ -73,7 +73,7 @@ struct Key {
     surface: &'static str,
     /// "point" or "node" and its number, for details.
     location: Option<Location>,
-    /// Names of the numbers behind the tensor; of a beam of all numbers.
+    /// Names of the numbers after the tensor; of a beam of all numbers.
     names: &'static [&'static str],
 }
 
@@ -82,12 +82,12 @@ struct Elout {
     tables: Vec<(Key, TableId)>,
     quantity: Option<Quantity>,
     cycle: Option<Vec<u8>>,
-    /// Names of the numbers behind the tensor, by the column lines.
+    /// Names of the numbers after the tensor, by the column lines.
     further: &'static [&'static str],
     entity: Option<EntityId>,
     /// Inside a beam's stresses at its integration points.
     at_points: bool,
-    /// Behind a heading: a row that the state already has is the first of the next one.
+    /// After a heading: a row that the state already has is the first of the next one.
     begins: bool,
     unread: Option<Place>,
     widths: Widths,
@@ -176,7 +176,7 @@ impl Elout {
         }
     }
 
-    /// One row; the first behind a heading begins a state where the one above has it already. Behind
+    /// One row; the first after a heading begins a state where the one above has it already. After
     /// damage that state's own heading, with its time, may be what was lost.
     fn row(
         &mut self,
@@ -193,7 +193,7 @@ impl Elout {
         states.row(table, entity, line, |k| Some(field(k)));
     }
 
-    /// Whether the line names columns; notes those behind the tensor.
+    /// Whether the line names columns; notes those after the tensor.
     fn column_line(&mut self, line: &Line<'_>) -> bool {
         let text = line.text.trim_ascii_start();
         let has = |word: &[u8]| memchr::memmem::find(text, word).is_some();
@@ -203,7 +203,7 @@ impl Elout {
                 () => &["effsg", "yield"],
             };
         }
-        // The strains of shells stand below the heading of their stresses.
+        // The strains of shells are below the heading of their stresses.
         let is_new = match self.quantity {
             Some(Quantity::Stress) if has(b"eps-xx") => Some(Quantity::Strain),
             Some(Quantity::Strain) if has(b"sig-xx") => Some(Quantity::Stress),
@@ -383,7 +383,7 @@ fn location(text: &[u8]) -> Option<(&[u8], Option<Location>)> {
     })
 }
 
-/// Integration point and surface that the first columns of a row tell.
+/// Integration point and surface in the first columns of a row.
 fn place(label: &[u8]) -> Option<(i64, &'static str)> {
     let text = label.trim_ascii_start();
     // The middle of a shell is what a binout calls its lower surface.

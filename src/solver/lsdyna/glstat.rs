@@ -1,7 +1,7 @@
 //! `glstat`: energies and other quantities of the whole model, one labelled line each.
 //!
-//! A state is label → value, and labels may be absent. A cut removes them from the end, so a last state that ends
-//! early is not whole. What stands between the labels and is not known to stand there is counted.
+//! A state is label → value, and labels may be absent. Truncation removes them from the end, so a last state that ends
+//! early is incomplete. Unexpected text between the labels is counted.
 
 use super::ascii::{self, Body, Skipped};
 use super::dotted::split;
@@ -70,7 +70,7 @@ impl Body for Glstat {
             states.damage(line, Some(columns), message);
             return;
         }
-        // Only a wall's number may stand behind the value.
+        // Only a wall's number may be after the value.
         let rest = line.text.get(columns[1]..).unwrap_or_default().trim_ascii();
         let wall = wall_number(rest);
         if !rest.is_empty() && wall.is_none() {
@@ -103,7 +103,7 @@ impl Body for Glstat {
 }
 
 impl Glstat {
-    /// Whether what stands behind a label is a number with nothing cut from it.
+    /// Whether what is after a label is a number with nothing cut from it.
     fn is_value(
         &mut self,
         label: &str,
@@ -124,7 +124,7 @@ fn is_text(text: &[u8]) -> bool {
     TEXTS.iter().any(|known| text.starts_with(known))
 }
 
-/// Where the value that begins behind `from` ends: with a whole number, else where values
+/// Where the value that begins after `from` ends: with a whole number, else where values
 /// usually end.
 fn value_end(text: &[u8], from: usize) -> usize {
     let behind = text.get(from..).unwrap_or_default();
@@ -137,7 +137,7 @@ fn value_end(text: &[u8], from: usize) -> usize {
     }
 }
 
-/// The number behind `wall#`, which follows the value of a stonewall energy.
+/// The number after `wall#`, which follows the value of a stonewall energy.
 fn wall_number(rest: &[u8]) -> Option<i64> {
     integer(rest.strip_prefix(b"wall#")?)
 }
@@ -146,7 +146,7 @@ fn wall_number(rest: &[u8]) -> Option<i64> {
 /// has no label.
 fn component(text: &[u8]) -> Option<(String, usize)> {
     let (label, end) = split(text, LABEL)?;
-    // Dots stand in other text as well; there, no number follows them.
+    // Dots are in other text as well; there, no number follows them.
     let value = text.get(end..value_end(text, end).min(text.len())).unwrap_or_default();
     let is_value = end == LABEL || is_whole_real(value.trim_ascii());
     let known = NAMES.iter().find(|(l, _)| *l == label);

@@ -1,6 +1,6 @@
 //! Rows of labels and numbers (`xforce=   1.0000E+00   yforce= …`): where the numbers are.
 //!
-//! A number is what stands between its label and the next one, so that a label that comes or
+//! A number is the text between its label and the next one, so that a label that comes or
 //! goes with a release, and a gap of another width, change nothing. Within one file widths stay:
 //! once numbers fill their usual columns, one that does not has lost some of its digits.
 
@@ -8,14 +8,14 @@ use super::line::{Line, is_whole_real};
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::states::StateReader;
 
-/// A component, its label, and the usual width of the number right behind the label.
+/// A component, its label, and the usual width of the number right after the label.
 pub(crate) struct Labelled {
     pub component: &'static str,
     pub label: &'static str,
     pub width: usize,
 }
 
-/// How wide the numbers behind each label of a file are, and where that was first seen.
+/// How wide the numbers after each label of a file are, and where that was first seen.
 #[derive(Default)]
 pub(crate) struct Widths {
     of: Vec<Width>,
@@ -36,7 +36,7 @@ const MAX_LABELS: usize = 1_000;
 
 impl Widths {
     /// Whether a number that is so much wider than usual can be that of the label. A first one that those below do not
-    /// confirm is said.
+    /// confirm is reported.
     pub(crate) fn allow(
         &mut self,
         label: &str,
@@ -71,7 +71,7 @@ impl Widths {
 }
 
 /// First and last column of every component's number; `None` for labels that the line does
-/// not have. `None` for the row if something else than one number stands behind a label.
+/// not have. `None` for the row if something else than one number is after a label.
 pub(crate) fn fields(
     line: &Line<'_>,
     labels: &[Labelled],
@@ -119,14 +119,14 @@ pub(crate) fn fields(
             return None;
         }
     }
-    // Stars outside a number: lines were overwritten, and what stands behind is of another.
+    // Stars outside a number: lines were overwritten, and what is after is of another.
     let in_number =
         |at: usize| fields.iter().flatten().any(|&(from, to)| (from..=to).contains(&(at + 1)));
     let stars = memchr::memchr_iter(b'*', text).any(|at| !in_number(at));
     (!stars).then_some(fields)
 }
 
-/// Whether the text behind a label is one number: a whole one, or, whatever it holds, one
+/// Whether the text after a label is one number: a whole one, or, whatever it holds, one
 /// that fills the usual width.
 pub(crate) fn is_number(text: &[u8], width: usize) -> bool {
     text.len() == width || is_whole_real(text.trim_ascii())

@@ -1,4 +1,4 @@
-//! Lines, columns and Fortran numbers: what all LS-DYNA ASCII files are made of.
+//! Lines, columns and Fortran numbers, common to all LS-DYNA ASCII files.
 
 use std::io::{self, BufRead};
 
@@ -65,7 +65,7 @@ impl<R: BufRead> Lines<R> {
         Self { input, buffer: Vec::with_capacity(256), number: 0, byte: 0 }
     }
 
-    /// Number of the last line read, counted from 1, and the byte behind it.
+    /// Number of the last line read, counted from 1, and the byte after it.
     pub(crate) fn place(&self) -> Place {
         Place { line: self.number, byte: self.byte }
     }

@@ -1,7 +1,7 @@
 //! LSDA: the container of binout. Header, records and paths; no meaning of content.
 //!
-//! Records are walked in order and symbol tables skipped: a run that died has no last table,
-//! so nothing may depend on one. Where a record makes no sense, the walk goes on at the next
+//! Records are walked in order and symbol tables skipped: a run that terminated early has no last table,
+//! so nothing may depend on one. After an invalid record, the walk continues at the next
 //! record that changes to an absolute path.
 
 use std::io;
@@ -103,7 +103,7 @@ pub(crate) enum Event<'a> {
         name: &'a str,
         payload: Payload,
     },
-    /// A record that makes no sense, at this byte; the walk goes on after it, or not.
+    /// A record that makes no sense, at this byte; the walk continues after it, or not.
     Damage {
         at: u64,
         resumed: Option<u64>,
@@ -178,7 +178,7 @@ pub(crate) fn walk(
 }
 
 /// Whether the end of the file cuts a symbol table at `at`: up to there it holds nothing but
-/// what a table does. Its records change directories too, but hold no data to go on with.
+/// what a table does. Its records change directories too, but hold no data to continue with.
 fn is_cut_table(source: &dyn Source, header: Header, at: u64) -> io::Result<bool> {
     let mut window = Window::new(source);
     let frame = usize::from(header.width) + 1;
@@ -213,7 +213,7 @@ fn record<'a>(
     let Some(head) = window.get(at, frame, ahead)? else { return Ok(Err(None)) };
     let (length, command) = (header.unsigned(&head[..width]), head[width]);
     if !COMMANDS.contains(&command) || length < frame as u64 {
-        return Ok(Err(Some(format!("command {command} and {length} bytes make no record"))));
+        return Ok(Err(Some(format!("command {command} and {length} bytes are not a record"))));
     }
     if length > size - at {
         return Ok(Err(None));
@@ -248,7 +248,7 @@ fn record<'a>(
             let bytes = payload - before;
             if !bytes.is_multiple_of(item as u64) {
                 return Ok(Err(Some(format!(
-                    "{name} has {bytes} bytes, no whole number of values"
+                    "{name} has {bytes} bytes, not a whole number of values"
                 ))));
             }
             let payload = Payload { kind, at: from + before, bytes };
@@ -264,7 +264,7 @@ fn text(bytes: &[u8]) -> Option<&str> {
     std::str::from_utf8(bytes).ok().filter(|_| is_printable)
 }
 
-/// The next record behind a damaged one that changes to an absolute path and is followed
+/// The next record after a damaged one that changes to an absolute path and is followed
 /// by a possible record.
 fn resume(source: &dyn Source, header: Header, from: u64, size: u64) -> io::Result<Option<u64>> {
     const CHUNK: usize = 1 << 16;
@@ -278,7 +278,7 @@ fn resume(source: &dyn Source, header: Header, from: u64, size: u64) -> io::Resu
         let Some(bytes) = window.get(at, length, 0)? else { return Ok(None) };
         for found in memchr::memmem::find_iter(bytes, [CD, b'/'].as_slice()) {
             let Some(start) = (at + found as u64).checked_sub(width as u64) else { continue };
-            // Most candidates are told by the length before them, without a read.
+            // Most candidates are recognised by the length before them, without a read.
             let length = found.checked_sub(width).map(|k| header.unsigned(&bytes[k..k + width]));
             if start < from || length.is_some_and(|n| n > (width + 1 + MAX_PATH) as u64) {
                 continue;

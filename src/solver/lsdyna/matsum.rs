@@ -13,9 +13,9 @@ const STATE: &[u8] = b" time =";
 const PART: &[u8] = b" mat.#=";
 /// Digits, point and exponent of a time.
 const TIME: usize = 10;
-/// Begins what may stand below the parts.
+/// Begins what may be below the parts.
 const BELOW: &[u8] = b"Maximum mass increase";
-/// Width of every number, right behind its label.
+/// Width of every number, right after its label.
 const WIDTH: usize = 13;
 
 /// The lines of a part; the last one is there only if hourglass energy is computed.

@@ -31,7 +31,7 @@ pub(super) mod swforc;
 use super::states::StateReader;
 use label_values::Widths;
 
-/// What stands in `( at time … )` of a state's heading.
+/// What is in `( at time … )` of a state's heading.
 fn at_time(line: &[u8]) -> Option<&[u8]> {
     const AT: &[u8] = b"( at time";
     let from = memchr::memmem::find(line, AT)? + AT.len();

@@ -44,20 +44,20 @@ const MAX_BLOCKS: usize = 200;
 pub(crate) struct Layout {
     /// Digits of the time.
     pub time_digits: i32,
-    /// Begins a state; the time stands behind `t=`.
+    /// Begins a state; the time is after `t=`.
     pub state: &'static [u8],
     /// Name of the block that a heading begins, such as a group; `None` for other lines.
     pub block: fn(&[u8]) -> Option<String>,
 }
 
 /// Reader of either file. Components of all blocks but the first of the file have the
-/// block's name in front, because the same node may stand in several.
+/// block's name in front, because the same node may be in several.
 pub(crate) struct NodeForces {
     layout: &'static Layout,
     blocks: Vec<Block>,
     current: Option<usize>,
     body: Option<i64>,
-    /// Behind a heading: a row that the state already has is the first of the next one.
+    /// After a heading: a row that the state already has is the first of the next one.
     begins: bool,
     widths: Widths,
 }

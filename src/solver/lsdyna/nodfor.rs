@@ -1,6 +1,6 @@
 //! `nodfor`: forces of groups of nodes.
 //!
-//! Never seen with data; read as the source of LSTC's converter `l2a` writes it. A group is
+//! Never tested with real data; read as the source of LSTC's converter `l2a` writes it. A group is
 //! numbered by its order, not by the id of its node set.
 
 use super::ascii;

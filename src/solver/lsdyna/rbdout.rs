@@ -1,6 +1,6 @@
 //! `rbdout`: motion of rigid bodies in global and in local directions.
 //!
-//! Never seen with data; read as the source of LSTC's converter `l2a` writes it.
+//! Never tested with real data; read as the source of LSTC's converter `l2a` writes it.
 
 use super::ascii::{self, Body};
 use super::label_values::{Widths, numbers};
@@ -14,7 +14,7 @@ const BODIES: [&[u8]; 2] = [b" nodal rigid body", b" rigid body"];
 const LOCAL: &[u8] = b" output in principal or user defined local";
 /// Lines that hold no values.
 const HEADINGS: [&[u8]; 5] = [b"1", b"global", b"principal or user defined", b"a ", b"output in"];
-/// Behind the label, fields of 12; in rows of direction cosines of 15.
+/// After the label, fields of 12; in rows of direction cosines of 15.
 const WIDTH: usize = 12;
 const ROW_WIDTH: usize = 15;
 /// Digits, point and exponent of a time.

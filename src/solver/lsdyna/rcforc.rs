@@ -14,8 +14,8 @@ const TIME: &[u8] = b" time";
 /// Width of the time and of every real number.
 const WIDTH: usize = 12;
 
-/// A component, its label, and where its number begins behind the start of ` time`.
-/// The number of a label starts right behind it.
+/// A component, its label, and where its number begins after the start of ` time`.
+/// The number of a label starts right after it.
 struct Column {
     component: &'static str,
     label: &'static [u8],
@@ -178,7 +178,7 @@ fn end_of_columns(text: &[u8], at: usize) -> usize {
 }
 
 /// A row whose numbers have other widths, or that has further labels: each label with the
-/// number behind it.
+/// number after it.
 fn by_labels(text: &[u8], at: usize) -> Option<Row> {
     let mut end = at + TIME.len();
     let mut word = || {
@@ -219,7 +219,7 @@ impl Column {
         self.component.ends_with("moment")
     }
 
-    /// Whether the label stands in its place and the number behind it is all there.
+    /// Whether the label is in its place and the number after it is all there.
     fn fits(&self, text: &[u8], at: usize) -> bool {
         let number = at + self.offset;
         text.get(number - self.label.len()..number) == Some(self.label)
@@ -235,7 +235,7 @@ fn side(text: &[u8]) -> Option<(Side, usize)> {
     Some((Side::parse(name)?, start + length))
 }
 
-/// Where ` time` begins: column 20, or further right behind a wide id.
+/// Where ` time` begins: column 20, or further right after a wide id.
 fn time_at(text: &[u8]) -> Option<usize> {
     const FIXED: usize = 19;
     if text.get(FIXED..FIXED + TIME.len()) == Some(TIME) {

@@ -1,6 +1,6 @@
 //! `secforc`: forces, moments and centroids of cross sections, three lines per section.
 //!
-//! Seen with data only as LSTC's converter `l2a` writes it; of the solver's own files only
+//! Tested with data only as LSTC's converter `l2a` writes it; of the solver's own files only
 //! ones that end after the header.
 
 use super::ascii::{self, Body};

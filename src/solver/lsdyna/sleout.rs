@@ -14,7 +14,7 @@ const ID: (usize, usize) = (1, 10);
 /// Energies of both sides and of friction. Old files have no third column, and for
 /// single-surface contacts no second one.
 const FIELDS: [(usize, usize); 3] = [(11, 23), (24, 36), (65, 77)];
-/// Sums: the value stands behind the label.
+/// Sums: the value is after the label.
 const SUMS: [(&[u8], &str); 6] = [
     (b"total slave side=", "total_slave"),
     (b"total surfa side=", "total_slave"),
@@ -78,7 +78,7 @@ impl Sleout {
             return Some(());
         }
         let id = integer(line.columns(ID.0, ID.1))?;
-        // Further columns, such as one of transducers, stand apart behind the third.
+        // Further columns, such as one of transducers, stand apart after the third.
         let last = FIELDS[2].1;
         let is_wider = text.get(last).is_some_and(u8::is_ascii_whitespace);
         let width = if is_wider { last } else { text.len() };

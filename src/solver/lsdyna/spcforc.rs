@@ -17,7 +17,7 @@ const NODE: &[u8] = b" node=";
 const FORCES: &[u8] = b"local x,y,z forces =";
 const MOMENTS: &[u8] = b"local x,y,z moments=";
 const RESULTANT: &[u8] = b"force resultants   =";
-/// Three `E14.4` behind each label, then `setid=` and digits (absent in old files).
+/// Three `E14.4` after each label, then `setid=` and digits (absent in old files).
 const WIDTH: usize = 14;
 const SET_ID: &[u8] = b"setid=";
 /// Sets of constraints that a node may be in.

@@ -109,7 +109,7 @@ impl Swforc {
         if states.pending_time() != Some(time) || states.has_row(table, entity) {
             states.begin(Some(time), line.into());
         }
-        // Words and blanks stand there as well.
+        // Words and blanks are there as well.
         let failure = line.columns(FAILURE.0, FAILURE.1).trim_ascii();
         let failure = failure.first().is_some_and(u8::is_ascii_digit);
         states.row(table, entity, line, |k| match k {

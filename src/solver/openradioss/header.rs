@@ -1,4 +1,4 @@
-//! Records of a T01, and its header: what there are histories of.
+//! Records of a T01, and its header, which lists the histories.
 
 use std::io::{self, BufRead, Read};
 
@@ -56,7 +56,7 @@ impl<'a> Records<'a> {
     }
 }
 
-/// Bytes of the length before and behind each record.
+/// Bytes of the length before and after each record.
 pub(crate) const FRAME: u64 = 4;
 
 /// A group of histories: objects with the same variables.

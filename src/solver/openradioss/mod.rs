@@ -1,14 +1,14 @@
 //! OpenRadioss time history `T01`: binary records framed as Fortran writes them.
 //!
-//! Its groups are given as the sections of LS-DYNA that hold the same: nodes as `nodout`,
+//! Its groups are returned as the equivalent sections of LS-DYNA: nodes as `nodout`,
 //! rigid walls as `rwforc`, contact interfaces as `rcforc`, cross sections as `secforc` (never
 //! seen in a file), rigid bodies as `rbdout`, springs as `deforc`, parts as `matsum`, global variables as
-//! `glstat`; other groups have sections of their own (`variables`). T01 stores the *impulse* of walls, contacts,
+//! `glstat`; other groups have their own sections (`variables`). T01 stores the *impulse* of walls, contacts,
 //! sections and rigid bodies; the forces here are its central difference over time (one-sided at both
 //! ends), means over two output intervals.
 //!
-//! All states of a T01 have one length, so a damaged state is passed over and the next one is found. The file has no
-//! check sums. A restart goes on in `T02`, with the impulses of `T01`: both are one record.
+//! All states of a T01 have one length, so a damaged state is skipped and the next one is found. The file has no
+//! checksums. A restart continues in `T02`, with the impulses of `T01`: both are one record.
 
 mod header;
 mod states;
@@ -113,4 +113,4 @@ fn empty(section: &str) -> SolverFile {
     }
 }
 
-const DIFFERENTIATED: &str = "forces are the central difference of T01's impulses, a mean over two output intervals; at both ends over one, so that the last force changes where the record goes on";
+const DIFFERENTIATED: &str = "forces are the central difference of T01's impulses, a mean over two output intervals; at both ends over one, so the last force changes when the record continues";

@@ -156,7 +156,7 @@ impl StateReader {
     /// Says that the record ends before its `number`-th file, and why.
     pub(crate) fn end_before(&mut self, number: usize, what: &str) {
         let message =
-            format!("T{number:02}, which goes on, {what}: it is not read, nor what follows");
+            format!("T{number:02}, the continuation, {what}: it and what follows are not read");
         self.problems.add(ProblemCode::UnreadRows, None, None, message);
     }
 
@@ -165,8 +165,8 @@ impl StateReader {
         self.lengths.iter().map(|&n| n as u64 + 2 * FRAME).sum()
     }
 
-    /// Reads states until the end. One that is damaged is left out and said; as all have the
-    /// same length, the next one is found behind it.
+    /// Reads states until the end. One that is damaged is left out and reported; as all have the
+    /// same length, the next one is found after it.
     pub(crate) fn read(&mut self, header: &Header, records: &mut Records<'_>) -> io::Result<()> {
         let mut start = records.position();
         let mut number = 0;
@@ -220,7 +220,7 @@ impl StateReader {
     }
 
     /// Names the last state above if more values next to each other are zero, though not in the
-    /// states around it, than a node that stands on a wall has: T01 has no check sums.
+    /// states around it, than a node that stands on a wall has: T01 has no checksums.
     fn look_for_zeros(
         &mut self,
         header: &Header,
@@ -245,7 +245,7 @@ impl StateReader {
                     continue;
                 };
                 let message = format!(
-                    "{} values of the state at time {:?}, {} to {}, are zero but not so in the states around it: was the file overwritten there?",
+                    "{} values of the state at time {:?}, {} to {}, are zero, but not in the states around it: was the file overwritten there?",
                     i - first,
                     self.time.last().copied().unwrap_or(f64::NAN),
                     self.name(header, k, first),
@@ -293,7 +293,7 @@ impl StateReader {
         }
     }
 
-    /// Leaves out what a restart wrote again; forces cannot be told across it.
+    /// Leaves out what a restart wrote again; forces are unknown across it.
     fn resolve_restarts(&mut self) {
         let place = |i: usize| self.starts.get(i).copied().map(Place::at_byte);
         let (mut kept, found) = restart::resolve(&self.time, |_, _| Some(true), place, "");
@@ -322,7 +322,7 @@ impl StateReader {
         let has_impulses =
             self.objects.iter().flat_map(|o| &*o.components).any(|c| c.made.is_rate());
         if self.time.len() == 1 && has_impulses {
-            let message = "one state has no rate of impulses: there are no forces";
+            let message = "one state gives no rate of impulses: there are no forces";
             self.problems.add(ProblemCode::AbsentComponent, None, None, message.into());
         }
         let time: Arc<[f64]> = std::mem::take(&mut self.time).into();
@@ -395,7 +395,7 @@ impl StateReader {
             let ids: Vec<String> = ids.iter().take(5).map(|(_, id)| id.to_string()).collect();
             let more = if ids.len() == 5 { " and others" } else { "" };
             files[file].notes.push(format!(
-                "no tangential impulses are recorded of {}{more}: the forces there are the normal ones alone",
+                "no tangential impulses are recorded for {}{more}: their forces are the normal ones alone",
                 ids.join(", ")
             ));
         }
@@ -419,7 +419,7 @@ impl StateReader {
 /// What the end of a cut file means for forces.
 fn goes_on(last: &f64) -> Problem {
     let message = format!(
-        "the record goes on behind time {last:?}: the forces there are differences over one interval, and will change"
+        "the record continues after time {last:?}: the forces there are differences over one interval, and will change"
     );
     Problem::new(ProblemCode::CutRecord, message)
 }

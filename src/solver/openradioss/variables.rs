@@ -1,4 +1,4 @@
-//! What the groups of a T01 hold: a section for each type, its variables by code, what is made of them.
+//! The groups of a T01: a section for each type, its variables by code, and derived quantities.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Ends states: a whole one is kept, one that lacks something is left out and said.
+//! Ends states: a complete one is kept, an incomplete one is left out and reported.
 
 use super::{ABSENT_CELLS, ABSENT_PER_PRESENT, Pending, StateReader};
 use crate::solver::problem::ProblemCode;
@@ -47,7 +47,7 @@ impl StateReader<'_> {
             let width = table.wanted_columns.len();
             for row in table.filled_rows.drain(..) {
                 table.filled[row] = false;
-                // What a state that was left out had must not stand in the next one.
+                // What a state that was left out had must not be in the next one.
                 if let Some(first) = table.channel_of[row] {
                     for channel in &mut table.channels[first..first + width] {
                         (channel.pending, channel.pending_seen) = (f64::NAN, false);

@@ -1,4 +1,4 @@
-//! Ends a file: the histories of its whole states.
+//! Ends a file: the histories of its complete states.
 
 use std::sync::Arc;
 

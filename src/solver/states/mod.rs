@@ -1,7 +1,7 @@
-//! Collects rows into states and keeps only whole states of selected histories.
+//! Collects rows into states and keeps only complete states of selected histories.
 //!
 //! A file is a sequence of states; a state is one row per entity in one or more tables
-//! (`nodout` has two: translations and rotations). The first whole state fixes the
+//! (`nodout` has two: translations and rotations). The first complete state fixes the
 //! entities of each table, unless its rows may come and go (eroded elements). Invariant:
 //! every kept history has one value per kept state.
 
@@ -44,7 +44,7 @@ struct Pending {
     cycle: Option<i64>,
     place: Place,
     damaged: bool,
-    /// Whether it has a row that the first whole state does not have.
+    /// Whether it has a row that the first complete state does not have.
     disagrees: bool,
     /// Labels seen in this state, in order of the file.
     labels: usize,
@@ -57,11 +57,11 @@ pub(crate) struct StateReader<'a> {
     scalars: Vec<Scalar>,
     time: Vec<f64>,
     pending: Option<Pending>,
-    /// Whether a whole state has fixed the entities.
+    /// Whether a complete state has fixed the entities.
     sealed: bool,
     /// Whole states to leave out before the first that is kept.
     skip: usize,
-    /// States left out because their rows are not those of the first whole state.
+    /// States left out because their rows are not those of the first complete state.
     disagreeing: usize,
     /// Whether a state without rows is whole.
     allow_empty_states: bool,
@@ -101,7 +101,7 @@ impl<'a> StateReader<'a> {
         }
     }
 
-    /// Leaves out the first `count` whole states.
+    /// Leaves out the first `count` complete states.
     pub(crate) fn skip(&mut self, count: usize) {
         self.skip = count;
     }
@@ -116,7 +116,7 @@ impl<'a> StateReader<'a> {
         self.allow_empty_states = true;
     }
 
-    /// Whether more states disagree with the first whole state than agree with it.
+    /// Whether more states disagree with the first complete state than agree with it.
     pub(crate) fn is_disputed(&self) -> bool {
         self.disagreeing > self.time.len()
     }
@@ -190,7 +190,7 @@ impl<'a> StateReader<'a> {
     }
 
     /// Notes a line that cannot be read; the state it belongs to is not whole.
-    /// Behind the last row of a whole state, that is the next state.
+    /// After the last row of a complete state, that is the next state.
     pub(crate) fn damage(&mut self, line: &Line<'_>, columns: Option<[usize; 2]>, message: String) {
         self.problems.add(ProblemCode::BadLine, Some(line.into()), columns, message);
         if let Some(pending) = &self.pending
@@ -338,7 +338,7 @@ impl<'a> StateReader<'a> {
         &self.tables[table.0].wanted_columns
     }
 
-    /// Adds whole states that were read at once. Per state: its cycle and time, the place of
+    /// Adds complete states that were read at once. Per state: its cycle and time, the place of
     /// its beginning, and of all tables, wanted rows and wanted columns, in this order, the values.
     pub(crate) fn extend(&mut self, states: &[((i64, f64), Place)], values: &[Vec<f64>]) {
         for &((cycle, time), place) in states {

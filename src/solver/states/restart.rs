@@ -6,7 +6,7 @@ use crate::solver::restart;
 impl StateReader<'_> {
     pub(super) fn resolve_restarts(&mut self) {
         let cycles = &self.cycles;
-        // Times have few digits: a cycle that does not rise tells the same state, or a time that is
+        // Times have few digits: a cycle that does not increase means the same state, or a time that is
         // known far better than states lie apart.
         let is_same = |above: usize, below: usize| match (cycles[above], cycles[below]) {
             (Some(above), Some(below)) => Some(below <= above),

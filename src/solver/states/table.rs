@@ -1,4 +1,4 @@
-//! Rows of the same components, and the histories that become of them.
+//! Rows of the same components, and the histories built from them.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -34,7 +34,7 @@ pub(crate) struct Table {
     pub next_row: usize,
 }
 
-/// One kept history: values of whole states, and the pending state's value.
+/// One kept history: values of complete states, and the pending state's value.
 pub(crate) struct Channel {
     pub values: Vec<f64>,
     pub pending: f64,

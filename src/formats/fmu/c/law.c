@@ -11,7 +11,7 @@ typedef struct {
     double work;
 } top_t;
 
-/* The unloading branch from the largest deflection. */
+/* The unloading branch from the maximum deflection. */
 typedef struct {
     double largest;
     double top;
@@ -71,7 +71,7 @@ static double by_stiffness(const crumple_table_t *t, const top_t *top) {
     return smaller(0.5 * mean * mean / t->stiffness, top->work);
 }
 
-/* Energy that comes back from a largest deflection. */
+/* Energy that comes back from a maximum deflection. */
 static double stored_from(const crumple_table_t *t, const top_t *top) {
     double dissipated = larger(t->dissipated[top->piece], top->work - by_stiffness(t, top));
     double stored = larger(top->work - dissipated, storable(t, top, t->steepest));

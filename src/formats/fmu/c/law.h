@@ -14,7 +14,7 @@ typedef struct {
 
 #define LAW_FAR 1e300
 
-/* Derivatives by the deflection, where the largest deflection follows it if it is at least that. */
+/* Derivatives by the deflection, where the maximum deflection follows it if it is at least that. */
 typedef struct {
     double force;
     double stored;

@@ -31,7 +31,7 @@ int spring_set_time(spring_t *spring, const char *function, double time) {
     return SAID_OK;
 }
 
-/* The largest deflection with the present point, which may be a trial. */
+/* The maximum deflection with the present point, which may be a trial. */
 static double largest_with(const state_t *now) {
     return now->input[0] > now->memory[0] ? now->input[0] : now->memory[0];
 }

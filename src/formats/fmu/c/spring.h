@@ -54,7 +54,7 @@ typedef struct {
     double stop_time;   /* beyond all times where none was given */
     double input[2];    /* deflection */
     double rates[2][2]; /* first and second derivative of each input, for the next step */
-    double memory[2];   /* largest deflection at an accepted point, 0 at least */
+    double memory[2];   /* maximum deflection at an accepted point, 0 at least */
     law_piece_t piece;  /* of the last event of model exchange: its ends are the next events */
     double force_scale;
 } state_t;

@@ -14,7 +14,7 @@
 
 /* The envelope is followed back unless this is set. */
 #define CRUMPLE_HAS_MEMORY 1u
-/* Energy is stored by the mean force up to the largest deflection, not by the force there. */
+/* Energy is stored by the mean force up to the maximum deflection, not by the force there. */
 #define CRUMPLE_BY_MEAN_FORCE 2u
 
 /* Without padding: the exporter counts on the places. SI. */

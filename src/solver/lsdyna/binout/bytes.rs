@@ -8,7 +8,7 @@ use super::records::DataRecord;
 use crate::solver::source::{Source, fill_at};
 
 /// Largest text of titles that is read, and ids of one list; real ones are far shorter. A
-/// longer list fits no values, which are then said to be left out.
+/// longer list fits no values, which are then reported as left out.
 const MAX_METADATA: u64 = 256 << 20;
 const MAX_IDS: u64 = 4_000_000;
 

@@ -1,4 +1,4 @@
-//! From records, a row of entities each, to histories, a column of states each.
+//! From records (rows of entities) to histories (columns of states).
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -9,7 +9,7 @@ use crate::history::EntityId;
 pub(crate) struct Pick {
     /// `None` for an entity that the state lacks.
     pub positions: Vec<Option<usize>>,
-    /// From the first to behind the last of them.
+    /// From the first to after the last of them.
     pub span: Range<usize>,
     /// Whether they are neighbours in their order.
     pub is_run: bool,

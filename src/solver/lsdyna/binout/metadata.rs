@@ -1,4 +1,4 @@
-//! What a section says of itself: title, version, ids, sides, titles of entities.
+//! Metadata of a section: title, version, ids, sides, titles of entities.
 
 use std::collections::HashMap;
 use std::io;
@@ -7,7 +7,7 @@ use super::bytes::Bytes;
 use super::records::{LISTS, Section};
 use crate::history::{EntityId, Side};
 
-/// What a section says of itself.
+/// Metadata of a section.
 pub(crate) struct Metadata {
     pub title: Option<String>,
     pub version: Option<String>,

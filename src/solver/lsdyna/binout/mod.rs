@@ -1,22 +1,22 @@
 //! `binout`: LS-DYNA's binary histories, an LSDA container.
 //!
-//! First all records are noted with their places ([`records`]), then the values that are wanted
-//! are read: of each section what it says of itself ([`metadata`]), its whole states
-//! ([`states`]), whom the values of its components belong to ([`owners`]) and those values
+//! First all records are noted with their places ([`records`]), then the selected values
+//! are read: for each section its metadata ([`metadata`]), its complete states
+//! ([`states`]), the owners of its component values ([`owners`]) and the values
 //! ([`values`]).
 //!
 //! A file that continues as `name%001`, `name%002`, … and the files `binout0000`,
 //! `binout0001`, … of the processes of one run are one tree over several containers.
 //!
-//! Any directory with states is a section, whatever its name; what else the container holds is named.
+//! Any directory with states is a section, whatever its name; other content of the container is listed.
 //!
-//! Of a record that is there twice the later one counts: a restart wrote it again. Entities
+//! If a record occurs twice, the later one counts: a restart wrote it again. Entities
 //! may differ between states (eroded elements): a state that lacks one has NaN there.
 //!
-//! A binout is walked record by record without its symbol tables, because a run that died has not written them. The
-//! walk only notes where records are, from 64 bytes each; then the wanted values are read. The ids of a section hold
-//! for the states written behind them, until others are written. The file has no check sums: flipped bits within a
-//! value cannot be seen.
+//! A binout is walked record by record without its symbol tables, because a run that terminated early has not written them. The
+//! walk only notes where records are, from 64 bytes each; then the selected values are read. The ids of a section apply
+//! to the states written after them, until others are written. The file has no checksums: flipped bits within a
+//! value cannot be detected.
 
 mod bytes;
 mod columns;
@@ -76,7 +76,7 @@ fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<Solv
 /// A directory whose data are not histories.
 fn unread(name: &str, records: usize) -> SolverFile {
     let message = format!(
-        "{name}: {} not read: they do not stand in states (d000001, d000002, …) with times",
+        "{name}: {} not read: they are not in states (d000001, d000002, …) with times",
         counted(records, "record")
     );
     SolverFile {

@@ -1,4 +1,4 @@
-//! Whom the values of a component belong to.
+//! The entities to which the values of a component belong.
 
 use std::collections::{HashMap, HashSet};
 use std::io;
@@ -11,7 +11,7 @@ use super::states::StateReader;
 use crate::history::EntityId;
 use crate::solver::problem::{Problem, ProblemCode};
 
-/// Values of one entity for several integration points that are told apart.
+/// Values of one entity for several integration points that are distinguished.
 const MAX_POINTS: usize = 128;
 /// Rows that one entity has in a state; a node is in so many sets of constraints at most.
 pub(super) const MAX_ROWS: usize = 20;
@@ -19,7 +19,7 @@ pub(super) const MAX_ROWS: usize = 20;
 const HAVE_ONE_ROW: [&str; 6] =
     ["nodout", "matsum", "rwforc/forces", "secforc", "rbdout", "abstat"];
 
-/// Whom the values of a component belong to.
+/// Owners of the values of a component.
 #[derive(Clone)]
 pub(super) enum Entities {
     Global,
@@ -29,7 +29,7 @@ pub(super) enum Entities {
     OfState(Arc<[EntityId]>),
 }
 
-/// What is found of a component's owners.
+/// Result of the search for a component's owners.
 pub(super) enum Found {
     /// Owners, and values of each of them: one, or one for each integration point.
     Entities(Entities, usize),
@@ -74,7 +74,7 @@ impl Entities {
             return Ok(Found::Entities(Self::Global, 1));
         }
         let message = format!(
-            "{}: {} has {width} values a state and no ids of that number; it is not read",
+            "{}: {} has {width} values per state but a different number of ids; it is not read",
             section.name, component.name
         );
         Ok(Found::Unfit(Problem::new(ProblemCode::UnreadRows, message)))
@@ -141,7 +141,7 @@ impl EntityList {
             let again = rows().filter(|(row, _)| **row == limit + 1).count();
             let first = rows().find(|(row, _)| **row == limit + 1).map(|(_, id)| id.to_string());
             let message = format!(
-                "{}: {again} ids, the first {}, are there more than {} in one state; rows beyond the first {MAX_ROWS} are left out",
+                "{}: {again} ids, the first {}, occur more than {} in one state; rows beyond the first {MAX_ROWS} are left out",
                 section.name,
                 first.unwrap_or_default(),
                 if limit == 1 { "once".to_string() } else { format!("{limit} times") },
@@ -152,7 +152,7 @@ impl EntityList {
     }
 }
 
-/// Sums over all entities of a section (bndout, spcforc), whose number of values tells
+/// Sums over all entities of a section (bndout, spcforc), whose number of values shows
 /// nothing where there is one entity.
 fn is_total(name: &str) -> bool {
     name == "etotal" || name.ends_with("_total") || name.ends_with("_resultant")

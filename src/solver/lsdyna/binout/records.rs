@@ -8,7 +8,7 @@ use super::super::lsda::{self, Event, Header, Payload, change_directory};
 use crate::solver::problem::{Diagnostics, ProblemCode};
 use crate::solver::source::Source;
 
-/// Metadata that tells whose values there are.
+/// Metadata that names the owners of values.
 pub(super) const LISTS: [&str; 4] = ["ids", "side", "force_ids", "moment_ids"];
 /// Components kept of one section; real ones have at most about forty.
 const MAX_COMPONENTS: usize = 2_000;
@@ -45,7 +45,7 @@ pub(super) struct Tree {
 pub(super) struct Section {
     pub name: String,
     pub metadata: HashMap<String, DataRecord>,
-    /// Lists of ids and sides, each for the states written behind it.
+    /// Lists of ids and sides, each for the states written after it.
     pub lists: Vec<(&'static str, DataRecord)>,
     /// Directory numbers of the states, in order of appearance.
     pub states: Vec<u64>,
@@ -101,7 +101,7 @@ impl Tree {
             }
             Event::Damage { at, resumed, message } => {
                 let rest = match resumed {
-                    Some(byte) => format!("reading goes on at byte {byte}"),
+                    Some(byte) => format!("reading continues at byte {byte}"),
                     None => "what follows is left out".into(),
                 };
                 let message = format!("damaged record: {message}; {rest}");
@@ -211,7 +211,7 @@ impl Section {
             }
         };
         let again = self.components[index].records.insert(state, place).is_some();
-        // Within one state a record may be there twice; behind later states it is a restart.
+        // Within one state a record may be there twice; after later states it is a restart.
         if again && state + 1 < self.states.len() {
             self.repeated += 1;
             self.first_repeated.get_or_insert(self.states[state]);

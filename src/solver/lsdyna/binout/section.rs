@@ -1,4 +1,4 @@
-//! One section: what it says of itself, and its selected histories.
+//! One section: its metadata and its selected histories.
 
 use std::collections::{HashMap, HashSet};
 use std::io;
@@ -156,7 +156,7 @@ impl<'a> SectionReader<'a> {
     ) -> io::Result<Vec<History>> {
         let (states, selection, bytes) = (&self.states, self.selection, self.bytes);
         let name = &self.section.name;
-        // Zeros of quantities that may vanish are told by the entity's other components.
+        // Zeros of quantities that may vanish are recognised by the entity's other components.
         let together = zeros::may_vanish(name);
         let read: Vec<(Vec<History>, Vec<Problem>)> = wanted
             .into_par_iter()

@@ -1,4 +1,4 @@
-//! The whole states of a section, in order of their numbers, and the ids of each.
+//! The complete states of a section, in order of their numbers, and the ids of each.
 
 use std::collections::{HashMap, HashSet};
 use std::io;
@@ -9,7 +9,7 @@ use super::records::{Component, DataRecord, LISTS, Section};
 use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::solver::restart;
 
-/// The whole states of a section.
+/// The complete states of a section.
 pub(super) struct StateReader {
     /// Indices of the states, in order of their numbers.
     pub whole: Vec<usize>,
@@ -22,7 +22,7 @@ pub(super) struct StateReader {
 pub(super) type Ids = Arc<[i64]>;
 
 impl StateReader {
-    /// A state is whole if it has a time and no damage; the last one must also have what the
+    /// A state is complete if it has a time and no damage; the last one must also have what the
     /// one before has. Of states that a restart wrote again the last ones are kept.
     pub(crate) fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<(Self, Diagnostics)> {
         let mut problems = Diagnostics::default();
@@ -67,7 +67,7 @@ impl StateReader {
 fn order_of(section: &Section) -> Option<Problem> {
     if section.repeated > 0 {
         let message = format!(
-            "{}: {} records are there again, the first of state d{} (a restart, or another file of the run with this section); the last ones are kept",
+            "{}: {} records occur again, the first of state d{} (a restart, or another file of the run with this section); the last ones are kept",
             section.name,
             section.repeated,
             section.first_repeated.unwrap_or_default()
@@ -143,7 +143,7 @@ impl Timed {
     }
 
     /// Leaves out states that were written before a list of ids changed: their rows cannot be
-    /// told by one id.
+    /// recognised by one id.
     fn leave_out_before(&mut self, change: (usize, u64), section: &Section) -> Option<Problem> {
         let times = section.component("time");
         let is_behind = |state: usize| {
@@ -195,7 +195,7 @@ fn ids_of_states(component: &Component, whole: &[usize], bytes: Bytes<'_>) -> io
 }
 
 /// The ids in force when each state was written, if they changed; sections whose rows
-/// are told by more than an id are not asked.
+/// need more than an id are not checked.
 fn ids_by_order(
     section: &Section,
     whole: &[usize],
@@ -230,7 +230,7 @@ fn repeated_ids(section: &Section, ids: &[Ids]) -> Option<Problem> {
     });
     let twice = changed.map(twice).max().unwrap_or(0);
     let message = format!(
-        "{}: {twice} ids are there twice in one state; the last value of each is returned",
+        "{}: {twice} ids occur twice in one state; the last value of each is returned",
         section.name
     );
     (twice > 0).then(|| Problem::new(ProblemCode::RepeatedLabel, message))

@@ -1,4 +1,4 @@
-//! The values of one component over the whole states, a history for each entity.
+//! The values of one component over the complete states, a history for each entity.
 
 use std::io;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ pub(super) struct Series<'a> {
 /// Index of an entity among the owners, and the entity itself.
 type Kept = (usize, Option<EntityId>);
 
-/// What a series lacks.
+/// Gaps of a series.
 #[derive(Default)]
 struct Lacks {
     /// States without it, or with another number of values.

@@ -70,7 +70,7 @@ impl<'a> Card<'a> {
         self.fields.iter().copied()
     }
 
-    /// An id and the text behind it. The text may hold commas, so the card counts as
+    /// An id and the text after it. The text may hold commas, so the card counts as
     /// free only when its first columns are no number by themselves.
     pub(crate) fn id_and_text(&self) -> (Field<'a>, Option<String>) {
         let width = self.format.width().min(self.text.len());

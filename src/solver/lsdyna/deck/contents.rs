@@ -1,10 +1,10 @@
-//! What a deck says of its run, and the speed that follows from it.
+//! The metadata of a run in its deck, and the resulting speed.
 
 use super::parameters::Value;
 use crate::solver::problem::Problem;
 use crate::unit::UnitSystem;
 
-/// What a deck and its includes say about a run. Numbers are in the deck's own units.
+/// Metadata of a run in a deck and its includes, in the deck's own units.
 ///
 /// Each list ends at 100,000 entries; a problem says when there were more.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -67,11 +67,11 @@ pub(crate) struct InitialVelocity {
     pub velocity: Option<[f64; 3]>,
     /// Whether a rotation is given or not known as well.
     pub rotates: bool,
-    /// What it holds for.
+    /// Its scope.
     pub scope: Scope,
 }
 
-/// What an initial velocity holds for.
+/// Scope of an initial velocity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Scope {
     /// Every node of the model.
@@ -90,7 +90,7 @@ pub(crate) enum Scope {
     Unknown,
 }
 
-/// One ASCII file that the deck asks for.
+/// One ASCII file that the deck requests.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output {
     /// As the keyword names it, in small letters: `nodout`.
@@ -106,7 +106,7 @@ pub struct Output {
 /// An id and the title that goes with it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TitledEntity {
-    /// As the deck has it.
+    /// As in the deck.
     pub id: i64,
     /// `None` where the deck gives none.
     pub title: Option<String>,
@@ -152,7 +152,7 @@ impl Deck {
     /// The speed at which the model starts to move: that of all initial velocities that
     /// are not zero, when they agree in size and direction (to 1e-6, since decks write
     /// seven digits). `None` when there is none, when they differ, when one turns or is
-    /// not known, or when a wall moves. An include that is not there may hide more.
+    /// not known, or when a wall moves. An include that is missing may hide more.
     pub fn impact_speed(&self) -> Option<ImpactSpeed> {
         let moves =
             |w: &DeckInterface| w.keyword.split('_').any(|o| o == "MOVING" || o == "MOTION");

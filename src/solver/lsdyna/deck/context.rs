@@ -1,4 +1,4 @@
-//! What is known of a deck while its cards are read: its contents so far, its parameters, the
+//! State of reading a deck: its contents so far, its parameters, the
 //! files that are open, and its problems.
 
 use super::card::{Card, Field};
@@ -13,7 +13,7 @@ pub(super) const MAX_ENTRIES: usize = 100_000;
 /// Includes read or tried; folders tried.
 pub(super) const MAX_INCLUDES: usize = 1000;
 
-/// A keyword and what its cards said so far.
+/// A keyword and the content of its cards so far.
 pub(super) struct Block {
     pub kind: Kind,
     pub keyword: Keyword,

@@ -30,7 +30,7 @@ impl Context {
         }
     }
 
-    /// PRMR1 EXPRESSION1, which goes on below where the name is blank. Only one that is
+    /// PRMR1 EXPRESSION1, which continues below where the name is blank. Only one that is
     /// a plain number has a value here.
     pub(super) fn expression(&mut self, card: &Card<'_>) {
         let (field, expression) = card.id_and_text();
@@ -65,7 +65,7 @@ impl Context {
             Defined::Full => self.note_full("parameters"),
             Defined::Contradicts => {
                 let message = format!(
-                    "parameter \"{name}\" has another value above; it is taken as not known"
+                    "parameter \"{name}\" has another value above; it is treated as unknown"
                 );
                 self.problem(ProblemCode::BadField, place, None, message);
             }

@@ -40,7 +40,7 @@ impl<'a, 'o> Includes<'a, 'o> {
         Self { open, folders: Vec::new() }
     }
 
-    /// One name per card; " +" at the end of a card says that the name goes on below. `Some`
+    /// One name per card; " +" at the end of a card says that the name continues below. `Some`
     /// for a file that is to be read before the next card.
     pub(crate) fn file_name(
         &mut self,
@@ -100,7 +100,7 @@ impl<'a, 'o> Includes<'a, 'o> {
             None if too_deep => {
                 format!("include \"{name}\" is more than {MAX_DEPTH} files deep; it is left out")
             }
-            None => format!("include \"{name}\" is not there"),
+            None => format!("include \"{name}\" is missing"),
         };
         context.problem(ProblemCode::UnreadRows, place, None, problem);
         None

@@ -1,4 +1,4 @@
-//! Keyword lines: names, options, and the card format they ask for.
+//! Keyword lines: names, options, and the card format they select.
 
 use nom::IResult;
 use nom::Parser;
@@ -10,7 +10,7 @@ use nom::sequence::preceded;
 const MAX_NAME: usize = 200;
 
 /// Keywords that stand alone, and the first words of families. Other programs have some
-/// of them too (Abaqus has `*NODE`), but go on with a comma or a blank.
+/// of them too (Abaqus has `*NODE`), but continue with a comma or a blank.
 const KEYWORDS_WITHOUT_OPTIONS: [&str; 6] =
     ["KEYWORD", "TITLE", "NODE", "PART", "INITIAL_VELOCITY", "INCLUDE_PATH"];
 const FAMILIES: [&str; 14] = [
@@ -52,7 +52,7 @@ pub(super) struct Keyword {
     /// In capitals and without its star.
     pub name: String,
     pub arguments: String,
-    /// What the keyword asks for itself: `+` long, `-` standard.
+    /// What the keyword requests for itself: `+` long, `-` standard.
     pub format: Option<Format>,
 }
 

@@ -2,7 +2,7 @@
 
 use super::keyword::Keyword;
 
-/// The ASCII files that `*DATABASE_…` asks for.
+/// The ASCII files that `*DATABASE_…` requests.
 const ASCII_FILES: [&str; 34] = [
     "abstat", "atdout", "avsflt", "bearing", "bndout", "curvout", "defgeo", "deforc", "disbout",
     "elout", "gceout", "glstat", "h3out", "icvout", "jntforc", "matsum", "movie", "mpgs", "ncforc",

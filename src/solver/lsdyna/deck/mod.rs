@@ -1,7 +1,7 @@
 //! LS-DYNA keyword decks: the metadata that names and sizes a run; not its mesh.
 //!
 //! Cards as in the LS-DYNA Keyword User's Manual, Volume I. A deck is read in one pass:
-//! a parameter holds for the cards below it, an include is read where it stands. Keywords
+//! a parameter applies to the cards below it, an include is read in place. Keywords
 //! that are not listed here are skipped; nothing of them is kept.
 
 mod card;
@@ -28,8 +28,8 @@ pub(crate) use parameters::Value;
 
 /// Reads a deck.
 ///
-/// `open` gives the bytes of an included file by its name, or `None` when it is not there.
-/// It is asked for the name as written, then for that name in each folder of
+/// `open` gives the bytes of an included file by its name, or `None` when it is missing.
+/// It is called with the name as written, then with that name in each folder of
 /// `*INCLUDE_PATH`. Includes end 16 deep and at the 1000th.
 ///
 /// # Errors
@@ -287,7 +287,7 @@ after the end
             [
                 "line 5: include \"parts.k\" includes itself; it is not read again (in \"mesh/fine/parts.k\")",
                 "line 8, columns 1-1: expected an integer, found \"x\" (in \"mesh/fine/parts.k\")",
-                "line 8: include \"gone.k\" is not there",
+                "line 8: include \"gone.k\" is missing",
                 "line 11: *INCLUDE_TRANSFORM: files included by this keyword are not read",
             ]
         );

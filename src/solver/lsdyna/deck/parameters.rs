@@ -1,4 +1,4 @@
-//! TitledEntity values, and the numbers of fields that may name them.
+//! Parameter values, and numbers in fields that may refer to them.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! Reads a deck card by card, its includes where they stand.
+//! Reads a deck card by card, with includes in place.
 
 use std::cell::Cell;
 use std::io::{self, BufRead, Read};
@@ -50,7 +50,7 @@ pub(super) fn read(source: &mut dyn BufRead, open: &mut Open<'_>) -> io::Result<
 /// A file of the deck that is being read.
 struct OpenFile<'a> {
     lines: Lines<SizeLimited<'a>>,
-    /// Format of its cards where their keyword asks for none.
+    /// Default format of its cards.
     format: Format,
     block: Option<Block>,
     /// Its name, and where in the file below on the stack it is included; `None` for the deck
@@ -173,7 +173,8 @@ impl Reader<'_, '_> {
     /// Reads a card; `Some` if it includes a file that is there.
     fn card(&mut self, block: &mut Block, line: &Line<'_>) -> Option<Included> {
         if line.overlong {
-            let message = "expected a card, found a line beyond 4096 bytes; its rest is left out";
+            let message =
+                "expected a card, found a line of more than 4096 bytes; the rest of it is left out";
             self.context.problem(ProblemCode::BadLine, line.into(), None, message.into());
         }
         let card = Card::new(line, block.format);

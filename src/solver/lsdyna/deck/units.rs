@@ -54,7 +54,7 @@ fn from_words<'a>(words: impl Iterator<Item = &'a str>) -> Option<UnitSystem> {
 }
 
 impl Context {
-    /// Keeps the first statement that is recognised; `*CONTROL_UNITS` stands above comments.
+    /// Keeps the first statement that is recognised; `*CONTROL_UNITS` is above comments.
     pub(super) fn units(&mut self, stated: String, place: Place, on_card: bool) {
         let mut new = StatedUnits { system: system(&stated), text: stated, at: self.at(place) };
         if let Some(known) = &self.deck.units {

@@ -1,8 +1,8 @@
-//! A whole nodout state by state, for a consumer that writes each state straight on.
+//! A complete nodout state by state, for a consumer that writes each state immediately.
 //!
-//! `histories -o x.h5` of a large nodout never holds the file. This module first verifies the frame of all states, so
-//! that their number is known. `hdf5/skeleton` then lets hdf5-pure encode a file whose large datasets are zeros that
-//! nothing ever touched, and notes where the encoder places them. At last the states are parsed and written to these
+//! `histories -o x.h5` of a large nodout never holds the file in memory. This module first verifies the frame of all states, so
+//! that their number is known. `hdf5/skeleton` then lets hdf5-pure encode a file whose large datasets are untouched
+//! zeros, and notes where the encoder places them. Finally the states are parsed and written to these
 //! places from all threads.
 
 use std::io;
@@ -37,14 +37,14 @@ pub struct Blocks {
 
 /// One component of some entities: neighbouring values of a state.
 pub struct Column {
-    /// Name of the component, as binout has it: `x_displacement`.
+    /// Name of the component, as in binout: `x_displacement`.
     pub component: String,
     /// The nodes whose values these are, in their order.
     pub entities: Vec<EntityId>,
 }
 
 impl Blocks {
-    /// `None` if the file is damaged, has too few states to tell their layout, or too few
+    /// `None` if the file is damaged, has too few states to show their layout, or too few
     /// values to be worth it: then the line reader gives what there is.
     pub(crate) fn open(source: Box<dyn Source>, selection: &Selection) -> io::Result<Option<Self>> {
         let mut frame = AsciiReader::new(&super::FORMAT, &*source, selection);

@@ -1,12 +1,12 @@
 //! `nodout`: displacements, velocities, accelerations and coordinates of nodes.
 //!
 //! A state is a translational block and, where nodes have rotations, a rotational block
-//! under a state line of its own with the same cycle and time. The column line tells
+//! under its own state line with the same cycle and time. The column line shows
 //! which block it is.
 //!
-//! The column line tells translations from rotations. A block joins the pending state if it has the same cycle and
+//! The column line distinguishes translations from rotations. A block joins the pending state if it has the same cycle and
 //! time. Ends of fields are counted from the right, because l2a pushes rows with wide ids to the right. `nodout`
-//! writes the cycle of a state, so states of one time are only repeated if the cycle does not rise.
+//! writes the cycle of a state, so states of one time are only repeated if the cycle does not increase.
 
 pub(crate) mod blocks;
 mod rows;
@@ -137,7 +137,7 @@ impl Body for Nodout {
         let above = self.pending_start.replace(start);
         let kept = states.kept();
         states.close(false);
-        // A state that was left out tells no layout, but an earlier one may have told it.
+        // A state that was left out shows no layout, but an earlier one may have.
         let above = above.filter(|_| states.kept() > kept);
         let tables = self.tables.unwrap_or_default();
         for known in [true, false] {

@@ -16,7 +16,7 @@ pub(crate) const DENSE_READ: usize = 1 << 18;
 /// Bytes below which two wanted rows are read together rather than apart.
 const PAGE: usize = 4096;
 
-/// Rows of equal width, and what stands above them.
+/// Rows of equal width, and what is above them.
 pub(crate) struct Block {
     pub table: TableId,
     /// Bytes above the rows, and where in them the state line is.
@@ -71,7 +71,7 @@ impl Wanted {
 }
 
 impl Block {
-    /// A block without rows yet, which begin `rows_at` bytes behind the state's start.
+    /// A block without rows yet, which begin `rows_at` bytes after the state's start.
     pub(crate) fn below(
         head: Vec<u8>,
         state_line: Range<usize>,
@@ -212,7 +212,7 @@ impl Block {
             rest = others;
             let to = group.last().map_or(from, |g| g.0);
             let start = at + (from * self.width) as u64;
-            // Behind the last row comes the head of what follows, with its first row.
+            // After the last row comes the head of what follows, with its first row.
             let ahead = if to == last { self.head.len() + self.width + 64 } else { 0 };
             let Some(bytes) = window.get(start, (to + 1 - from) * self.width, ahead)? else {
                 return Ok(None);

@@ -1,16 +1,16 @@
 //! States of a nodout that repeat the layout of the one above them: found by arithmetic,
 //! verified, and read without going through their lines.
 //!
-//! Every state with the same nodes has the same number of bytes. What stands around its
+//! Every state with the same nodes has the same number of bytes. The text around its
 //! rows (blank lines, state line, column line) must equal the state above but for cycle and
 //! time, and the id columns of the first and last row of each block must equal theirs; where
-//! all rows are read, those of all rows. At the first surprise the line reader goes on.
+//! all rows are read, those of all rows. At the first irregularity the line reader continues.
 //!
 //! The layout is learned from a state that was read by lines. Of each further state this module verifies the state
 //! line, the column lines, the blank lines, and the ids of the first and last row (of all rows where all are read);
-//! then it takes the wanted rows. Batches of states are parsed in parallel and handed on in order. At the first
-//! surprise the line reader takes that state, and leaping goes on after it. `tests/stride.rs` holds both ways against
-//! each other, on whole and on damaged files.
+//! then it takes the selected rows. Batches of states are parsed in parallel and passed on in order. At the first
+//! irregularity the line reader takes that state, and skipping continues after it. `tests/stride.rs` compares both ways
+//! on intact and on damaged files.
 
 use std::io;
 
@@ -36,13 +36,13 @@ pub(crate) struct Stride {
     /// Bytes and lines from one state to the next.
     period: u64,
     lines: u64,
-    /// Blank lines behind the last row.
+    /// Blank lines after the last row.
     tail: Vec<u8>,
     /// What the states keep of each block.
     wanted: Vec<Wanted>,
 }
 
-/// The blocks of the state between `from` and `to`, and what stands below the last; `None` if
+/// The blocks of the state between `from` and `to`, and what is below the last; `None` if
 /// the rows of a block differ in width.
 fn blocks(
     source: &dyn Source,
@@ -119,7 +119,7 @@ impl Stride {
         }) && self.blocks.iter().all(|b| b.rows > 0 && !b.state_line.is_empty())
     }
 
-    /// Reads the states from `start` on as long as they repeat the layout; the place behind
+    /// Reads the states from `start` on as long as they repeat the layout; the place after
     /// them, or `None` if there is none.
     pub(crate) fn leap(
         &self,
@@ -165,14 +165,14 @@ impl Stride {
         }
     }
 
-    /// Beginning of the `k`-th state behind the one at `place`.
+    /// Beginning of the `k`-th state after the one at `place`.
     fn place(&self, place: Place, k: usize) -> Place {
         let k = k as u64;
         Place { line: place.line + k * self.lines, byte: place.byte + k * self.period }
     }
 
     /// Number of states between byte `at` and the end of the file; the last one may lack
-    /// the blank lines behind it.
+    /// the blank lines after it.
     pub(crate) fn count(&self, size: u64, at: u64) -> usize {
         let body = self.period - self.tail.len() as u64;
         match size.saturating_sub(at).checked_sub(body) {
@@ -196,7 +196,7 @@ impl Stride {
                 Wanted { start: 0, row_step: columns.len(), column_step: 1, rows, columns }
             })
             .collect();
-        // The values stand in order of the tables, which need not be that of the blocks.
+        // The values are in order of the tables, which need not be that of the blocks.
         let mut order: Vec<usize> = (0..wanted.len()).collect();
         order.sort_by_key(|&k| self.blocks[k].table);
         let mut start = 0;
@@ -207,7 +207,7 @@ impl Stride {
         wanted
     }
 
-    /// The same for a table whose columns are to stand one behind the other.
+    /// The same for a table whose columns are to stand one after the other.
     pub(crate) fn wanted_by_column(&self, states: &StateReader<'_>) -> Vec<Wanted> {
         let mut wanted = self.wanted(states);
         for wanted in &mut wanted {
