@@ -405,7 +405,9 @@ fn the_recorded_speed_outranks_the_decks() {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{said}");
     assert!(
-        said.contains("speed: the deck main.k, line 2 states 25 km/h; the record's 60 km/h is used"),
+        said.contains(
+            "speed: the deck main.k, line 2 states 25 km/h; the record's 60 km/h is used"
+        ),
         "{said}"
     );
     let list = crumple_ok(folder.path(), &["db", "ls", "c.h5"]);
