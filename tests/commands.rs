@@ -170,7 +170,7 @@ fn a_wrong_speed_in_the_manifest_is_noticed() {
     assert_eq!(output.status.code(), Some(3));
     let error = String::from_utf8(output.stderr).unwrap();
     assert!(
-        error.contains("36kmh: speed: the record says 36 km/h, the manifest's 38 km/h is used"),
+        error.contains("36kmh: speed: the record states 36 km/h; the manifest's 38 km/h is used"),
         "{error}"
     );
 }

@@ -405,7 +405,9 @@ fn the_recorded_speed_outranks_the_decks() {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{said}");
     assert!(
-        said.contains("speed: the deck main.k, line 2 says 25 km/h, the record's 60 km/h is used"),
+        said.contains(
+            "speed: the deck main.k, line 2 states 25 km/h; the record's 60 km/h is used"
+        ),
         "{said}"
     );
     let list = crumple_ok(folder.path(), &["db", "ls", "c.h5"]);
@@ -538,7 +540,7 @@ fn a_record_that_is_not_one_impact_is_refused() {
     let mut other = Run::read(48);
     each(&mut other.velocity, |_, v| 0.3 * v);
     let said = refused(&other, CONTACT_RECIPE, Stated::default());
-    assert!(said.contains("displacement: from") && said.contains("another node"), "{said}");
+    assert!(said.contains("displacement: from") && said.contains("wrong node"), "{said}");
     let taken = other.extract_with(CONTACT_RECIPE, accepted).unwrap().quality.warnings;
     assert!(taken.iter().any(|w| w.starts_with("accept_energy: displacement: from")), "{taken:?}");
     let window = format!("{CONTACT_RECIPE}\nsampling = {{ states = 100, interval_ms = 0.75 }}");

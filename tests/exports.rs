@@ -680,8 +680,8 @@ fn what_is_said_of_an_import_and_what_its_file_says() {
     let said =
         add("pair.csv", "wall", &["--kind", "wall", "--unloading", "30MN/m", "--accept-energy"]);
     let said = said.to_string();
-    assert!(said.contains("the file says closing, wall is used"), "{said}");
-    assert!(said.contains("unloading stiffness: the file says"), "{said}");
+    assert!(said.contains("the file states closing; wall is used"), "{said}");
+    assert!(said.contains("unloading stiffness: the file states"), "{said}");
 }
 
 /// A whole group goes into one file or one folder; a model gives any speeds.

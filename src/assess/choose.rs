@@ -54,9 +54,10 @@ pub(crate) fn choose(means: &[Means], purpose: Purpose) -> Option<(String, Strin
     };
     let (over, preferred) = match purpose {
         Purpose::Vehicle => ("", "the simplest"),
-        Purpose::Train => {
-            (", ends of the range included,", "the simplest that follows the closing speed")
-        }
+        Purpose::Train => (
+            ", ends of the range included,",
+            "the simplest, with a force that follows the closing speed,",
+        ),
     };
     let best = means.iter().filter(keeps).map(|m| m.force_l1).fold(f64::INFINITY, f64::min);
     let tied = means.iter().filter(keeps).filter(|m| m.force_l1 <= (1.0 + TIE) * best);
