@@ -389,12 +389,17 @@ fn db_check_holds_attributes_against_the_curves() {
         "attribute_differs",
         "unloading_stiffness_N_per_m is 7000000 N/m",
     );
-    t("mass_kg", number(12e3), "altered", "its attributes are not those");
+    t("mass_kg", number(12e3), "altered", "its attributes differ from those");
     t("mass_kg", number(12e3), "energy_impossible", "W/E is 2.04");
     t("speed_m_per_s", number(8.0), "energy_impossible", "W/E is 1.59");
     t("speed_m_per_s", number(f64::NAN), "damaged", "attribute speed_m_per_s is not finite");
     t("speed_kind", AttrValue::String("closing".into()), "speed_kinds", "has a closing speed, ");
-    t("notes", AttrValue::String("[\"mine\"]".into()), "altered", "its attributes are not those");
+    t(
+        "notes",
+        AttrValue::String("[\"mine\"]".into()),
+        "altered",
+        "its attributes differ from those",
+    );
 }
 
 #[test]
@@ -429,7 +434,7 @@ fn db_check_finds_wrong_lengths_order_and_holes() {
             let force = values(file, "force_N");
             replace(file, "force_N", &force[..force.len() - 1]);
         },
-        &[("length", "force_N has "), ("altered", "the values of force_N are not")],
+        &[("length", "force_N has "), ("altered", "the values of force_N differ")],
     );
     t(
         &|file| replace(file, "original/force_N", &[]),
@@ -1010,7 +1015,7 @@ fn changed_numbers_are_not_read_in_silence() {
         let words: Vec<&str> = line.split(' ').collect();
         let error = crumple_fails(here, 1, &words);
         assert!(
-            error.contains("the values of case lead-car-wall/48kmh are not"),
+            error.contains("the values of case lead-car-wall/48kmh do not match"),
             "{line}: {error}"
         );
         if !line.starts_with("validate") && !line.starts_with("report") {

@@ -154,7 +154,7 @@ fn lsdyna_decks() {
     );
     let own = deck("x", card, &fields(1e-3, 1.0))
         .replace("$ by hand", "$ units of the points: mm-t-s (length 1e-3 m)");
-    t(&own, None, &["units: mm-t-s by line 2 of the file"]);
+    t(&own, None, &["units: mm-t-s from line 2 of the file"]);
     // Compression in the third quadrant, as springs of S06 have it.
     let third: String = POINTS
         .iter()
@@ -221,7 +221,7 @@ fn modelica_tables() {
     t(&format!("#1\ndouble fd_load(5,2)\n{si}"), None, "SI, as crumple export writes fd_load");
     let mm = rows(1e-3, 1.0, "\t", ".");
     t(&format!("#1\n# mine\ndouble nose(5, 2)\n{mm}"), Some("mm-t-s"), "mm-t-s as given");
-    t(&format!("#1\n# units: mm-t-s\nfloat nose(5,2)\n{mm}"), None, "units: mm-t-s by line 2");
+    t(&format!("#1\n# units: mm-t-s\nfloat nose(5,2)\n{mm}"), None, "units: mm-t-s from line 2");
     let one_line = si.replace('\n', ", ");
     t(&format!("#1\ndouble fd_load(5,2)\n{one_line}\n"), None, "SI");
     let guarded = format!("#1\ndouble fd_load(7,2)\n-0.1 0\n{si}1.1 2e6\n");

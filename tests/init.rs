@@ -700,7 +700,7 @@ fn what_is_no_run_is_named_and_left_out() {
     };
     said("again", "its files are identical to those of 48kmh");
     said("converted", "its histories are identical to those of 36kmh");
-    said("died", "it died: nodout holds 3 whole states (line 33: the file ends");
+    said("died", "it terminated early: nodout holds 3 complete states (line 33: the file ends");
     said(
         "aborted",
         "it terminated early: the record ends at 66.754 ms, while the bodies still close at 62 % of",
@@ -1041,7 +1041,7 @@ fn scenarios_run_as_they_are_written() {
         // A wall is a body of the result too, or not: only vehicles are counted.
         assert!(masses == bodies || masses + 1 == bodies, "{models:?}: {masses} bodies");
         let error = crumple_fails(here, 1, &arguments);
-        assert!(error.contains("new.toml is there already"), "{error}");
+        assert!(error.contains("new.toml exists already"), "{error}");
         let scenario = study(here, "new.toml");
         let speed = number(&scenario["train"][0]["speed"], "km/h");
         assert!((12.0..=72.0).contains(&speed));

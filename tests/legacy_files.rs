@@ -490,11 +490,11 @@ fn radioss_functions() {
     let one = funct(5, &points(1e-3, 1.0));
     t(&one, &given(Some("mm-t-s")), &["curve: /FUNCT/5 of the deck", "units: mm-t-s as given"]);
     let own = begin(&fields(["Mg", "mm", "s"])) + &one + "/END\n";
-    t(&own, &given(None), &["units: mm-t-s by line 5 of the file"]);
+    t(&own, &given(None), &["units: mm-t-s from line 5 of the file"]);
     let ms = begin(&fields(["kg", "mm", "ms"])) + &funct(5, &points(1e-3, 1e3));
-    t(&ms, &given(None), &["units: mm-kg-ms by line 5"]);
-    t(&(begin(&fields(["1000", "0.001", "1"])) + &one), &given(None), &["by line 5"]);
-    t(&format!("# units: mm-t-s\n{one}"), &given(None), &["by line 1"]);
+    t(&ms, &given(None), &["units: mm-kg-ms from line 5"]);
+    t(&(begin(&fields(["1000", "0.001", "1"])) + &one), &given(None), &["from line 5"]);
+    t(&format!("# units: mm-t-s\n{one}"), &given(None), &["from line 1"]);
     // Compression in the third quadrant, as our export has it.
     let third: String =
         POINTS.iter().rev().map(|(d, f)| format!("{:>20}{:>20}\n", -d, -f)).collect();

@@ -880,7 +880,8 @@ fn the_choice_for_trains_counts_the_ends() {
         crumple_ok(demo.path(), &all)
     };
     let text = of("vehicle-pair", &["--for", "train"]);
-    let ends = "mean force error, ends of the range included, ";
+    let ends =
+        "mean force error, ends of the range included, is within 10 % of the smallest (its own ";
     assert!(text.contains(ends) && text.contains("that follows the closing speed"), "{text}");
     let plain = of("vehicle-pair", &[]);
     assert!(!plain.contains(ends));
@@ -994,7 +995,12 @@ fn validate_prints_and_tells_what_to_run_next() {
     let text = crumple_ok(here, &arguments);
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines[0], "lead-car-wall: mean errors over 5 inner speeds left out in turn");
-    assert!(lines[9].starts_with("crush-law chosen (*): mean force error "), "{text}");
+    assert!(
+        lines[9].starts_with(
+            "crush-law chosen (*): the simplest of the models whose mean force error "
+        ),
+        "{text}"
+    );
     assert_eq!(lines.iter().filter(|line| line.starts_with("band of the ")).count(), 4, "{text}");
     assert!(lines.len() == 17 && lines[15].starts_with("next run: "), "{text}");
     let found: Value =

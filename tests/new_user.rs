@@ -169,7 +169,7 @@ fn a_killed_run_says_nothing_of_the_others() {
         printed.contains("left out: runs/48kmh: it terminated early: the record ends at 22."),
         "{printed}"
     );
-    assert!(printed.contains("\n36kmh  36 km/h     24.00 "), "{printed}");
+    assert!(printed.contains("\n36kmh  36 km/h  24.00 t "), "{printed}");
 }
 
 #[test]
@@ -192,7 +192,7 @@ fn what_is_not_as_it_should_be_is_said_with_what_to_do() {
     fails(&["runs/36kmh/nodout"], "this is not a folder: give a run's folder, or one above runs");
     // A file with another name than the solver's.
     fs::rename(here.join("runs/48kmh/nodout"), here.join("runs/48kmh/Nodout.txt")).unwrap();
-    fails(&["runs/48kmh"], "it has rwforc; if Nodout.txt is the nodout, name it so");
+    fails(&["runs/48kmh"], "it has rwforc; if Nodout.txt is the nodout, rename it accordingly");
     // A folder without anything, beside one with a run.
     fs::remove_dir_all(here.join("runs/48kmh")).unwrap();
     fs::create_dir(here.join("runs/48kmh")).unwrap();

@@ -649,7 +649,7 @@ fn another_sweeps_file_is_not_taken_up() {
         folder.put(file, &old.replace(from, to));
         let error = folder.fails(1, "sweep s.toml -q -o out.csv");
         assert!(
-            error.contains("out.csv.part belongs to another sweep: plan, scenario or a file it names have changed since; --restart drops it"),
+            error.contains("out.csv.part belongs to another sweep: plan, scenario or a file it names have changed since; --restart replaces it"),
             "{error}"
         );
         assert!(folder.read("out.csv.part") == begun);

@@ -336,7 +336,7 @@ fn what_does_not_fit_in_a_train_is_said() {
     assert_eq!(compared(&text), "null");
     let swapped = text.replace("A2 = 900002, A3 = 900003", "A2 = 900003, A3 = 900002");
     let swapped = compared(&swapped);
-    assert!(swapped.contains("FE's record of A2 fits the run's A3"), "{swapped}");
+    assert!(swapped.contains("FE's record of A2 matches A3 in the run"), "{swapped}");
     let late = compared(&text.replace("until =", "contact = \"8ms\"\nuntil ="));
     assert!(late.contains("fits better by") && late.contains("when it is shifted by +"), "{late}");
 }
