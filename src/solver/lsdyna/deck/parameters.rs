@@ -1,12 +1,15 @@
-//! TitledEntity values, and the numbers of fields that may name them.
+//! Values of parameters, and the numbers of fields that may name them.
 
 use std::collections::HashMap;
+
+use serde::Serialize;
 
 use super::super::line;
 use super::card::{Field, start};
 
 /// A parameter's value.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(untagged)]
 pub enum Value {
     /// Of type R.
     Real(f64),
