@@ -111,21 +111,6 @@ impl ErrorDocument {
         };
         Self { error }
     }
-
-    /// The document of a wrong command line.
-    pub fn usage(message: &str) -> Self {
-        Self {
-            error: ErrorReport {
-                code: ErrorCode::Usage,
-                message: message.into(),
-                causes: Vec::new(),
-                file: None,
-                line: None,
-                column: None,
-                hint: hint(message),
-            },
-        }
-    }
 }
 
 /// The question of a message, as `guess` puts it, or the tip for a wrong command line.

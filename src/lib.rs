@@ -41,6 +41,8 @@ mod guess;
 
 pub mod plural;
 
+mod table;
+
 pub mod plot;
 
 pub mod history;

@@ -9,8 +9,9 @@ use crate::common::{entries, root};
 
 /// Which module may name which others. One way only: a change here is a change of
 /// architecture and belongs into ARCHITECTURE.md.
-const MAY_NAME: [(&str, &[&str]); 36] = [
+const MAY_NAME: [(&str, &[&str]); 37] = [
     ("plural", &[]),
+    ("table", &[]),
     ("guess", &[]),
     ("error", &["guess"]),
     ("unit", &["guess"]),
@@ -129,6 +130,7 @@ const MAY_NAME: [(&str, &[&str]); 36] = [
         "report",
         &[
             "plural",
+            "table",
             "charts",
             "assess",
             "scenario",
@@ -318,7 +320,7 @@ fn no_unwrap_outside_tests() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 75939), ("files", 360), ("public types", 240), ("error types", 11)];
+    [("lines", 74636), ("files", 362), ("public types", 241), ("error types", 11)];
 
 #[test]
 fn the_source_keeps_its_budget() {

@@ -148,6 +148,12 @@ pub(crate) fn compare(
     })
 }
 
+/// Mean of a method's rows over the comparisons.
+pub(crate) fn mean(comparisons: &[Comparison], method: &str, of: impl Fn(&Row) -> f64) -> f64 {
+    let rows = || comparisons.iter().flat_map(|c| &c.rows).filter(|row| row.method == method);
+    rows().map(of).sum::<f64>() / rows().count() as f64
+}
+
 /// The case at `speed_m_per_s`, left out of the group; at least two others must remain.
 fn left_out_at<'a>(speed_m_per_s: f64, set: &'a TrainingSet) -> Result<LeftOutCase<'a>, Error> {
     let index = set

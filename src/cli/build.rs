@@ -9,12 +9,11 @@ use crate::build::{self, BuildReport, BuiltRun, RunOutcome};
 use crate::curve::group as siblings;
 use crate::database::CasePath;
 use crate::plural::counted;
-use crate::unit::Shown;
-use serde::Serialize;
+use crate::table::Table;
 
-use super::db::CaseRow;
-use super::output;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, progress};
+use super::db::{case_columns, case_row};
+use super::progress::Bar;
+use super::{CommandResult, Failure, GlobalOptions, Outcome, output, usage};
 
 /// Read all runs of a study, extract their curves and write the database
 #[derive(clap::Args)]
@@ -44,9 +43,9 @@ impl Args {
             Some(study) => study.clone(),
             None if Path::new(STUDY).is_file() => STUDY.into(),
             None => {
-                return Err(Failure::Usage(format!(
+                return usage(format!(
                     "there is no {STUDY} in this folder: name a study, or let crumple init write one"
-                )));
+                ));
             }
         };
         let output = self.output.clone().unwrap_or_else(|| study.with_file_name(DATABASE));
@@ -54,150 +53,120 @@ impl Args {
     }
 }
 
-#[derive(Serialize)]
-struct Document {
-    database: String,
-    group: String,
-    runs: Vec<RunReport>,
-    /// What is unusual in a run compared with its group.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    group_warnings: Vec<String>,
-    removed: Vec<String>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    moved: Vec<Moved>,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    earlier_groups: Vec<String>,
-}
-
-/// A case that has another name or group than before.
-#[derive(Serialize)]
-struct Moved {
-    from: String,
-    to: String,
-    #[serde(skip)]
-    paths: (CasePath, CasePath),
-}
-
-#[derive(Serialize)]
-struct RunReport {
-    name: String,
-    outcome: &'static str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    error: Option<String>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    case: Option<CaseRow>,
-    /// Group and name of the case where the database has others than the manifest.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    renamed: Option<String>,
-}
-
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let (study, output) = args.files()?;
-    let bar = progress::Bar::new(options, "reading runs");
+    let bar = Bar::new(options, "reading runs");
     let done = AtomicUsize::new(0);
     let report = build::build(&study, &output, |name| {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         bar.step(&format!("{} read, last {name}", counted(done, "run")));
-    });
-    bar.end();
-    let report = report?;
-    let runs: Vec<RunReport> = report.runs.iter().map(|r| run_report(&report, r)).collect();
+    })?;
+    drop(bar);
     let mut outcome = Outcome::Clean;
-    for (run, built) in runs.iter().zip(&report.runs) {
-        if let Some(error) = &run.error {
-            output::say(&format!("error: run {}: {error}", run.name));
-            if let RunOutcome::Failed { reason, .. } = &built.outcome {
-                output::say_excerpt(reason.place());
+    for run in &report.runs {
+        if let (_, Some(error)) = outcome_of(run) {
+            output::eprint_line(&format!("error: run {}: {error}", run.name));
+            if let RunOutcome::Failed { reason, .. } = &run.outcome {
+                output::eprint_excerpt(reason.place());
             }
             outcome = Outcome::Partly;
         }
-        for warning in run.case.iter().flat_map(|c| &c.warnings) {
-            options.warn(&format!("{}: {warning}", run.name));
-            if outcome == Outcome::Clean {
-                outcome = Outcome::Warned;
-            }
-        }
+        let warnings = report.case(run).into_iter().flat_map(|case| &case.quality.warnings);
+        let warnings = warnings.map(|warning| format!("{}: {warning}", run.name));
+        outcome = outcome.max(options.warn_all(warnings));
     }
+    // What is unusual in a run compared with its group.
     let of_group = siblings::remarks(report.database.cases(&report.group));
     let of_group: Vec<String> =
         of_group.into_iter().map(|(case, _, words)| format!("{case}: {words}")).collect();
-    for warning in &of_group {
-        options.warn(warning);
-        if outcome == Outcome::Clean {
-            outcome = Outcome::Warned;
-        }
-    }
+    outcome = outcome.max(options.warn_all(&of_group));
     let database = output.display().to_string();
-    if options.json {
-        output::print_json(&Document::of(report, database, runs, of_group))?;
-    } else {
-        options.print(|out| print(out, &Document::of(report, database, runs, of_group)))?;
-    }
+    let runs = report.runs.iter().map(|run| {
+        let (word, error) = outcome_of(run);
+        document! {
+            name: &run.name,
+            outcome: word,
+            error if_any: error,
+            case if_any: report.case(run).map(case_row),
+            renamed if_any: renamed(&report, run),
+        }
+    });
+    let moved = report.moved.iter().map(|(from, to)| {
+        document! { from: from.to_string(), to: to.to_string() }
+    });
+    let document = document! {
+        database: &database,
+        group: &report.group,
+        runs: runs.collect::<Vec<_>>(),
+        group_warnings if_any: &of_group,
+        removed: removed(&report),
+        moved if_any: moved.collect::<Vec<_>>(),
+        earlier_groups if_any: &report.earlier,
+    };
+    options.show(&document, |out| print(out, &report, &database))?;
     Ok(outcome)
 }
 
-impl Document {
-    fn of(
-        report: BuildReport,
-        database: String,
-        runs: Vec<RunReport>,
-        group_warnings: Vec<String>,
-    ) -> Self {
-        let shown = |path: &CasePath| {
-            if path.group == report.group { path.name.clone() } else { path.to_string() }
-        };
-        let moved = |(from, to): &(CasePath, CasePath)| Moved {
-            from: from.to_string(),
-            to: to.to_string(),
-            paths: (from.clone(), to.clone()),
-        };
-        Self {
-            database,
-            runs,
-            group_warnings,
-            removed: report.removed.iter().map(shown).collect(),
-            moved: report.moved.iter().map(moved).collect(),
-            earlier_groups: report.earlier,
-            group: report.group,
+/// What became of a run, in a word and in the sentence of its error.
+fn outcome_of(run: &BuiltRun) -> (&'static str, Option<String>) {
+    match &run.outcome {
+        RunOutcome::Built => ("built", None),
+        RunOutcome::Kept => ("unchanged", None),
+        RunOutcome::Failed { reason, earlier_kept } => {
+            let kept = if *earlier_kept { " (the case of an earlier build is kept)" } else { "" };
+            ("failed", Some(format!("{reason}{kept}")))
         }
     }
 }
 
-fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
-    let Document { database, group, runs, removed, moved, earlier_groups, .. } = document;
-    let heading: Vec<&str> = ["run"].into_iter().chain(CaseRow::HEADING).collect();
-    let units = CaseRow::units(runs.iter().filter_map(|run| run.case.as_ref()));
-    output::table(out, &heading, &runs.iter().map(|run| row(run, units)).collect::<Vec<_>>())?;
-    for run in runs {
-        for note in run.case.iter().flat_map(|c| &c.notes) {
+/// Group and name of a run's case where the database has others than the manifest.
+fn renamed(report: &BuildReport, run: &BuiltRun) -> Option<String> {
+    let is_renamed = run.case.group != report.group || run.case.name != run.name;
+    (is_renamed && report.case(run).is_some()).then(|| run.case.to_string())
+}
+
+/// Cases that were removed, with the name of their group where that is another one.
+fn removed(report: &BuildReport) -> Vec<String> {
+    let shown = |path: &CasePath| {
+        if path.group == report.group { path.name.clone() } else { path.to_string() }
+    };
+    report.removed.iter().map(shown).collect()
+}
+
+fn print(out: &mut dyn Write, report: &BuildReport, database: &str) -> io::Result<()> {
+    let runs = Table::of(&report.runs)
+        .column("run", |run| format!("{} ({})", run.name, outcome_of(run).0));
+    output::table(out, case_columns(runs, |run| report.case(run)))?;
+    for run in &report.runs {
+        for note in report.case(run).into_iter().flat_map(|case| &case.quality.notes) {
             writeln!(out, "note: {}: {note}", run.name)?;
         }
     }
-    for name in removed {
+    for name in removed(report) {
         writeln!(out, "note: {name}: no longer in the study, removed")?;
     }
-    for run in runs {
-        if let Some(renamed) = &run.renamed {
+    for run in &report.runs {
+        if let Some(renamed) = renamed(report, run) {
             writeln!(out, "note: {}: called {renamed} in the database", run.name)?;
         }
     }
-    for line in moved_lines(moved) {
+    for line in moved_lines(&report.moved) {
         writeln!(out, "note: {line}")?;
     }
-    for group in earlier_groups {
+    for group in &report.earlier {
         writeln!(
             out,
             "note: group {group} was built from an earlier version of this manifest and is kept: crumple db rm removes it"
         )?;
     }
-    writeln!(out, "wrote {database} (group {group})")
+    writeln!(out, "wrote {database} (group {})", report.group)
 }
 
 /// Says what has moved: a whole group in one line.
-fn moved_lines(moved: &[Moved]) -> Vec<String> {
+fn moved_lines(moved: &[(CasePath, CasePath)]) -> Vec<String> {
     let mut groups: BTreeMap<(&str, &str), usize> = BTreeMap::new();
     let mut lines = Vec::new();
-    for Moved { paths: (from, to), .. } in moved {
+    for (from, to) in moved {
         if from.name == to.name {
             *groups.entry((&from.group, &to.group)).or_default() += 1;
         } else {
@@ -205,32 +174,9 @@ fn moved_lines(moved: &[Moved]) -> Vec<String> {
         }
     }
     let group = |((from, to), count): (&(&str, &str), &usize)| {
-        let cases = output::counted(*count, "case");
+        let cases = counted(*count, "case");
         format!("group {from}: renamed since it was built, {cases} moved to {to}")
     };
     lines.extend(groups.iter().map(group));
     lines
-}
-
-fn run_report(report: &BuildReport, run: &BuiltRun) -> RunReport {
-    let (word, error) = match &run.outcome {
-        RunOutcome::Built => ("built", None),
-        RunOutcome::Kept => ("unchanged", None),
-        RunOutcome::Failed { reason, earlier_kept } => {
-            let kept = if *earlier_kept { " (the case of an earlier build is kept)" } else { "" };
-            ("failed", Some(format!("{reason}{kept}")))
-        }
-    };
-    let case = report.case(run).map(CaseRow::of);
-    let is_renamed = run.case.group != report.group || run.case.name != run.name;
-    let renamed = (is_renamed && case.is_some()).then(|| run.case.to_string());
-    RunReport { name: run.name.clone(), outcome: word, error, case, renamed }
-}
-
-fn row(run: &RunReport, units: [Shown; 3]) -> Vec<String> {
-    let cells = match &run.case {
-        Some(case) => case.cells(units),
-        None => CaseRow::HEADING.iter().map(|_| "-".to_string()).collect(),
-    };
-    [format!("{} ({})", run.name, run.outcome)].into_iter().chain(cells).collect()
 }

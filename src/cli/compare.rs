@@ -12,13 +12,12 @@ use crate::database::Database;
 use crate::nsdm::Start;
 use crate::rating::Rating;
 use crate::scenario;
+use crate::table::Table;
 use crate::unit::{Shown, km_per_h};
-use serde::Serialize;
 
 use super::arguments::{self, one_of};
-use super::output;
 use super::progress::Bar;
-use super::{CommandResult, Failure, GlobalOptions, Outcome};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, output, usage};
 
 /// Compare FE with FDRM, NSDM, DDTCM and the best model, all in the same multi-body model
 #[derive(clap::Args)]
@@ -75,27 +74,6 @@ const STARTS: &[(&str, Start, &str)] = &[
     ),
 ];
 
-/// Comparisons at several speeds.
-#[derive(Serialize)]
-struct Document {
-    comparisons: Vec<Comparison>,
-    /// By method, in the order of the rows.
-    means: Vec<Mean>,
-}
-
-#[derive(Serialize)]
-struct Mean {
-    method: String,
-    /// Which force drives its runs; null for a spring and damper.
-    driven_by: Option<ForceKind>,
-    velocity_l1: f64,
-    acceleration_l1: f64,
-    acceleration_unfiltered_l1: f64,
-    /// Score of ISO/TS 18571 of velocity and acceleration.
-    velocity_iso18571: f64,
-    acceleration_iso18571: f64,
-}
-
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let settings = ComparisonSettings {
         seed: args.seed,
@@ -107,7 +85,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         return trains(&args.train, &settings, options);
     }
     let Some(path) = &args.database else {
-        return Err(Failure::Usage("name a database, or --train".into()));
+        return usage("name a database, or --train");
     };
     let database = Database::read(path)?;
     let (group, cases) = database.group_or_only(path, args.group.as_deref())?;
@@ -121,32 +99,17 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         bar.step(&format!("comparing at {}", km_per_h(speed)));
         comparisons.push(compare::compare(group, cases, speed, &settings)?);
     }
-    bar.end();
+    drop(bar);
     let inner = comparisons.iter().all(|c| c.inner);
     if !inner {
         options.warn("the left-out speed is an end of the range: the models extrapolate");
     }
     if let (Some(_), [comparison]) = (args.speed, &comparisons[..]) {
-        if options.json {
-            output::print_json(comparison)?;
-        } else {
-            options.print(|out| print(out, comparison))?;
-        }
+        options.show(comparison, |out| print(out, comparison))?;
     } else {
-        let document = Document { means: means(&comparisons), comparisons };
-        if options.json {
-            output::print_json(&document)?;
-        } else {
-            options.print(|out| {
-                for comparison in &document.comparisons {
-                    print(out, comparison)?;
-                    writeln!(out)?;
-                }
-                print_means(out, &document)
-            })?;
-        }
+        several(&comparisons, options)?;
     }
-    Ok(if inner { Outcome::Clean } else { Outcome::Warned })
+    Ok(Outcome::warned_if(!inner))
 }
 
 fn percent(error: f64) -> String {
@@ -164,57 +127,47 @@ fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
         Shown::force(comparison.reference_peak_force_n).text(comparison.reference_peak_force_n),
         comparison.reference_max_crush_m
     )?;
-    let rows: Vec<Vec<String>> = comparison.rows.iter().map(cells).collect();
-    let heading = [
-        "method",
-        "driven by",
-        "curve",
-        "velocity",
-        "acceleration",
-        "ISO v/a",
-        "force",
-        "peak force",
-        "max crush",
-        "fit",
-        "predict",
-        "run",
-        "speed-up",
-        "with training",
-    ];
-    output::table(out, &heading, &rows)?;
+    let milliseconds = |time_s: f64| format!("{:.2} ms", time_s * 1e3);
+    let factor = |f: Option<f64>| match f {
+        None => "-".into(),
+        Some(f) if (0.01..1e3).contains(&f) => format!("{f:.2}"),
+        Some(f) => format!("{f:.1e}"),
+    };
+    let table = Table::of(&comparison.rows)
+        .column("method", |row| &row.method)
+        .column("driven by", |row| driven_by(row.driven_by))
+        .column("curve", |row| &row.curve)
+        .column("velocity", |row| percent(row.velocity_l1))
+        .column("acceleration", |row| {
+            let unfiltered = row.acceleration_unfiltered_l1 * 100.0;
+            format!("{} ({unfiltered:.2})", percent(row.acceleration_l1))
+        })
+        .column("ISO v/a", |row| {
+            let score = |of: &Rating| score(of).map_or("-".into(), |score| format!("{score:.3}"));
+            format!("{}/{}", score(&row.velocity), score(&row.acceleration))
+        })
+        .column("force", |row| row.force_l1.map_or("-".into(), percent))
+        .column("peak force", |row| Shown::force(row.peak_force_n).text(row.peak_force_n))
+        .column("max crush", |row| format!("{:.4} m", row.max_crush_m))
+        .column("fit", |row| format!("{:.1} ms", row.fit_time_s * 1e3))
+        .column("predict", |row| milliseconds(row.predict_time_s))
+        .column("run", |row| milliseconds(row.simulation_time_s))
+        .column("speed-up", |row| factor(row.speed_up))
+        .column("with training", |row| factor(row.speed_up_with_training));
+    output::table(out, table)?;
     match &comparison.nsdm {
         Some(nsdm) => print_nsdm(out, nsdm),
         None => Ok(()),
     }
 }
 
-/// The cells of one method, in the order of the table's heading.
-fn cells(row: &Row) -> Vec<String> {
-    let score = |rating: &Rating| {
-        rating.iso18571.map_or("-".to_string(), |iso| format!("{:.3}", iso.rating))
-    };
-    let factor = |f: Option<f64>| match f {
-        None => "-".into(),
-        Some(f) if (0.01..1e3).contains(&f) => format!("{f:.2}"),
-        Some(f) => format!("{f:.1e}"),
-    };
-    let unfiltered = row.acceleration_unfiltered_l1 * 100.0;
-    vec![
-        row.method.clone(),
-        row.driven_by.map_or("spring and damper", ForceKind::name).into(),
-        row.curve.clone(),
-        percent(row.velocity_l1),
-        format!("{} ({unfiltered:.2})", percent(row.acceleration_l1)),
-        format!("{}/{}", score(&row.velocity), score(&row.acceleration)),
-        row.force_l1.map_or("-".into(), percent),
-        Shown::force(row.peak_force_n).text(row.peak_force_n),
-        format!("{:.4} m", row.max_crush_m),
-        format!("{:.1} ms", row.fit_time_s * 1e3),
-        format!("{:.2} ms", row.predict_time_s * 1e3),
-        format!("{:.2} ms", row.simulation_time_s * 1e3),
-        factor(row.speed_up),
-        factor(row.speed_up_with_training),
-    ]
+/// The score of ISO/TS 18571.
+fn score(rating: &Rating) -> Option<f64> {
+    rating.iso18571.map(|iso| iso.rating)
+}
+
+fn driven_by(force: Option<ForceKind>) -> &'static str {
+    force.map_or("spring and damper", ForceKind::name)
 }
 
 /// What the fits of the spring and damper are worth.
@@ -248,89 +201,43 @@ fn print_nsdm(out: &mut dyn Write, nsdm: &NsdmReport) -> io::Result<()> {
     Ok(())
 }
 
-fn means(comparisons: &[Comparison]) -> Vec<Mean> {
-    let Some(first) = comparisons.first() else { return Vec::new() };
-    let score = |rating: &crate::rating::Rating| {
-        rating.iso18571.as_ref().map_or(f64::NAN, |iso| iso.rating)
-    };
-    first
-        .rows
-        .iter()
-        .map(|row| {
-            let all = || {
-                comparisons.iter().flat_map(|c| &c.rows).filter(|other| other.method == row.method)
-            };
-            let mean = |of: &dyn Fn(&Row) -> f64| all().map(of).sum::<f64>() / all().count() as f64;
-            Mean {
-                method: row.method.clone(),
-                driven_by: row.driven_by,
-                velocity_l1: mean(&|r| r.velocity_l1),
-                acceleration_l1: mean(&|r| r.acceleration_l1),
-                acceleration_unfiltered_l1: mean(&|r| r.acceleration_unfiltered_l1),
-                velocity_iso18571: mean(&|r| score(&r.velocity)),
-                acceleration_iso18571: mean(&|r| score(&r.acceleration)),
-            }
-        })
-        .collect()
-}
-
-fn print_means(out: &mut dyn Write, document: &Document) -> io::Result<()> {
-    let speeds: Vec<String> =
-        document.comparisons.iter().map(|c| km_per_h(c.speed_m_per_s)).collect();
-    let group = document.comparisons.first().map_or("", |c| &c.group);
-    writeln!(out, "{group}: means over {}, each left out in turn", speeds.join(", "))?;
-    let rows: Vec<Vec<String>> = document
-        .means
-        .iter()
-        .map(|m| {
-            vec![
-                m.method.clone(),
-                m.driven_by.map_or("spring and damper", ForceKind::name).into(),
-                format!("{:.1} %", m.velocity_l1 * 100.0),
-                format!(
-                    "{:.1} % ({:.1})",
-                    m.acceleration_l1 * 100.0,
-                    m.acceleration_unfiltered_l1 * 100.0
-                ),
-                format!("{:.3}", m.velocity_iso18571),
-                format!("{:.3}", m.acceleration_iso18571),
-            ]
-        })
-        .collect();
-    let heading = [
-        "method",
-        "driven by",
-        "velocity",
-        "acceleration",
-        "ISO/TS 18571 velocity",
-        "acceleration",
-    ];
-    output::table(out, &heading, &rows)
-}
-
-/// Comparisons in several trains.
-#[derive(Serialize)]
-struct Trains {
-    trains: Vec<OneTrain>,
-    /// By method, of those that every train has.
-    means: Vec<TrainMean>,
-}
-
-#[derive(Serialize)]
-struct OneTrain {
-    scenario: PathBuf,
-    #[serde(flatten)]
-    comparison: TrainComparison,
-}
-
-/// Means over the trains.
-#[derive(Serialize)]
-struct TrainMean {
-    method: String,
-    mean_velocity_l1: f64,
-    mean_velocity_difference_m_per_s: f64,
-    mean_velocity_share_of_initial: f64,
-    mean_acceleration_l1: f64,
+/// Comparisons at several speeds, and their means by method.
+fn several(comparisons: &[Comparison], options: GlobalOptions) -> Result<(), Failure> {
+    let rows = comparisons.first().map_or(&[][..], |first| &first.rows);
+    let means = rows.iter().map(|row| {
+        let mean = |of: &dyn Fn(&Row) -> f64| compare::mean(comparisons, &row.method, of);
+        let score = |rating: &Rating| score(rating).unwrap_or(f64::NAN);
+        document! {
+            method: &row.method,
+            driven_by: row.driven_by,
+            velocity_l1: mean(&|r| r.velocity_l1),
+            acceleration_l1: mean(&|r| r.acceleration_l1),
+            acceleration_unfiltered_l1: mean(&|r| r.acceleration_unfiltered_l1),
+            velocity_iso18571: mean(&|r| score(&r.velocity)),
+            acceleration_iso18571: mean(&|r| score(&r.acceleration)),
+        }
+    });
+    let means: Vec<_> = means.collect();
+    options.show(&document! { comparisons: comparisons, means: &means }, |out| {
+        for comparison in comparisons {
+            print(out, comparison)?;
+            writeln!(out)?;
+        }
+        let speeds: Vec<String> = comparisons.iter().map(|c| km_per_h(c.speed_m_per_s)).collect();
+        let group = comparisons.first().map_or("", |c| &c.group);
+        writeln!(out, "{group}: means over {}, each left out in turn", speeds.join(", "))?;
+        let table = Table::of(&means)
+            .column("method", |m| m.method)
+            .column("driven by", |m| driven_by(m.driven_by))
+            .column("velocity", |m| format!("{:.1} %", m.velocity_l1 * 100.0))
+            .column("acceleration", |m| {
+                let unfiltered = m.acceleration_unfiltered_l1 * 100.0;
+                format!("{:.1} % ({unfiltered:.1})", m.acceleration_l1 * 100.0)
+            })
+            .column("ISO/TS 18571 velocity", |m| format!("{:.3}", m.velocity_iso18571))
+            .column("acceleration", |m| format!("{:.3}", m.acceleration_iso18571));
+        output::table(out, table)
+    })
 }
 
 /// `compare --train`.
@@ -343,102 +250,80 @@ fn trains(
     let mut trains = Vec::new();
     for path in paths {
         let scenario = scenario::read(path)?;
-        let comparison = compare_train(path, &scenario, settings)?;
-        trains.push(OneTrain { scenario: path.clone(), comparison });
+        trains.push((path, compare_train(path, &scenario, settings)?));
     }
-    bar.end();
-    let mut warned = false;
-    for train in &trains {
-        let of_train = match trains.len() {
-            1 => String::new(),
-            _ => format!("{}: ", train.scenario.display()),
-        };
-        for warning in &train.comparison.warnings {
-            warned = true;
-            options.warn(&format!("{of_train}{warning}"));
-        }
-        for row in &train.comparison.rows {
-            for warning in &row.warnings {
-                warned = true;
-                options.warn(&format!("{of_train}{}: {warning}", row.method));
-            }
-        }
+    drop(bar);
+    let mut outcome = Outcome::Clean;
+    for (path, train) in &trains {
+        let of_train =
+            if trains.len() == 1 { String::new() } else { format!("{}: ", path.display()) };
+        let of_rows = train.rows.iter().flat_map(|row| {
+            row.warnings.iter().map(move |warning| format!("{}: {warning}", row.method))
+        });
+        let warnings = train.warnings.iter().cloned().chain(of_rows);
+        outcome = outcome.max(options.warn_all(warnings.map(|w| format!("{of_train}{w}"))));
     }
-    let document = Trains { means: train_means(&trains), trains };
-    match (&document.trains[..], options.json) {
-        ([one], true) => output::print_json(&one.comparison)?,
-        (_, true) => output::print_json(&document)?,
-        ([one], false) => options.print(|out| print_train(out, &one.comparison))?,
-        (_, false) => options.print(|out| {
-            for train in &document.trains {
-                writeln!(out, "{}", train.scenario.display())?;
-                print_train(out, &train.comparison)?;
-                writeln!(out)?;
-            }
-            print_train_means(out, &document)
-        })?,
+    if let [(_, one)] = &trains[..] {
+        options.show(one, |out| print_train(out, one))?;
+        return Ok(outcome);
     }
-    Ok(if warned { Outcome::Warned } else { Outcome::Clean })
-}
-
-fn train_means(trains: &[OneTrain]) -> Vec<TrainMean> {
-    let Some(first) = trains.first() else { return Vec::new() };
-    let mut means = Vec::new();
-    for row in &first.comparison.rows {
-        let all: Option<Vec<&TrainRow>> = trains
-            .iter()
-            .map(|t| t.comparison.rows.iter().find(|other| other.method == row.method))
-            .collect();
-        let Some(all) = all else { continue };
-        let mean = |of: fn(&TrainRow) -> f64| {
-            all.iter().map(|row| of(row)).sum::<f64>() / all.len() as f64
-        };
-        means.push(TrainMean {
-            method: row.method.clone(),
+    // By method, of those that every train has.
+    let rows = trains.first().map_or(&[][..], |(_, first)| &first.rows);
+    let means = rows.iter().filter_map(|row| {
+        let of_train =
+            trains.iter().map(|(_, train)| train.rows.iter().find(|r| r.method == row.method));
+        let all = of_train.collect::<Option<Vec<&TrainRow>>>()?;
+        let mean =
+            |of: fn(&TrainRow) -> f64| all.iter().map(|r| of(r)).sum::<f64>() / all.len() as f64;
+        Some(document! {
+            method: &row.method,
             mean_velocity_l1: mean(|r| r.mean_velocity_l1),
             mean_velocity_difference_m_per_s: mean(|r| r.mean_velocity_difference_m_per_s),
             mean_velocity_share_of_initial: mean(|r| r.mean_velocity_share_of_initial),
             mean_acceleration_l1: mean(|r| r.mean_acceleration_l1),
-        });
-    }
-    means
-}
-
-fn print_train_means(out: &mut dyn Write, document: &Trains) -> io::Result<()> {
-    writeln!(out, "means over {} trains", document.trains.len())?;
-    let row = |m: &TrainMean| {
-        vec![
-            m.method.clone(),
-            format!("{:.1} %", m.mean_velocity_l1 * 100.0),
-            format!("{:.3} m/s", m.mean_velocity_difference_m_per_s),
-            format!("{:.1} %", m.mean_velocity_share_of_initial * 100.0),
-            format!("{:.0} %", m.mean_acceleration_l1 * 100.0),
-        ]
-    };
-    let rows: Vec<Vec<String>> = document.means.iter().map(row).collect();
-    output::table(
-        out,
-        &["method", "velocity", "difference", "of the first speed", "acceleration"],
-        &rows,
-    )
+        })
+    });
+    let means: Vec<_> = means.collect();
+    let documents = trains.iter().map(|(path, comparison)| {
+        document! { scenario: path, #[serde(flatten)] comparison: comparison }
+    });
+    let document = document! { trains: documents.collect::<Vec<_>>(), means: &means };
+    options.show(&document, |out| {
+        for (path, train) in &trains {
+            writeln!(out, "{}", path.display())?;
+            print_train(out, train)?;
+            writeln!(out)?;
+        }
+        writeln!(out, "means over {} trains", trains.len())?;
+        let share = |share: f64| format!("{:.1} %", share * 100.0);
+        let table = Table::of(&means)
+            .column("method", |m| m.method)
+            .column("velocity", |m| share(m.mean_velocity_l1))
+            .column("difference", |m| format!("{:.3} m/s", m.mean_velocity_difference_m_per_s))
+            .column("of the first speed", |m| share(m.mean_velocity_share_of_initial))
+            .column("acceleration", |m| format!("{:.0} %", m.mean_acceleration_l1 * 100.0));
+        output::table(out, table)
+    })?;
+    Ok(outcome)
 }
 
 /// Crush and work between the vehicles, by method.
 fn print_crush(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<()> {
     let Some(first) = comparison.rows.first() else { return Ok(()) };
     writeln!(out, "\nlargest crush between vehicles, work of the forces in brackets")?;
-    let metres = |m: Option<f64>| m.map_or("-".into(), |m| format!("{m:.4} m"));
-    let mut rows = vec![vec!["fe".to_string()]];
-    rows[0].extend(first.interfaces.iter().map(|i| metres(i.fe_crush_m)));
-    for row in &comparison.rows {
-        let mut cells = vec![row.method.clone()];
-        let cell = |crush_m: f64, work_j: f64| format!("{crush_m:.4} m ({:.3} MJ)", work_j / 1e6);
-        cells.extend(row.interfaces.iter().map(|i| cell(i.crush_m, i.work_j)));
-        rows.push(cells);
-    }
-    let mut heading = vec!["method"];
-    heading.extend(first.interfaces.iter().map(|i| i.interface.as_str()));
-    output::table(out, &heading, &rows)
+    // FE's row comes first.
+    let rows = std::iter::once(None).chain(comparison.rows.iter().map(Some));
+    let methods = Table::of(rows).column("method", |row| row.map_or("fe", |row| &row.method));
+    let table = first.interfaces.iter().enumerate().fold(methods, |table, (k, interface)| {
+        table.column(&interface.interface, |row| match row {
+            None => interface.fe_crush_m.map_or("-".into(), |m| format!("{m:.4} m")),
+            Some(row) => {
+                let (crush_m, work_j) = (row.interfaces[k].crush_m, row.interfaces[k].work_j);
+                format!("{crush_m:.4} m ({:.3} MJ)", work_j / 1e6)
+            }
+        })
+    });
+    output::table(out, table)
 }
 
 /// Rows of the table of speeds.
@@ -452,55 +337,41 @@ fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
         "velocity errors up to {:.1} ms, accelerations (CFC 60) in brackets{fe_time}",
         comparison.until_s * 1e3
     )?;
-    let rows: Vec<Vec<String>> = comparison
-        .rows
-        .iter()
-        .map(|row| {
-            let cell = |v: f64, a: f64| format!("{:.1} % ({:.0})", v * 100.0, a * 100.0);
-            let mut cells = vec![
-                row.method.clone(),
-                row.driven_by.clone(),
-                cell(row.mean_velocity_l1, row.mean_acceleration_l1),
-                format!(
-                    "{:.3} m/s, {:.1} %",
-                    row.mean_velocity_difference_m_per_s,
-                    row.mean_velocity_share_of_initial * 100.0
-                ),
-            ];
-            cells.extend(row.vehicles.iter().map(|v| cell(v.velocity_l1, v.acceleration_l1)));
-            let speeds: Vec<String> = row
-                .interface_speeds_m_per_s
-                .iter()
-                .map(|(name, v)| format!("{name} {}", v.map_or("-".into(), km_per_h)))
-                .collect();
-            cells.push(speeds.join(", "));
-            cells
-        })
-        .collect();
-    let mut heading = vec!["method", "driven by", "mean", "mean, of initial speed"];
-    heading.extend(vehicles.iter().map(|v| v.as_str()));
-    heading.push("curves at");
-    output::table(out, &heading, &rows)?;
+    let cell = |v: f64, a: f64| format!("{:.1} % ({:.0})", v * 100.0, a * 100.0);
+    let mut table = Table::of(&comparison.rows)
+        .column("method", |row| &row.method)
+        .column("driven by", |row| &row.driven_by)
+        .column("mean", |row| cell(row.mean_velocity_l1, row.mean_acceleration_l1))
+        .column("mean, of initial speed", |row| {
+            let share = row.mean_velocity_share_of_initial * 100.0;
+            format!("{:.3} m/s, {share:.1} %", row.mean_velocity_difference_m_per_s)
+        });
+    for (k, vehicle) in vehicles.iter().enumerate() {
+        let of =
+            |row: &&TrainRow| cell(row.vehicles[k].velocity_l1, row.vehicles[k].acceleration_l1);
+        table = table.column(*vehicle, of);
+    }
+    table = table.column("curves at", |row| {
+        let speed = |(name, v): (&String, &Option<f64>)| {
+            format!("{name} {}", v.map_or("-".into(), km_per_h))
+        };
+        row.interface_speeds_m_per_s.iter().map(speed).collect::<Vec<_>>().join(", ")
+    });
+    output::table(out, table)?;
     print_crush(out, comparison)?;
-    let times: Vec<String> = comparison
-        .rows
-        .iter()
-        .map(|row| format!("{} {:.2} ms", row.method, row.simulation_time_s * 1e3))
-        .collect();
+    let time = |row: &TrainRow| format!("{} {:.2} ms", row.method, row.simulation_time_s * 1e3);
+    let times: Vec<String> = comparison.rows.iter().map(time).collect();
     writeln!(out, "time for curves and run: {}", times.join(", "))?;
     writeln!(out, "\nspeeds in m/s")?;
     let step = comparison.time_s.len().div_ceil(SPEED_ROWS).max(1);
-    let columns = |of: &BTreeMap<String, Vec<f64>>, i: usize| {
+    let speeds = |of: &BTreeMap<String, Vec<f64>>, i: usize| {
         vehicles.iter().map(|v| format!("{:.2}", of[*v][i])).collect::<Vec<_>>().join(" ")
     };
-    let mut rows = Vec::new();
-    for i in (0..comparison.time_s.len()).step_by(step) {
-        let mut cells = vec![format!("{:.1} ms", comparison.time_s[i] * 1e3)];
-        cells.push(columns(&comparison.fe, i));
-        cells.extend(comparison.rows.iter().map(|row| columns(&row.velocities, i)));
-        rows.push(cells);
+    let mut table = Table::of((0..comparison.time_s.len()).step_by(step))
+        .column("time", |i| format!("{:.1} ms", comparison.time_s[*i] * 1e3))
+        .column("fe", |i| speeds(&comparison.fe, *i));
+    for row in &comparison.rows {
+        table = table.column(&row.method, |i| speeds(&row.velocities, *i));
     }
-    let mut heading = vec!["time", "fe"];
-    heading.extend(comparison.rows.iter().map(|row| row.method.as_str()));
-    output::table(out, &heading, &rows)
+    output::table(out, table)
 }

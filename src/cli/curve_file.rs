@@ -78,8 +78,7 @@ impl Reading {
 impl CurveFile {
     /// Whether any of the options is given.
     pub(super) fn is_asked(&self) -> bool {
-        let is_number = self.other_mass.is_some() || self.unloading.is_some();
-        self.kind.is_some() || is_number || self.accept_energy || self.reading.is_asked()
+        self.settings() != Settings::default()
     }
 
     /// The given options, and defaults for the rest.

@@ -17,12 +17,13 @@ use crate::report::{MethodSpeeds, ReportSettings, report};
 use crate::scenario;
 use crate::surrogate::leave_one_out::Validation;
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
+use crate::table::Table;
 use crate::unit::{M_PER_S_PER_KM_PER_H, Shown, km_per_h};
 use include_dir::{Dir, include_dir};
-use serde::Serialize;
 
-use super::output;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, progress};
+use super::progress::Bar;
+use super::validate::print_validation;
+use super::{CommandResult, Failure, GlobalOptions, output, usage};
 
 /// Run the whole workflow on bundled FE runs: database, models, prediction, multi-body run, exports
 #[derive(clap::Args)]
@@ -57,57 +58,24 @@ const REPORTED: [&str; 2] = [SCENARIO, "en15227-identical-units.toml"];
 const MODELS: [(&str, &str); 3] =
     [(GROUP, "lead.model"), ("lead-car-pair", "pair.model"), ("vehicle-pair", "vehicle.model")];
 
-#[derive(Serialize)]
-struct Document {
-    cases: Vec<CaseLine>,
-    validations: Vec<Validation>,
-    prediction: Prediction,
-    files: Vec<String>,
-    #[serde(skip)]
-    folder: String,
-    seconds: f64,
-}
-
-#[derive(Serialize)]
-struct CaseLine {
-    group: String,
-    speed_m_per_s: f64,
-    #[serde(rename = "peak_force_N")]
-    peak_force_n: f64,
-    max_deflection_m: f64,
-    work_over_energy: f64,
-}
-
-#[derive(Serialize)]
-struct Prediction {
-    model: String,
-    speed_m_per_s: f64,
-    #[serde(rename = "peak_force_N")]
-    peak_force_n: f64,
-    max_deflection_m: f64,
-    energy_over_kinetic: f64,
-    simulated_max_crush_m: f64,
-    simulated_energy_error: f64,
-}
-
 /// What the flow makes on its way.
 struct Flow<'a> {
     folder: &'a Path,
-    bar: progress::Bar,
+    bar: Bar,
     files: Vec<PathBuf>,
 }
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let start = Instant::now();
     if let Some(edited) = edited_scenario(&args.output).filter(|_| !options.overwrite) {
-        return Err(Failure::Usage(format!(
+        return usage(format!(
             "{} exists and differs from what the demo writes: name another folder with -o, or replace it with --overwrite",
             edited.display()
-        )));
+        ));
     }
     let mut flow = Flow {
         folder: &args.output,
-        bar: progress::Bar::new(options, "writing the FE runs"),
+        bar: Bar::new(options, "writing the FE runs"),
         files: Vec::new(),
     };
     flow.unpack()?;
@@ -118,33 +86,61 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let curve = flow.predict(model)?;
     let run = flow.simulate()?;
     flow.report(&database, &models)?;
-    let Flow { bar, files, .. } = flow;
-    bar.end();
-    let document = Document {
-        cases: cases(&database).map(|(group, case)| case_line(group, case)).collect(),
-        validations,
-        prediction: Prediction {
-            model: curve.model.clone(),
+    let files = flow.files;
+    drop(flow.bar);
+    let seconds = start.elapsed().as_secs_f64();
+    let (peak_n, crush_m) = (curve.peak_force_n(), run.interfaces[0].max_deflection_m);
+    let runs = cases(&database).map(|(group, case)| {
+        document! {
+            group: group,
+            speed_m_per_s: case.conditions.speed.m_per_s,
+            peak_force_N: case.peak_force_n(),
+            max_deflection_m: case.max_deflection_m(),
+            work_over_energy: case.quality.audit.ratio(),
+        }
+    });
+    let document = document! {
+        cases: runs.collect::<Vec<_>>(),
+        validations: &validations,
+        prediction: document! {
+            model: &curve.model,
             speed_m_per_s: curve.speed_m_per_s,
-            peak_force_n: curve.force_n.iter().copied().fold(0.0, f64::max),
+            peak_force_N: peak_n,
             max_deflection_m: curve.max_deflection_m,
             energy_over_kinetic: curve.provenance.energy_over_kinetic,
-            simulated_max_crush_m: run.interfaces[0].max_deflection_m,
+            simulated_max_crush_m: crush_m,
             simulated_energy_error: run.ledger.max_energy_error,
         },
-        files: files.iter().map(|p| p.display().to_string()).collect(),
-        folder: args.output.display().to_string(),
-        seconds: start.elapsed().as_secs_f64(),
+        files: files.iter().map(|p| p.display().to_string()).collect::<Vec<_>>(),
+        seconds: seconds,
     };
-    for warning in &curve.warnings {
-        options.warn(&warning.to_string());
-    }
-    if options.json {
-        output::print_json(&document)?;
-    } else {
-        options.print(|out| print(out, &document, options.verbose))?;
-    }
-    Ok(if curve.warnings.is_empty() { Outcome::Clean } else { Outcome::Warned })
+    let outcome = options.warn_all(&curve.warnings);
+    options.show(&document, |out| {
+        print_runs(out, &database)?;
+        writeln!(out)?;
+        for validation in &validations {
+            print_validation(out, validation, options)?;
+            writeln!(out)?;
+        }
+        writeln!(
+            out,
+            "{GROUP} at {} by the model {}: peak force {}, max crush {:.4} m, energy {:.1} %; crush in the multi-body run {crush_m:.4} m\n",
+            km_per_h(curve.speed_m_per_s),
+            curve.model,
+            Shown::force(peak_n).text(peak_n),
+            curve.max_deflection_m,
+            curve.provenance.energy_over_kinetic * 100.0,
+        )?;
+        if options.verbose {
+            files.iter().try_for_each(|file| writeln!(out, "wrote {}", file.display()))?;
+        }
+        let (files, folder) = (files.len(), args.output.display());
+        writeln!(
+            out,
+            "wrote {files} files into {folder} in {seconds:.1} s; open {folder}/report.html"
+        )
+    })?;
+    Ok(outcome)
 }
 
 impl Flow<'_> {
@@ -236,9 +232,7 @@ impl Flow<'_> {
         let prepared = scenario::load(&path)?;
         Ok(prepared.run()?)
     }
-}
 
-impl Flow<'_> {
     /// The page about all of it; the models spare a second validation.
     fn report(&mut self, database: &Database, models: &[Model]) -> Result<(), Failure> {
         let settings = ReportSettings {
@@ -258,7 +252,6 @@ impl Flow<'_> {
     }
 }
 
-/// Writes the bundled files of a folder and all below it.
 /// Maximum number of bytes of a scenario that is compared with the bundled one.
 const MAX_SCENARIO: u64 = 1 << 20;
 
@@ -270,6 +263,7 @@ fn edited_scenario(folder: &Path) -> Option<PathBuf> {
     there.find(|(found, _, own)| found != own).map(|(_, path, _)| path)
 }
 
+/// Writes the bundled files of a folder and all below it.
 fn extract(bundled: &Dir, target: &Path) -> Result<(), Error> {
     let folder = target.join(bundled.path());
     std::fs::create_dir_all(&folder).map_err(|e| not_written(&folder, e))?;
@@ -283,60 +277,14 @@ fn cases(database: &Database) -> impl Iterator<Item = (&str, &Case)> {
     database.groups().flat_map(|g| database.cases(g).iter().map(move |c| (g, c)))
 }
 
-fn case_line(group: &str, case: &Case) -> CaseLine {
-    CaseLine {
-        group: group.into(),
-        speed_m_per_s: case.conditions.speed.m_per_s,
-        peak_force_n: case.peak_force_n(),
-        max_deflection_m: case.max_deflection_m(),
-        work_over_energy: case.quality.audit.ratio(),
-    }
-}
-
-fn print(out: &mut dyn Write, document: &Document, verbose: bool) -> io::Result<()> {
-    let largest_n = document.cases.iter().map(|case| case.peak_force_n).fold(0.0, f64::max);
+fn print_runs(out: &mut dyn Write, database: &Database) -> io::Result<()> {
+    let largest_n = cases(database).map(|(_, case)| case.peak_force_n()).fold(0.0, f64::max);
     let force = Shown::force(largest_n);
-    let rows: Vec<Vec<String>> = document
-        .cases
-        .iter()
-        .map(|case| {
-            vec![
-                case.group.clone(),
-                km_per_h(case.speed_m_per_s),
-                force.text(case.peak_force_n),
-                format!("{:.4} m", case.max_deflection_m),
-                format!("{:.3}", case.work_over_energy),
-            ]
-        })
-        .collect();
-    output::table(out, &["FE run", "speed", "peak force", "max crush", "W/E"], &rows)?;
-    writeln!(out)?;
-    for validation in &document.validations {
-        if verbose {
-            super::validate::print_means(out, validation)?;
-        } else {
-            super::validate::print_summary(out, validation)?;
-        }
-        writeln!(out)?;
-    }
-    let p = &document.prediction;
-    writeln!(
-        out,
-        "{GROUP} at {} by the model {}: peak force {}, max crush {:.4} m, energy {:.1} %; crush in the multi-body run {:.4} m\n",
-        km_per_h(p.speed_m_per_s),
-        p.model,
-        Shown::force(p.peak_force_n).text(p.peak_force_n),
-        p.max_deflection_m,
-        p.energy_over_kinetic * 100.0,
-        p.simulated_max_crush_m,
-    )?;
-    if verbose {
-        document.files.iter().try_for_each(|file| writeln!(out, "wrote {file}"))?;
-    }
-    let (files, folder) = (document.files.len(), &document.folder);
-    writeln!(
-        out,
-        "wrote {files} files into {folder} in {:.1} s; open {folder}/report.html",
-        document.seconds
-    )
+    let runs = Table::of(cases(database))
+        .column("FE run", |(group, _)| *group)
+        .column("speed", |(_, case)| km_per_h(case.conditions.speed.m_per_s))
+        .column("peak force", |(_, case)| force.text(case.peak_force_n()))
+        .column("max crush", |(_, case)| format!("{:.4} m", case.max_deflection_m()))
+        .column("W/E", |(_, case)| format!("{:.3}", case.quality.audit.ratio()));
+    output::table(out, runs)
 }

@@ -9,12 +9,12 @@ use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{PredictedCurve, Query};
 use crate::unit::UnitSystem;
 
-use super::arguments::{self, MAX_CRUSH_RULES, one_of};
+use super::arguments::{self, FORCES, MAX_CRUSH_RULES, one_of, units};
 use super::curve_file::CurveFile;
-use super::export_input::{Chosen, Curves, Input};
-use super::export_output::Destination;
-use super::output::{self, ListedFormat};
-use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input};
+use super::export_input::Input;
+use super::{
+    CommandResult, Failure, GlobalOptions, export_output, keep_input, output, usage, usage_error,
+};
 
 /// Write curves, recorded cases or a model for another tool
 #[derive(clap::Args)]
@@ -46,40 +46,40 @@ pub(super) struct Args {
     #[arg(short, long)]
     output: Option<PathBuf>,
     #[command(flatten)]
-    which: Which,
+    pub which: Which,
     #[command(flatten)]
     target: Target,
     /// Units of a measured or legacy curve's file if it does not state them
     #[arg(long, value_parser = units)]
-    input_units: Option<UnitSystem>,
+    pub input_units: Option<UnitSystem>,
     #[command(flatten, next_help_heading = "Measured and legacy curves")]
-    file: CurveFile,
+    pub file: CurveFile,
 }
 
 /// Which curves of a model or database.
 #[derive(clap::Args)]
-struct Which {
+pub(super) struct Which {
     /// Speeds of a model's curves, of a database's cases, or of a measured curve, with units; repeated or separated by commas
     #[arg(long, value_parser = arguments::speed, value_delimiter = ',', allow_hyphen_values = true)]
-    speed: Vec<f64>,
+    pub speed: Vec<f64>,
     /// Mass of a model's body, or of each body of a pair, with its unit (default: the training runs')
     #[arg(long, value_parser = arguments::mass, allow_hyphen_values = true)]
-    mass: Option<f64>,
+    pub mass: Option<f64>,
     /// Rule for a model's maximum crush [default: the model's own]
     #[arg(long, value_parser = one_of(MAX_CRUSH_RULES))]
-    max_crush: Option<MaxCrushRule>,
+    pub max_crush: Option<MaxCrushRule>,
     /// Allow speeds outside a model's training speeds by more than a third of their range
     #[arg(long)]
-    extrapolate: bool,
+    pub extrapolate: bool,
     /// Value of a model's further parameter, as NAME=VALUE; may be repeated
     #[arg(long, value_parser = arguments::parameter, value_name = "NAME=VALUE")]
-    parameter: Vec<(String, Parameter)>,
+    pub parameter: Vec<(String, Parameter)>,
     /// Group of a database (default: the only one)
     #[arg(long)]
-    group: Option<String>,
+    pub group: Option<String>,
     /// Case of the group (default: all); may be repeated
     #[arg(long)]
-    case: Vec<String>,
+    pub case: Vec<String>,
 }
 
 /// The target's format and what it leaves open.
@@ -111,16 +111,6 @@ pub(super) struct Target {
     deck: bool,
 }
 
-/// Forces of a curve.
-pub(super) const FORCES: &[(&str, ForceKind, &str)] = &[
-    ("body", ForceKind::Body, "The force that drives a body of one mass"),
-    (
-        "contact",
-        ForceKind::Contact,
-        "The force on the obstacle: for bodies whose crush zone is a separate mass",
-    ),
-];
-
 /// What a curve does beyond its maximum crush.
 const TAILS: &[(&str, Tail, &str)] = &[
     ("none", Tail::None, "Nothing: the last point is the maximum crush"),
@@ -139,10 +129,6 @@ const MATERIALS: &[(&str, Material, &str)] = &[
     ("s06", Material::S06, "*MAT_SPRING_GENERAL_NONLINEAR: unloads along a curve"),
 ];
 
-pub(super) fn units(text: &str) -> Result<UnitSystem, String> {
-    UnitSystem::parse(text).map_err(|e| e.to_string())
-}
-
 impl Target {
     /// The format by `--to`, else by the extension of the file.
     pub(super) fn format(&self, path: Option<&Path>) -> Result<&'static Format, Failure> {
@@ -150,13 +136,13 @@ impl Target {
             (Some(name), _) => formats::by_name(name),
             (None, Some(path)) => formats::by_extension(path),
             (None, None) => {
-                return Err(Failure::Usage(format!(
+                return usage(format!(
                     "name the format with --to ({}) or by the extension of -o",
                     formats::names()
-                )));
+                ));
             }
         };
-        found.map_err(|e: Error| Failure::Usage(e.to_string()))
+        found.map_err(|e: Error| usage_error(e))
     }
 
     /// The options for a file at `path`.
@@ -200,7 +186,7 @@ impl Target {
         }
         format.export(curves, &self.options(path)).map_err(|error| {
             if self.force.is_none() && error.is_about("force") {
-                Failure::Usage("the curve has no force that drives a body of one mass (its runs record no velocities): use --force contact to export the force on the obstacle".into())
+                usage_error("the curve has no force that drives a body of one mass (its runs record no velocities): use --force contact to export the force on the obstacle")
             } else {
                 error.into()
             }
@@ -220,7 +206,7 @@ impl Target {
             if is_asked && is_of_none(takes) {
                 let those: Vec<&str> =
                     FORMATS.iter().filter(|f| takes(f)).map(|f| f.name).collect();
-                return Err(Failure::Usage(format!("{option} is for {}", those.join(", "))));
+                return usage(format!("{option} is for {}", those.join(", ")));
             }
         }
         Ok(())
@@ -231,11 +217,11 @@ impl Target {
         let of_curves = self.units.is_some() || self.soften;
         let forced = self.force.is_some() && !format.over_speeds;
         if of_curves || forced {
-            Err(Failure::Usage(format!(
+            usage(format!(
                 "{} holds a whole model in SI: remove --units and --soften{}",
                 format.name,
                 if forced { " and --force: it holds the recipe's force" } else { "" }
-            )))
+            ))
         } else {
             Ok(())
         }
@@ -244,7 +230,8 @@ impl Target {
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let Some(path) = args.input.as_ref().filter(|_| !args.list) else {
-        return list(options);
+        let listed = FORMATS.iter().map(|f| (f.name, f.extensions, f.description));
+        return output::formats(listed, options);
     };
     let output = args.output.as_deref().filter(|path| !super::is_stdout(path));
     let format = args.target.format(output)?;
@@ -254,11 +241,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     args.target.check(&[format])?;
     let input = Input::read(path)?;
     let (exported, warnings) = export(args, format, &input, output)?;
-    for warning in &warnings {
-        options.warn(warning);
-    }
-    Destination { output, format, warnings: &warnings }.write(exported, options)?;
-    Ok(if warnings.is_empty() { Outcome::Clean } else { Outcome::Warned })
+    let outcome = options.warn_all(&warnings);
+    export_output::write(&exported, format, output, &warnings, options)?;
+    Ok(outcome)
 }
 
 /// The files, and the warnings of the curves.
@@ -268,43 +253,28 @@ fn export(
     input: &Input,
     output: Option<&Path>,
 ) -> Result<(Exported, Vec<String>), Failure> {
-    let Which { speed, mass, max_crush, extrapolate, parameter, group, case } = &args.which;
-    let chosen = Chosen {
-        speeds_m_per_s: speed,
-        query: Query {
-            mass_kg: *mass,
-            rule: *max_crush,
-            extrapolate: *extrapolate,
-            parameters: parameter.iter().cloned().collect(),
-            ..Query::at(0.0)
-        },
-        group: group.as_deref(),
-        cases: case,
-        file: &args.file,
-        input_units: args.input_units,
-    };
-    input.check_said(&chosen)?;
+    input.check_said(args)?;
     if format.takes_model() {
         args.target.check_for_model(format)?;
-        chosen.check_for_model(format.over_speeds)?;
+        args.which.check_for_model(format.over_speeds)?;
         let model = input.model(format.name)?;
         let mut options = args.target.options(output);
-        options.speeds_m_per_s = speed.clone();
-        options.query = chosen.query;
+        options.speeds_m_per_s.clone_from(&args.which.speed);
+        options.query = args.which.query();
         let mut exported = format.export_model(model, &options)?;
         let warnings = std::mem::take(&mut exported.warnings);
         return Ok((exported, warnings));
     }
     if format.takes_case() {
-        let cases = input.cases(&chosen, format.name)?;
+        let cases = input.cases(args, format.name)?;
         if let (Some(force), Some(case)) = (args.target.force, cases.first())
             && force != case.curves.force_kind
         {
-            return Err(Failure::Usage(format!(
+            return usage(format!(
                 "{} holds a case's histories, which are of the {} force: remove --force",
                 format.name,
                 case.curves.force_kind.name()
-            )));
+            ));
         }
         let mut exported = format.export_cases(&cases, &args.target.options(output))?;
         if let (Input::File(_), Some(case)) = (input, cases.into_iter().next()) {
@@ -313,17 +283,18 @@ fn export(
         }
         return Ok((exported, Vec::new()));
     }
-    export_curves(args, format, (input, &chosen), output)
+    export_curves(args, format, input, output)
 }
 
 /// The same for a format that is made of curves.
 fn export_curves(
     args: &Args,
     format: &Format,
-    (input, chosen): (&Input, &Chosen<'_>),
+    input: &Input,
     output: Option<&Path>,
 ) -> Result<(Exported, Vec<String>), Failure> {
-    let Curves { inputs: mut curves, notes, mut warnings } = input.curves(chosen)?;
+    let (mut curves, quality) = input.curves(args)?;
+    let (notes, mut warnings) = quality.map_or_else(Default::default, |q| (q.notes, q.warnings));
     if let (Input::Curve(curve), true, None) =
         (input, format.holds_both_forces(), args.target.force)
     {
@@ -338,14 +309,4 @@ fn export_curves(
     let mut exported = args.target.export(format, &curves, output)?;
     exported.notes.splice(0..0, notes);
     Ok((exported, warnings))
-}
-
-fn list(options: GlobalOptions) -> CommandResult {
-    let listed = FORMATS.iter().map(|f| ListedFormat {
-        name: f.name,
-        extensions: f.extensions,
-        description: f.description,
-    });
-    output::formats(listed.collect(), options)?;
-    Ok(Outcome::Clean)
 }

@@ -3,6 +3,7 @@
 use std::io::Read;
 use std::path::Path;
 
+use crate::error::error;
 use crate::file;
 
 use super::Failure;
@@ -33,7 +34,7 @@ impl FileKind {
         let mut head = Vec::new();
         file::open(path)
             .and_then(|f| f.take(HEAD).read_to_end(&mut head))
-            .map_err(|e| Failure::Failed(format!("{}: {e}", path.display()).into()))?;
+            .map_err(|e| error!(CurveFile, "{path}: {e}", path = path.display()).caused_by(e))?;
         if head.starts_with(HDF5) {
             return Ok(Self::Database);
         }

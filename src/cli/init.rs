@@ -4,16 +4,15 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::file::write_whole;
-use crate::init::{
-    self, GivenForce, Proposal, Proposed, ProposedRun, Request, ScenarioProposal, UserHints,
-};
+use crate::init::{self, GivenForce, Proposal, Proposed, Request, UserHints};
+use crate::plural::counted;
 use crate::study::StudyKind;
+use crate::table::Table;
 use crate::unit::{Shown, UnitSystem, km_per_h};
-use serde::Serialize;
 
 use super::arguments;
-use super::output;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, progress};
+use super::progress::Bar;
+use super::{CommandResult, GlobalOptions, Outcome, is_stdout, output};
 
 /// Examine run folders and write a commented study; or write a scenario for models
 #[derive(clap::Args)]
@@ -45,7 +44,7 @@ pub(super) struct Args {
 #[group(id = "known", multiple = true, conflicts_with = "scenario")]
 struct GivenArgs {
     /// Units of the solver files, such as mm-t-s
-    #[arg(long, value_parser = |text: &str| UnitSystem::parse(text))]
+    #[arg(long, value_parser = arguments::units)]
     units: Option<UnitSystem>,
     /// Kind of impact
     #[arg(long, value_parser = arguments::one_of(KINDS))]
@@ -78,63 +77,31 @@ const KINDS: &[(&str, StudyKind, &str)] = &[
     ("pair", StudyKind::Pair, "Two bodies"),
 ];
 
-#[derive(Serialize)]
-struct Document<'a> {
-    /// The file that was written; null for standard output.
-    study: Option<String>,
-    /// Whether crumple build takes it as it is.
-    complete: bool,
-    /// What is left to fill in.
-    fill_in: Vec<String>,
-    #[serde(flatten)]
-    proposal: &'a Proposal,
-}
-
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let default = if args.scenario { "scenario.toml" } else { "study.toml" };
     let output = args.output.clone().unwrap_or_else(|| default.into());
-    let to_stdout = is_stdout(&output);
-    if to_stdout && options.json {
-        let message = "-o - and --json both write to standard output: give one of them";
-        return Err(Failure::Usage(message.into()));
-    }
-    if !to_stdout {
+    if !options.on_stdout([&output])? {
         init::refuse_existing(&output)?;
     }
     if args.scenario { scenario(args, &output, options) } else { study(args, &output, options) }
-}
-
-#[derive(Serialize)]
-struct ScenarioDocument<'a> {
-    scenario: String,
-    #[serde(flatten)]
-    proposal: &'a ScenarioProposal,
 }
 
 fn scenario(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
     let place = if is_stdout(output) { Path::new("scenario.toml") } else { output };
     let proposal = init::propose_scenario(&args.inputs, place)?;
     let text = proposal.to_toml();
-    for what in &proposal.missing {
-        options.warn(&format!("fill in {what}"));
-    }
+    let outcome = options.warn_all(proposal.missing.iter().map(|what| format!("fill in {what}")));
     if is_stdout(output) {
         output::print_data(|out| out.write_all(text.as_bytes()))?;
-    } else {
-        write_whole(output, text.as_bytes())?;
-        let scenario = output.display().to_string();
-        if options.json {
-            output::print_json(&ScenarioDocument { scenario, proposal: &proposal })?;
-        } else {
-            options.print(|out| {
-                writeln!(
-                    out,
-                    "wrote {scenario}: put in your trains, then run crumple simulate {scenario}"
-                )
-            })?;
-        }
+        return Ok(outcome);
     }
-    Ok(if proposal.missing.is_empty() { Outcome::Clean } else { Outcome::Warned })
+    write_whole(output, text.as_bytes())?;
+    let scenario = output.display().to_string();
+    let document = document! { scenario: &scenario, #[serde(flatten)] proposal: &proposal };
+    options.show(&document, |out| {
+        writeln!(out, "wrote {scenario}: put in your trains, then run crumple simulate {scenario}")
+    })?;
+    Ok(outcome)
 }
 
 fn study(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
@@ -156,38 +123,37 @@ fn study(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
             group: known.group.clone(),
         },
     };
-    let bar = progress::Bar::new(options, "examining runs");
+    let bar = Bar::new(options, "examining runs");
     let done = AtomicUsize::new(0);
     let proposal = init::propose(&request, |name| {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         bar.step(&format!("{done} runs examined, last {name}"));
-    });
-    bar.end();
-    let proposal = proposal?;
+    })?;
+    drop(bar);
     let text = proposal.to_toml();
     if !is_stdout(output) {
         // Another may have come there while the runs were read.
         init::refuse_existing(output)?;
         write_whole(output, text.as_bytes())?;
     }
-    let missing = proposal.missing();
-    for warning in warnings(&proposal) {
-        options.warn(&warning);
-    }
+    let outcome = options
+        .warn_all(warnings(&proposal))
+        .max(Outcome::warned_if(!proposal.left_out.is_empty()));
     if is_stdout(output) {
         output::print_data(|out| out.write_all(text.as_bytes()))?;
-    } else if options.json {
-        output::print_json(&Document {
-            study: Some(output.display().to_string()),
-            complete: missing.is_empty(),
-            fill_in: missing.clone(),
-            proposal: &proposal,
-        })?;
-    } else {
-        options.print(|out| print(out, &proposal, output))?;
+        return Ok(outcome);
     }
-    let is_clean = warnings(&proposal).is_empty() && proposal.left_out.is_empty();
-    Ok(if is_clean { Outcome::Clean } else { Outcome::Warned })
+    let missing = proposal.missing();
+    let document = document! {
+        study: output.display().to_string(),
+        // Whether crumple build takes it as it is, and what is left to fill in.
+        complete: missing.is_empty(),
+        fill_in: missing,
+        #[serde(flatten)]
+        proposal: &proposal,
+    };
+    options.show(&document, |out| print(out, &proposal, output))?;
+    Ok(outcome)
 }
 
 /// Everything that the user should look at.
@@ -205,59 +171,51 @@ fn print(out: &mut dyn std::io::Write, proposal: &Proposal, output: &Path) -> st
         writeln!(out, "{key:<11} {value} ({from})")?;
     }
     writeln!(out)?;
-    let rows: Vec<Vec<String>> = proposal.runs.iter().map(row).collect();
-    output::table(out, &["run", "speed", "mass", "max crush (m)", "states"], &rows)?;
+    let known = |value: Option<String>| value.unwrap_or_else(|| "?".into());
+    let runs = Table::of(&proposal.runs)
+        .column("run", |run| &run.name)
+        .column("speed", |run| known(run.speed_m_per_s.value().map(|v| km_per_h(*v))))
+        .column("mass", |run| known(run.mass_kg.value().map(|kg| Shown::one_mass(*kg))))
+        .column("max crush (m)", |run| known(run.crush_m.map(|m| format!("{m:.3}"))))
+        .column("states", |run| run.states.to_string());
+    output::table(out, runs)?;
     for note in &proposal.notes {
         writeln!(out, "note: {note}")?;
     }
     for left_out in &proposal.left_out {
         writeln!(out, "left out: {}: {}", left_out.path.display(), left_out.message)?;
     }
-    let runs = output::counted(proposal.runs.len(), "run");
+    let runs = counted(proposal.runs.len(), "run");
     let next = match proposal.missing().len() {
         0 => "check the guessed values, then run crumple build".into(),
         lines => format!(
             "incomplete, {} to fill in or to give as an option; then run crumple build",
-            output::counted(lines, "line")
+            counted(lines, "line")
         ),
     };
     writeln!(out, "wrote {} ({runs}): {next}", output.display())
 }
 
 /// What the runs share: key, value, where it is from in a word.
-fn chosen(proposal: &Proposal) -> Vec<(&'static str, String, &'static str)> {
-    fn said<T>(proposed: &Proposed<T>, shown: impl Fn(&T) -> String) -> (String, &'static str) {
+fn chosen(proposal: &Proposal) -> [(&'static str, String, &'static str); 7] {
+    fn described<T>(
+        key: &'static str,
+        proposed: &Proposed<T>,
+        shown: impl Fn(&T) -> String,
+    ) -> (&'static str, String, &'static str) {
         match proposed {
-            Proposed::Found { value, evidence } => (shown(value), evidence.word()),
-            Proposed::Missing { .. } => ("?".into(), "fill in"),
+            Proposed::Found { value, evidence } => (key, shown(value), evidence.word()),
+            Proposed::Missing { .. } => (key, "?".into(), "fill in"),
         }
     }
-    let kind = |kind: &StudyKind| {
-        if proposal.half_model {
-            format!("{} (half model)", kind.name())
-        } else {
-            kind.name().to_string()
-        }
-    };
-    let all = [
-        ("group", said(&proposal.group, String::clone)),
-        ("units", said(&proposal.units, ToString::to_string)),
-        ("kind", said(&proposal.kind, kind)),
-        ("deflection", said(&proposal.deflection, ToString::to_string)),
-        ("force", said(&proposal.force, ToString::to_string)),
-        ("filter", said(&proposal.filter, |filter| String::from(*filter))),
-        ("sampling", said(&proposal.sampling, ToString::to_string)),
-    ];
-    all.into_iter().map(|(key, (value, from))| (key, value, from)).collect()
-}
-
-fn row(run: &ProposedRun) -> Vec<String> {
-    let shown = |value: Option<String>| value.unwrap_or_else(|| "?".into());
-    vec![
-        run.name.clone(),
-        shown(run.speed_m_per_s.value().map(|v| km_per_h(*v))),
-        shown(run.mass_kg.value().map(|kg| Shown::one_mass(*kg))),
-        shown(run.crush_m.map(|m| format!("{m:.3}"))),
-        run.states.to_string(),
+    let half = if proposal.half_model { " (half model)" } else { "" };
+    [
+        described("group", &proposal.group, String::clone),
+        described("units", &proposal.units, ToString::to_string),
+        described("kind", &proposal.kind, |kind| format!("{}{half}", kind.name())),
+        described("deflection", &proposal.deflection, ToString::to_string),
+        described("force", &proposal.force, ToString::to_string),
+        described("filter", &proposal.filter, |filter| String::from(*filter)),
+        described("sampling", &proposal.sampling, ToString::to_string),
     ]
 }

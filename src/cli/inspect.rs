@@ -6,13 +6,12 @@ use std::path::{Path, PathBuf};
 use crate::error::Error;
 use crate::solver::decks;
 use crate::solver::lsdyna::deck::Deck;
-use crate::solver::{self, Access, Entity, Problem, Selection, SolverFile, WithoutData};
+use crate::solver::{self, Access, Selection, SolverFile};
+use crate::table::Table;
 use serde::Serialize;
 
-use super::Failure;
-use super::deck_report::DeckReport;
-use super::output;
-use super::{CommandResult, GlobalOptions, Outcome};
+use super::deck_report::{self, SHOWN, list, titled};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, failed_at, output};
 use crate::solver::decks::Search;
 use crate::solver::runs::{output_files, run_folders};
 
@@ -37,67 +36,32 @@ pub(super) struct Args {
     map: bool,
 }
 
-#[derive(Serialize)]
-struct Report<'a> {
-    path: String,
-    format: &'a str,
-    /// Section of a binary file; absent for text.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    section: Option<&'a str>,
-    solver: Option<&'a str>,
-    version: Option<&'a str>,
-    title: Option<&'a str>,
-    states: usize,
-    /// First and last time in the solver's unit; absent if there is no state.
-    time: Option<[f64; 2]>,
-    entities: &'a [Entity],
-    without_data: &'a [WithoutData],
-    components: Vec<&'a str>,
-    problems: &'a [Problem],
-    #[serde(skip_serializing_if = "<[String]>::is_empty")]
-    notes: &'a [String],
-    /// Deck that titles were taken from, or what a deck itself says.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    deck: Option<DeckReport<'a>>,
+/// One section of a file, or a deck, which has no states.
+struct Section {
+    path: PathBuf,
+    file: SolverFile,
+    /// Deck that titles were taken from, and how many.
+    titles_from: Option<(PathBuf, usize)>,
+    deck: Option<Deck>,
 }
 
-#[derive(Serialize)]
-struct Document<'a> {
-    files: Vec<Report<'a>>,
-}
-
-/// One section of a file, or a deck.
-enum Read {
-    Section { file: Box<SolverFile>, titles_from: Option<(PathBuf, usize)> },
-    Deck(Box<Deck>),
-}
-
-impl Read {
-    fn problems(&self) -> &[Problem] {
-        match self {
-            Self::Section { file, .. } => &file.problems,
-            Self::Deck(deck) => &deck.problems,
-        }
-    }
-}
-
-/// What was read of it: files with their sections, and what could not be read.
+/// What was read: sections, and what could not be read.
 struct Inspected {
     /// The run's folder, if it was found by its folder.
     run: Option<PathBuf>,
-    read: Vec<(PathBuf, Read)>,
+    sections: Vec<Section>,
     unread: Vec<Error>,
 }
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let mut outcome = Outcome::Clean;
     let mut inspected = Vec::new();
-    for asked in asked(&args.files)? {
-        let one = inspect(asked, args);
+    for (run, files) in asked(&args.files)? {
+        let one = inspect(run, files, args);
         match (&one.run, &one.unread[..]) {
             (_, []) => {}
             (None, [error]) if args.files.len() > 1 => {
-                output::say(&format!("error: {error}"));
+                output::eprint_line(&format!("error: {error}"));
                 outcome = Outcome::Partly;
             }
             (None, _) => {
@@ -107,45 +71,35 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
                 continue;
             }
             // A file of a run may only be named like a solver's.
-            (Some(_), errors) => errors.iter().for_each(|error| options.warn(&error.to_string())),
+            (Some(_), errors) => _ = options.warn_all(errors),
         }
         inspected.push(one);
     }
     let is_damaged = |one: &Inspected| {
         one.run.is_some() && !one.unread.is_empty()
-            || one.read.iter().any(|(_, read)| !read.problems().is_empty())
+            || one.sections.iter().any(|section| !section.file.problems.is_empty())
     };
-    if outcome == Outcome::Clean && inspected.iter().any(is_damaged) {
-        outcome = Outcome::Warned;
-    }
-    if options.json {
-        let files = inspected.iter().flat_map(reports).collect();
-        output::print_json(&Document { files })?;
-    } else {
-        options.print(|out| {
-            inspected.iter().try_for_each(|one| match &one.run {
-                None => reports(one).iter().try_for_each(|file| print(out, file)),
-                Some(folder) => {
-                    let rows: Vec<Vec<String>> = reports(one).iter().map(row).collect();
-                    print_runs(out, folder, &rows)
-                }
-            })
-        })?;
-    }
+    outcome = outcome.max(Outcome::warned_if(inspected.iter().any(is_damaged)));
+    let files = inspected.iter().flat_map(|one| one.sections.iter().map(document));
+    options.show(&document! { files: files.collect::<Vec<_>>() }, |out| {
+        inspected.iter().try_for_each(|one| match &one.run {
+            None => one.sections.iter().try_for_each(|section| print(out, section)),
+            Some(folder) => {
+                writeln!(out, "{}", folder.display())?;
+                output::table(out, table(&one.sections))
+            }
+        })
+    })?;
     Ok(outcome)
 }
 
-fn inspect(asked: Asked, args: &Args) -> Inspected {
-    let (run, files) = match asked {
-        Asked::File(path) => (None, vec![path]),
-        Asked::Run { folder, files } => (Some(folder), files),
-    };
+fn inspect(run: Option<PathBuf>, files: Vec<PathBuf>, args: &Args) -> Inspected {
     let access = if args.map { Access::Map } else { Access::Plain };
     let selection = Selection { access, ..Selection::nothing() };
-    let mut inspected = Inspected { run, read: Vec::new(), unread: Vec::new() };
+    let mut inspected = Inspected { run, sections: Vec::new(), unread: Vec::new() };
     for path in files {
         match read(&path, args.format.as_deref(), &selection) {
-            Ok(read) => inspected.read.extend(read.into_iter().map(|read| (path.clone(), read))),
+            Ok(sections) => inspected.sections.extend(sections),
             Err(error) => inspected.unread.push(error),
         }
     }
@@ -153,11 +107,21 @@ fn inspect(asked: Asked, args: &Args) -> Inspected {
 }
 
 /// The sections of a file, or the deck that it is.
-fn read(path: &Path, format: Option<&str>, selection: &Selection) -> Result<Vec<Read>, Error> {
+fn read(path: &Path, format: Option<&str>, selection: &Selection) -> Result<Vec<Section>, Error> {
     let sections = match solver::read_sections(path, format, selection) {
         Ok(sections) => sections,
         Err(error) if error.is_about("deck") => {
-            return Ok(vec![Read::Deck(Box::new(decks::read_deck(path)?))]);
+            let deck = decks::read_deck(path)?;
+            let file = SolverFile {
+                format: KEYWORD,
+                section: KEYWORD.into(),
+                solver: Some("LS-DYNA".into()),
+                title: deck.title.clone(),
+                problems: deck.problems.clone(),
+                ..SolverFile::default()
+            };
+            let (path, deck) = (path.into(), Some(deck));
+            return Ok(vec![Section { path, file, titles_from: None, deck }]);
         }
         Err(error) => return Err(error),
     };
@@ -166,18 +130,9 @@ fn read(path: &Path, format: Option<&str>, selection: &Selection) -> Result<Vec<
         let filled =
             deck.as_ref().map(|(from, deck)| (from.clone(), decks::fill_titles(&mut file, deck)));
         let titles_from = filled.filter(|(_, count)| *count > 0);
-        Read::Section { file: Box::new(file), titles_from }
+        Section { path: path.into(), file, titles_from, deck: None }
     };
     Ok(sections.into_iter().map(with_titles).collect())
-}
-
-fn reports(inspected: &Inspected) -> Vec<Report<'_>> {
-    let read = inspected.read.iter();
-    read.map(|(path, read)| match read {
-        Read::Section { file, titles_from } => report(path, file, titles_from.as_ref()),
-        Read::Deck(deck) => deck_report(path, deck),
-    })
-    .collect()
 }
 
 /// The deck next to a file, if an entity of the file lacks a title.
@@ -189,159 +144,129 @@ fn deck_for(path: &Path, sections: &[SolverFile]) -> Option<(PathBuf, Deck)> {
     decks::beside(path)
 }
 
-fn deck_report<'a>(path: &Path, deck: &'a Deck) -> Report<'a> {
-    Report {
-        path: path.display().to_string(),
-        format: "keyword",
-        section: None,
-        solver: Some("LS-DYNA"),
-        version: None,
-        title: deck.title.as_deref(),
-        states: 0,
-        time: None,
-        entities: &[],
-        without_data: &[],
-        components: Vec::new(),
-        problems: &deck.problems,
-        notes: &[],
-        deck: Some(DeckReport::of(deck)),
+impl Section {
+    /// Section of a binary file; absent for text.
+    fn name(&self) -> Option<&str> {
+        (self.file.section != self.file.format).then_some(self.file.section.as_str())
+    }
+
+    /// First and last time in the solver's unit; absent if there is no state.
+    fn times(&self) -> Option<[f64; 2]> {
+        let time = &self.file.time;
+        time.first().zip(time.last()).map(|(&first, &last)| [first, last])
     }
 }
 
-fn report<'a>(
-    path: &Path,
-    file: &'a SolverFile,
-    titles_from: Option<&'a (PathBuf, usize)>,
-) -> Report<'a> {
-    Report {
-        path: path.display().to_string(),
+fn document(section: &Section) -> impl Serialize {
+    let file = &section.file;
+    document! {
+        path: section.path.display().to_string(),
         format: file.format,
-        section: (file.section != file.format).then_some(file.section.as_str()),
-        solver: file.solver.as_deref(),
-        version: file.version.as_deref(),
-        title: file.title.as_deref(),
+        section if_any: section.name(),
+        solver: &file.solver,
+        version: &file.version,
+        title: &file.title,
         states: file.time.len(),
-        time: file.time.first().zip(file.time.last()).map(|(&a, &b)| [a, b]),
+        time: section.times(),
         entities: &file.entities,
         without_data: &file.without_data,
-        components: file.components.iter().map(|c| &**c).collect(),
+        components: file.components.iter().map(|c| &**c).collect::<Vec<_>>(),
         problems: &file.problems,
-        notes: &file.notes,
-        deck: titles_from.map(|(path, count)| DeckReport::titles(path, *count)),
+        notes if_any: &file.notes,
+        deck if_any: deck_report::document(section.titles_from.as_ref(), section.deck.as_ref()),
     }
 }
 
-/// Entities printed in full; of longer lists the rest is counted.
-const SHOWN_ENTITIES: usize = 20;
+/// What a deck is called as a format.
+const KEYWORD: &str = "keyword";
 
-/// A section in one line, as [`HEADING`] has it.
-fn row(file: &Report<'_>) -> Vec<String> {
-    let name = Path::new(&file.path).file_name();
-    let times = file.time.map_or(["-".into(), "-".into()], |time| time.map(|t| format!("{t:?}")));
-    let [first, last] = times;
-    vec![
-        name.map_or(String::new(), |name| name.to_string_lossy().into_owned()),
-        file.section.unwrap_or(file.format).into(),
-        file.states.to_string(),
-        first,
-        last,
-        file.entities.len().to_string(),
-        file.problems.len().to_string(),
-    ]
+/// A run's files, a line for each section.
+fn table(sections: &[Section]) -> impl Into<Table> {
+    let time = |section: &Section, k: usize| {
+        section.times().map_or("-".into(), |times| format!("{:?}", times[k]))
+    };
+    Table::of(sections)
+        .column("file", |section| {
+            section.path.file_name().map_or(String::new(), |n| n.to_string_lossy().into_owned())
+        })
+        .column("holds", |section| &section.file.section)
+        .column("states", |section| section.file.time.len().to_string())
+        .column("first time", move |section| time(section, 0))
+        .column("last", move |section| time(section, 1))
+        .column("entities", |section| section.file.entities.len().to_string())
+        .column("problems", |section| section.file.problems.len().to_string())
 }
 
-fn print(out: &mut dyn Write, file: &Report<'_>) -> io::Result<()> {
-    writeln!(out, "{}", file.path)?;
-    match file.section {
+fn print(out: &mut dyn Write, section: &Section) -> io::Result<()> {
+    let file = &section.file;
+    writeln!(out, "{}", section.path.display())?;
+    match section.name() {
         Some(section) => writeln!(out, "  format      {}, section {section}", file.format)?,
         None => writeln!(out, "  format      {}", file.format)?,
     }
-    if let Some(solver) = file.solver {
-        writeln!(out, "  solver      {solver} {}", file.version.unwrap_or_default())?;
+    if let Some(solver) = &file.solver {
+        writeln!(out, "  solver      {solver} {}", file.version.as_deref().unwrap_or_default())?;
     }
-    writeln!(out, "  title       {}", file.title.unwrap_or("(none)"))?;
-    if let Some(deck) = &file.deck {
-        deck.print(out)?;
+    writeln!(out, "  title       {}", file.title.as_deref().unwrap_or("(none)"))?;
+    if let Some((path, count)) = &section.titles_from {
+        writeln!(out, "  titles      {count} taken from the deck {}", path.display())?;
     }
-    match file.time {
-        _ if file.format == "keyword" => {}
+    if let Some(deck) = &section.deck {
+        deck_report::print(out, deck)?;
+    }
+    match section.times() {
+        _ if section.deck.is_some() => {}
         Some([first, last]) => {
-            writeln!(out, "  states      {}, time {first:?} to {last:?}", file.states)?;
+            writeln!(out, "  states      {}, time {first:?} to {last:?}", file.time.len())?;
         }
         None => writeln!(out, "  states      0")?,
     }
     if !file.components.is_empty() {
         writeln!(out, "  components  {}", file.components.join(", "))?;
     }
-    let titled = |title: &Option<String>| match title {
-        Some(title) => format!("  {title}"),
-        None => String::new(),
-    };
-    if !file.entities.is_empty() {
-        writeln!(out, "  entities    {}", file.entities.len())?;
-    }
-    for entity in file.entities.iter().take(SHOWN_ENTITIES) {
-        writeln!(out, "    {}{}", entity.id, titled(&entity.title))?;
-    }
-    if file.entities.len() > SHOWN_ENTITIES {
-        let more = file.entities.len() - SHOWN_ENTITIES;
-        writeln!(out, "    … and {more} more (--json lists all)")?;
-    }
-    for entity in file.without_data.iter().take(SHOWN_ENTITIES) {
+    let entities = file.entities.iter();
+    list(out, "entities", entities.map(|entity| titled(entity.id, &entity.title)))?;
+    for entity in file.without_data.iter().take(SHOWN) {
         let reason = match entity.reason {
             solver::NoDataReason::SingleSurfaceContact => "single surface: resultants undefined",
             solver::NoDataReason::LegendOnly => "in the legend only",
         };
-        writeln!(out, "    {}{}  ({reason})", entity.id, titled(&entity.title))?;
+        writeln!(out, "    {}  ({reason})", titled(entity.id, &entity.title))?;
     }
-    for note in file.notes {
+    for note in &file.notes {
         writeln!(out, "  note        {note}")?;
     }
-    for problem in file.problems {
+    for problem in &file.problems {
         writeln!(out, "  problem     {problem}")?;
     }
     Ok(())
 }
 
-/// What is to be inspected: a file that was named, or the files of a run that was found.
-pub(super) enum Asked {
-    File(PathBuf),
-    Run { folder: PathBuf, files: Vec<PathBuf> },
-}
+/// What is to be inspected: files, with the folder of the run where it was found by that.
+type Asked = (Option<PathBuf>, Vec<PathBuf>);
 
 /// The files that were named, and those of every run at or below the folders that were.
-pub(super) fn asked(paths: &[PathBuf]) -> Result<Vec<Asked>, Failure> {
+fn asked(paths: &[PathBuf]) -> Result<Vec<Asked>, Failure> {
     let mut asked = Vec::new();
     for path in paths {
         if !path.is_dir() {
-            asked.push(Asked::File(path.clone()));
+            asked.push((None, vec![path.clone()]));
             continue;
         }
-        let failed = |e| Failure::Failed(format!("{}: {e}", path.display()).into());
-        let found = run_folders(path).map_err(failed)?;
+        let named = |e| failed_at(path, e);
+        let found = run_folders(path).map_err(named)?;
         if found.runs.is_empty() {
-            let message = format!("{}: none of its folders holds solver files", path.display());
-            return Err(Failure::Failed(message.into()));
+            return Err(failed_at(path, "none of its folders holds solver files"));
         }
         for folder in found.runs {
-            let mut files = output_files(&folder).map_err(failed)?;
-            files.extend(match decks::find(&folder).map_err(failed)? {
+            let mut files = output_files(&folder).map_err(named)?;
+            files.extend(match decks::find(&folder).map_err(named)? {
                 Search::None => Vec::new(),
                 Search::One(deck) => vec![deck],
                 Search::Several(decks) => decks,
             });
-            asked.push(Asked::Run { folder, files });
+            asked.push((Some(folder), files));
         }
     }
     Ok(asked)
-}
-
-/// Columns of a run's table.
-pub(super) const HEADING: [&str; 7] =
-    ["file", "holds", "states", "first time", "last", "entities", "problems"];
-
-/// A run's files, a line for each section.
-fn print_runs(out: &mut dyn Write, folder: &Path, rows: &[Vec<String>]) -> io::Result<()> {
-    writeln!(out, "{}", folder.display())?;
-    output::table(out, &HEADING, rows)
 }

@@ -1,5 +1,10 @@
 //! The commands: one file each, with its arguments and a `run` that calls the library.
 
+// `document!` calls the type of a field as the field.
+#![allow(non_camel_case_types)]
+
+#[macro_use]
+mod output;
 mod arguments;
 mod build;
 mod compare;
@@ -14,7 +19,6 @@ mod file_kind;
 mod histories;
 mod init;
 mod inspect;
-mod output;
 mod plot;
 mod predict;
 mod progress;
@@ -29,8 +33,9 @@ mod validate;
 
 use std::error::Error;
 use std::ffi::OsString;
+use std::fmt::Display;
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 #[cfg(unix)]
 use std::sync::Arc;
@@ -42,6 +47,7 @@ use crate::file::{self, is_same};
 use crate::solver;
 use clap::{FromArgMatches, Parser, Subcommand};
 use file_kind::FileKind;
+use serde::Serialize;
 
 #[derive(Parser)]
 #[command(name = "crumple", version, about, propagate_version = true)]
@@ -101,7 +107,7 @@ enum Command {
 }
 
 /// How a command ended.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Outcome {
     Clean,
     /// Done, with damage in the input or warnings about the result.
@@ -110,33 +116,21 @@ pub enum Outcome {
     Partly,
 }
 
-/// Why a command did not do its work.
-#[derive(Debug)]
-pub enum Failure {
-    /// The arguments do not fit together.
-    Usage(String),
-    Failed(Box<dyn Error>),
-}
-
-impl<E: Error + 'static> From<E> for Failure {
-    fn from(error: E) -> Self {
-        let error: Box<dyn Error> = Box::new(error);
-        if failure::code(&*error) == ErrorCode::Usage {
-            return Self::Usage(error.to_string());
-        }
-        Self::Failed(error)
+impl Outcome {
+    fn warned_if(is_warned: bool) -> Self {
+        if is_warned { Self::Warned } else { Self::Clean }
     }
 }
+
+/// Why a command did not do its work.
+pub type Failure = Box<dyn Error>;
 
 pub type CommandResult = Result<Outcome, Failure>;
 
 /// Refuses to write over what is read.
 fn keep_input(input: &Path, output: &Path) -> Result<(), Failure> {
     if is_same(input, output) {
-        Err(Failure::Usage(format!(
-            "-o {} names the input itself: name another file",
-            output.display()
-        )))
+        usage(format!("-o {} names the input itself: name another file", output.display()))
     } else {
         Ok(())
     }
@@ -163,10 +157,10 @@ impl GlobalOptions {
         if kind == own && !(kind == FileKind::Database && database::is_database(output)) {
             return Ok(());
         }
-        Err(Failure::Usage(format!(
+        usage(format!(
             "-o {} exists and is {what}: name another file, or replace it with --overwrite",
             output.display()
-        )))
+        ))
     }
 }
 
@@ -186,7 +180,49 @@ fn is_stdout(output: &Path) -> bool {
     output == Path::new("-")
 }
 
+/// A wrong use of the command line.
+fn usage_error(message: impl Display) -> Failure {
+    crate::error::error!(Usage, "{message}").into()
+}
+
+fn usage<T>(message: impl Display) -> Result<T, Failure> {
+    Err(usage_error(message))
+}
+
+/// A failure with a message of the command's own.
+fn failed(message: impl Into<String>) -> Failure {
+    message.into().into()
+}
+
+/// A failure about a file.
+fn failed_at(path: &Path, error: impl Display) -> Failure {
+    failed(format!("{}: {error}", path.display()))
+}
+
 impl GlobalOptions {
+    /// Whether one of the outputs is standard output, which takes one thing only.
+    fn on_stdout<'a>(
+        self,
+        outputs: impl IntoIterator<Item = &'a PathBuf>,
+    ) -> Result<bool, Failure> {
+        match outputs.into_iter().filter(|path| is_stdout(path)).count() {
+            1.. if self.json => {
+                usage("-o - and --json both write to standard output: give one of them")
+            }
+            2.. => usage("standard output can take only one of them: one \"-o -\", or --json"),
+            count => Ok(count == 1),
+        }
+    }
+
+    /// A result on standard output: as one JSON document, or as text.
+    fn show(
+        self,
+        document: &impl Serialize,
+        text: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    ) -> Result<(), Failure> {
+        if self.json { output::print_json(document) } else { self.print(text) }
+    }
+
     /// The text of a result on standard output.
     fn print(self, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
         if self.quiet { Ok(()) } else { output::print(write) }
@@ -195,7 +231,29 @@ impl GlobalOptions {
     /// A warning on standard error.
     pub fn warn(self, text: &str) {
         if !self.quiet {
-            output::say(&format!("warning: {text}"));
+            output::eprint_line(&format!("warning: {text}"));
+        }
+    }
+
+    /// Warnings on standard error, and the outcome of what has them.
+    fn warn_all<W: Display>(self, warnings: impl IntoIterator<Item = W>) -> Outcome {
+        let mut outcome = Outcome::Clean;
+        for warning in warnings {
+            self.warn(&warning.to_string());
+            outcome = Outcome::Warned;
+        }
+        outcome
+    }
+
+    /// Warnings about a file.
+    fn warn_of<W: Display>(self, path: &Path, warnings: &[W]) -> Outcome {
+        self.warn_all(warnings.iter().map(|warning| format!("{}: {warning}", path.display())))
+    }
+
+    /// Notes of an export on standard error; a document has them itself.
+    fn say_notes(self, notes: &[String]) {
+        if !self.quiet && !self.json {
+            notes.iter().for_each(|note| output::eprint_line(&format!("note: {note}")));
         }
     }
 }
@@ -215,7 +273,7 @@ fn survive_file_size_limit() {}
 fn arguments() -> Result<Cli, ExitCode> {
     let arguments: Vec<OsString> = std::env::args_os().collect();
     if arguments.len() < 2 {
-        output::say(&shell::short_help());
+        output::eprint_line(&shell::short_help());
         return Err(ExitCode::from(USAGE));
     }
     let wants_json =
@@ -228,7 +286,7 @@ fn arguments() -> Result<Cli, ExitCode> {
             let said = text.split("\n\nUsage:").next().unwrap_or_default();
             let said = said.split("\n\nFor more information").next().unwrap_or_default();
             let said = said.trim().trim_start_matches("error: ");
-            print_document(&ErrorDocument::usage(&shell::one_line(said)));
+            print_document(&ErrorDocument::new(&*usage_error(shell::one_line(said))));
         } else {
             // With standard error closed nobody would read it.
             let _ = error.print();
@@ -240,7 +298,7 @@ fn arguments() -> Result<Cli, ExitCode> {
 /// The document of an error; without standard output its message.
 fn print_document(document: &ErrorDocument) {
     if output::print_json(document).is_err() {
-        output::say(&format!("error: {}", document.error.message));
+        output::eprint_line(&format!("error: {}", document.error.message));
     }
 }
 
@@ -257,22 +315,14 @@ pub fn main() -> ExitCode {
         Ok(Outcome::Warned) if options.strict => DONE_WITH_WARNINGS,
         Ok(Outcome::Warned) => DONE,
         Ok(Outcome::Partly) => FAILED,
-        Err(Failure::Usage(message)) => {
-            if options.json {
-                print_document(&ErrorDocument::usage(&message));
-            } else {
-                output::say(&format!("error: {message}"));
-            }
-            USAGE
-        }
-        Err(Failure::Failed(error)) if output::is_closed_pipe(&*error) => DONE,
-        Err(Failure::Failed(error)) => {
+        Err(error) if output::is_closed_pipe(&*error) => DONE,
+        Err(error) => {
             if options.json {
                 print_document(&ErrorDocument::new(&*error));
             } else {
                 print_error(&*error);
             }
-            FAILED
+            if failure::code(&*error) == ErrorCode::Usage { USAGE } else { FAILED }
         }
     })
 }
@@ -302,9 +352,9 @@ fn run(command: Command, options: GlobalOptions) -> CommandResult {
 
 /// The error with the line of the file that it is about, then its causes.
 fn print_error(error: &(dyn Error + 'static)) {
-    output::say(&format!("error: {error}"));
-    output::say_excerpt(failure::place(error));
+    output::eprint_line(&format!("error: {error}"));
+    output::eprint_excerpt(failure::place(error));
     for cause in failure::causes(error) {
-        output::say(&format!("  because: {cause}"));
+        output::eprint_line(&format!("  because: {cause}"));
     }
 }

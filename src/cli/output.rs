@@ -10,8 +10,35 @@ use serde::Serialize;
 
 use crate::error::Place;
 
-use super::{Failure, GlobalOptions};
+use crate::table::{Cell, Table};
+
+use super::{CommandResult, Failure, GlobalOptions, Outcome};
 use terminal_size::{Width, terminal_size_of};
+
+/// An object for JSON with these fields in this order, made where it is printed; a field marked
+/// `if_any` is left out where it is null or empty.
+macro_rules! document {
+    ($($(#[$attribute:meta])* $key:ident $($if_any:ident)?: $value:expr),* $(,)?) => {{
+        #[derive(serde::Serialize)]
+        #[allow(non_snake_case)]
+        struct Document<$($key),*> {
+            $(
+                $(
+                    #[doc = stringify!($if_any)]
+                    #[serde(skip_serializing_if = "crate::cli::output::is_empty")]
+                )?
+                $(#[$attribute])*
+                $key: $key,
+            )*
+        }
+        Document { $($key: $value),* }
+    }};
+}
+
+/// Whether there is nothing in a value.
+pub(super) fn is_empty(value: &impl Serialize) -> bool {
+    serde_json::to_string(value).is_ok_and(|json| ["null", "[]", "{}"].contains(&json.as_str()))
+}
 
 /// Writes text to standard output.
 pub(super) fn print(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
@@ -46,7 +73,7 @@ fn print_with<T, E: Error + 'static>(
     write: impl FnOnce(&mut dyn Write) -> Result<T, E>,
 ) -> Result<T, Failure> {
     let out = NamedStdout(io::stdout().lock());
-    let mut out = BufWriter::new(ControlFilter { out, instead, held: false });
+    let mut out = BufWriter::new(ControlFilter { out, instead, pending_lead: false });
     let written = write(&mut out)?;
     out.flush()?;
     Ok(written)
@@ -73,7 +100,7 @@ impl Write for NamedStdout<'_> {
 }
 
 /// Prints a line on standard error.
-pub(super) fn say(line: &str) {
+pub(super) fn eprint_line(line: &str) {
     // With standard error closed or full nobody would read it.
     let _ = writeln!(io::stderr().lock(), "{}", plain(line));
 }
@@ -83,10 +110,10 @@ pub(super) fn say(line: &str) {
 const WIDEST: usize = 200;
 
 /// Prints the line of a file that an error is about on standard error, with carets below.
-pub(super) fn say_excerpt(place: Option<&Place>) {
+pub(super) fn eprint_excerpt(place: Option<&Place>) {
     let width = error_width().unwrap_or(WIDEST);
     if let Some(excerpt) = place.and_then(|place| place.excerpt(width)) {
-        say(&excerpt);
+        eprint_line(&excerpt);
     }
 }
 
@@ -110,7 +137,7 @@ struct ControlFilter<W, F> {
     /// Replacement of a control character of that code.
     instead: F,
     /// Whether a `0xc2` waits for the byte after it.
-    held: bool,
+    pending_lead: bool,
 }
 
 /// First byte of the characters from U+0080 to U+00BF.
@@ -122,13 +149,13 @@ fn is_control(byte: u8) -> bool {
 
 impl<W: Write, F: Fn(u8) -> String> Write for ControlFilter<W, F> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if !self.held && !bytes.iter().any(|&byte| byte == LEAD || is_control(byte)) {
+        if !self.pending_lead && !bytes.iter().any(|&byte| byte == LEAD || is_control(byte)) {
             self.out.write_all(bytes)?;
             return Ok(bytes.len());
         }
         let mut passed = Vec::with_capacity(bytes.len());
         for &byte in bytes {
-            if std::mem::take(&mut self.held) {
+            if std::mem::take(&mut self.pending_lead) {
                 if (0x80..=0x9f).contains(&byte) {
                     passed.extend((self.instead)(byte).bytes());
                     continue;
@@ -136,7 +163,7 @@ impl<W: Write, F: Fn(u8) -> String> Write for ControlFilter<W, F> {
                 passed.push(LEAD);
             }
             match byte {
-                LEAD => self.held = true,
+                LEAD => self.pending_lead = true,
                 _ if is_control(byte) => passed.extend((self.instead)(byte).bytes()),
                 _ => passed.push(byte),
             }
@@ -146,7 +173,7 @@ impl<W: Write, F: Fn(u8) -> String> Write for ControlFilter<W, F> {
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        if std::mem::take(&mut self.held) {
+        if std::mem::take(&mut self.pending_lead) {
             self.out.write_all(&[LEAD])?;
         }
         self.out.flush()
@@ -170,21 +197,16 @@ pub(super) fn is_closed_pipe(error: &(dyn Error + 'static)) -> bool {
 /// Prints rows under a heading with columns as wide as their content; the first
 /// column is set left, the others right. What is wider than the terminal is shown in blocks of
 /// columns, each with the first one, or with a line for each cell.
-pub(super) fn table(out: &mut dyn Write, heading: &[&str], rows: &[Vec<String>]) -> io::Result<()> {
-    table_within(out, width().unwrap_or(usize::MAX), heading, rows)
+pub(super) fn table(out: &mut dyn Write, table: impl Into<Table>) -> io::Result<()> {
+    table_within(out, width().unwrap_or(usize::MAX), &table.into())
 }
 
-fn table_within(
-    out: &mut dyn Write,
-    width: usize,
-    heading: &[&str],
-    rows: &[Vec<String>],
-) -> io::Result<()> {
+fn table_within(out: &mut dyn Write, width: usize, table: &Table) -> io::Result<()> {
     // A name with a line's end or a tab in it is one cell all the same.
     let shown = |cell: &str| plain(cell).replace(['\n', '\t'], REPLACED);
-    let heading: Vec<String> = heading.iter().map(|h| shown(h)).collect();
-    let rows: Vec<Vec<String>> =
-        rows.iter().map(|row| row.iter().map(|cell| shown(cell)).collect()).collect();
+    let heading: Vec<String> = table.heading.iter().map(|name| shown(name)).collect();
+    let cells = |row: &Vec<Cell>| row.iter().map(|cell| shown(&cell.text)).collect();
+    let rows: Vec<Vec<String>> = table.rows.iter().map(cells).collect();
     let width_of = |k: usize| {
         let cells = rows.iter().filter_map(|r| r.get(k)).map(|c| c.chars().count());
         cells.chain([heading[k].chars().count()]).max().unwrap_or(0)
@@ -219,6 +241,28 @@ fn table_within(
         writeln!(out)?;
         from = to;
     }
+}
+
+/// Writes columns of numbers as CSV; names may hold commas and quotes, numbers cannot.
+pub(super) fn csv(
+    out: &mut dyn Write,
+    columns: &[(String, &[f64])],
+    mut number: impl FnMut(&mut dyn Write, f64) -> io::Result<()>,
+) -> io::Result<()> {
+    let mut heading = csv::Writer::from_writer(&mut *out);
+    heading.write_record(columns.iter().map(|(name, _)| name))?;
+    heading.flush()?;
+    drop(heading);
+    for row in 0..columns.first().map_or(0, |(_, values)| values.len()) {
+        for (k, (_, values)) in columns.iter().enumerate() {
+            if k > 0 {
+                out.write_all(b",")?;
+            }
+            number(out, values[row])?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
 }
 
 /// Between columns.
@@ -261,39 +305,26 @@ fn list(
     Ok(())
 }
 
-/// A format as a list of them says it.
-#[derive(Serialize)]
-pub(super) struct ListedFormat {
-    pub name: &'static str,
-    pub extensions: &'static [&'static str],
-    pub description: &'static str,
-}
-
-/// Prints the formats that a command knows.
-pub(super) fn formats(formats: Vec<ListedFormat>, options: GlobalOptions) -> Result<(), Failure> {
-    #[derive(Serialize)]
-    struct Document {
-        formats: Vec<ListedFormat>,
-    }
-    if options.json {
-        return print_json(&Document { formats });
-    }
-    let extensions = |format: &ListedFormat| format!(".{}", format.extensions.join(" ."));
-    let widest = |length: &dyn Fn(&ListedFormat) -> usize| formats.iter().map(length).max();
-    let name = widest(&|format| format.name.len()).unwrap_or(0);
-    let endings = widest(&|format| extensions(format).len()).unwrap_or(0);
-    print(|out| {
-        formats.iter().try_for_each(|format| {
-            let (own, description) = (extensions(format), format.description);
-            writeln!(out, "{:<name$}  {own:<endings$}  {description}", format.name)
+/// Prints the formats that a command knows: name, extensions and description of each.
+pub(super) fn formats(
+    formats: impl Iterator<Item = (&'static str, &'static [&'static str], &'static str)>,
+    options: GlobalOptions,
+) -> CommandResult {
+    let formats: Vec<_> = formats.collect();
+    let listed = formats.iter().map(|(name, extensions, description)| {
+        document! { name: name, extensions: extensions, description: description }
+    });
+    let joined = |extensions: &[&str]| format!(".{}", extensions.join(" ."));
+    let widest = |length: &dyn Fn(&(&str, &[&str], &str)) -> usize| {
+        formats.iter().map(|format| length(format)).max().unwrap_or(0)
+    };
+    let (name, endings) = (widest(&|format| format.0.len()), widest(&|f| joined(f.1).len()));
+    options.show(&document! { formats: listed.collect::<Vec<_>>() }, |out| {
+        formats.iter().try_for_each(|(own, extensions, description)| {
+            writeln!(out, "{own:<name$}  {:<endings$}  {description}", joined(extensions))
         })
-    })
-}
-
-/// A number of things: `1 case`, `2 cases`.
-pub(super) fn counted(number: usize, what: &str) -> String {
-    let plural = if number == 1 { "" } else { "s" };
-    format!("{number} {what}{plural}")
+    })?;
+    Ok(Outcome::Clean)
 }
 
 /// Narrower is taken as this.
@@ -332,7 +363,7 @@ mod tests {
 
     fn passed(chunks: &[&[u8]], instead: impl Fn(u8) -> String) -> String {
         let mut out = Vec::new();
-        let mut plain = ControlFilter { out: &mut out, instead, held: false };
+        let mut plain = ControlFilter { out: &mut out, instead, pending_lead: false };
         chunks.iter().for_each(|chunk| plain.write_all(chunk).unwrap());
         plain.flush().unwrap();
         String::from_utf8(out).unwrap()
@@ -355,7 +386,8 @@ mod tests {
     #[test]
     fn a_cell_is_one_line() {
         let mut out = Vec::new();
-        table(&mut out, &["name", "v"], &[vec!["a\nb\u{1b}[A".into(), "1".into()]]).unwrap();
+        let one = Table::of(["a\nb\u{1b}[A"]).column("name", |name| *name).column("v", |_| "1");
+        table(&mut out, one).unwrap();
         let text = String::from_utf8(out).unwrap();
         assert_eq!(text, "name    v\na\u{fffd}b\u{fffd}[A  1\n");
     }
@@ -364,11 +396,11 @@ mod tests {
     fn a_wide_table_fits_the_terminal() {
         let table = |width: usize| {
             let mut out = Vec::new();
-            let rows = [
-                vec!["a".into(), "10.5".into(), "7".into()],
-                vec!["bcd".into(), "1".into(), "8".into()],
-            ];
-            table_within(&mut out, width, &["run", "speed km/h", "mass"], &rows).unwrap();
+            let rows = [["a", "10.5", "7"], ["bcd", "1", "8"]];
+            let names = ["run", "speed km/h", "mass"];
+            let table = names.iter().enumerate();
+            let table = table.fold(Table::of(rows), |t, (k, name)| t.column(*name, |row| row[k]));
+            table_within(&mut out, width, &table.into()).unwrap();
             String::from_utf8(out).unwrap()
         };
         let whole = "run  speed km/h  mass\na          10.5     7\nbcd           1     8\n";

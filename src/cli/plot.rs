@@ -1,6 +1,5 @@
 //! `crumple plot`: pictures of databases, models, curves, runs and solver files.
 
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crate::assess::ComparisonSettings;
@@ -15,17 +14,18 @@ use crate::formats::ReadOptions;
 use crate::formats::read::{self, json};
 use crate::plot::Chart;
 use crate::scenario;
-use crate::solver::{self, Access, Selection, WantedId};
+use crate::solver::{self, WantedId};
 use crate::surrogate::{Model, ModelCase, PredictedCurve, Query, predict};
 use crate::unit::{UnitSystem, km_per_h};
-use serde::Serialize;
 
-use super::arguments::{self, one_of};
+use super::arguments::{self, one_of, selection, units};
 use super::curve_file::Reading;
 use super::file_kind::FileKind;
-use super::output;
 use super::progress::Bar;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_input};
+use super::{
+    CommandResult, Failure, GlobalOptions, Outcome, failed_at, is_stdout, keep_input, output,
+    usage, usage_error,
+};
 
 /// Draw curves, predictions, runs and histories as SVG or PNG
 #[derive(clap::Args)]
@@ -111,10 +111,6 @@ const QUANTITIES: &[(&str, Quantity, &str)] = &[
     ("energy", Quantity::Energy, "Kinetic, stored and dissipated energy over time"),
 ];
 
-fn units(text: &str) -> Result<UnitSystem, String> {
-    UnitSystem::parse(text).map_err(|e| e.to_string())
-}
-
 fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|n| (low..=high).contains(n));
     number.ok_or_else(|| format!("expected a number from {low} to {high}"))
@@ -131,25 +127,11 @@ fn scale(text: &str) -> Result<f64, String> {
 /// Maximum number of bytes of a result that is drawn.
 const MOST_RESULT: u64 = 1 << 30;
 
-#[derive(Serialize)]
-struct Document {
-    title: String,
-    series: Vec<String>,
-    notes: Vec<String>,
-    files: Vec<PathBuf>,
-}
-
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
-    let pictures =
-        args.output.iter().map(|path| Picture::of(path)).collect::<Result<Vec<_>, _>>()?;
+    let is_png = args.output.iter().map(|path| is_png(path)).collect::<Result<Vec<_>, _>>()?;
     args.output.iter().try_for_each(|output| keep_input(&args.file, output))?;
     args.output.iter().try_for_each(|output| options.keep_others(output, FileKind::Curve))?;
-    let to_stdout = args.output.iter().filter(|path| is_stdout(path)).count();
-    if to_stdout > 1 || to_stdout == 1 && options.json {
-        return Err(Failure::Usage(
-            "standard output can take only one of them: one \"-o -\", or --json".into(),
-        ));
-    }
+    let to_stdout = options.on_stdout(&args.output)?;
     let mut chart = chart(args, options)?;
     if let Some(title) = &args.title {
         chart.title.clone_from(title);
@@ -157,11 +139,8 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     (chart.width, chart.height) = (args.width, args.height);
     let drawing = chart.drawing();
     let mut files = Vec::new();
-    for (path, picture) in args.output.iter().zip(&pictures) {
-        let bytes = match picture {
-            Picture::Svg => drawing.svg().into_bytes(),
-            Picture::Png => drawing.png(args.scale)?,
-        };
+    for (path, is_png) in args.output.iter().zip(is_png) {
+        let bytes = if is_png { drawing.png(args.scale)? } else { drawing.svg().into_bytes() };
         if is_stdout(path) {
             output::print_data(|out| out.write_all(&bytes))?;
         } else {
@@ -170,17 +149,20 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     }
     let all: Vec<(&Path, &[u8])> = files.iter().map(|(path, bytes)| (*path, &bytes[..])).collect();
     write_all_whole(&all)?;
-    let document = Document {
-        series: names(&chart),
-        title: chart.title,
-        notes: chart.notes,
-        files: files.iter().map(|(path, _)| path.to_path_buf()).collect(),
-    };
-    if options.json {
-        output::print_json(&document)?;
-    } else if to_stdout == 0 {
-        options.print(|out| print(out, &document))?;
+    if to_stdout {
+        return Ok(Outcome::Clean);
     }
+    let document = document! {
+        title: &chart.title,
+        series: names(&chart),
+        notes: &chart.notes,
+        files: &args.output,
+    };
+    options.show(&document, |out| {
+        args.output
+            .iter()
+            .try_for_each(|file| writeln!(out, "wrote {}: {}", file.display(), chart.title))
+    })?;
     Ok(Outcome::Clean)
 }
 
@@ -194,31 +176,13 @@ fn names(chart: &Chart) -> Vec<String> {
     names
 }
 
-fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
-    for file in &document.files {
-        writeln!(out, "wrote {}: {}", file.display(), document.title)?;
-    }
-    Ok(())
-}
-
-enum Picture {
-    Svg,
-    Png,
-}
-
-impl Picture {
-    fn of(path: &Path) -> Result<Self, Failure> {
-        if is_stdout(path) {
-            return Ok(Self::Svg);
-        }
-        match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
-            Some("svg") => Ok(Self::Svg),
-            Some("png") => Ok(Self::Png),
-            _ => Err(Failure::Usage(format!(
-                "-o {}: pictures are written as .svg or .png",
-                path.display()
-            ))),
-        }
+/// Whether a picture is PNG, else SVG.
+fn is_png(path: &Path) -> Result<bool, Failure> {
+    match path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase).as_deref() {
+        _ if is_stdout(path) => Ok(false),
+        Some("svg") => Ok(false),
+        Some("png") => Ok(true),
+        _ => usage(format!("-o {}: pictures are written as .svg or .png", path.display())),
     }
 }
 
@@ -234,21 +198,15 @@ fn chart(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
         FileKind::Scenario => {
             let prepared = scenario::load(&args.file)?;
             let run = prepared.run()?;
-            let mut warnings = prepared.warnings.clone();
-            warnings.extend(run.all_warnings());
-            warnings.iter().for_each(|warning| options.warn(warning));
+            options.warn_all(prepared.warnings.iter().chain(&run.all_warnings()));
             of_motion(args, &Motion::of_run(&prepared.chain, &run, &prepared.order))
         }
         FileKind::Result => {
-            let text = file::read(&args.file, MOST_RESULT).map_err(|e| named(&args.file, e))?;
-            of_motion(args, &Motion::of_csv(&text).map_err(|e| named(&args.file, e))?)
+            let text = file::read(&args.file, MOST_RESULT).map_err(|e| failed_at(&args.file, e))?;
+            of_motion(args, &Motion::of_csv(&text).map_err(|e| failed_at(&args.file, e))?)
         }
         FileKind::Solver => of_solver_file(args, options),
     }
-}
-
-fn named(path: &Path, error: impl std::fmt::Display) -> Failure {
-    Failure::Failed(format!("{}: {error}", path.display()).into())
 }
 
 impl Args {
@@ -274,11 +232,7 @@ impl Args {
             (self.reading.is_asked(), of_solver, "--curve and the like are for a curve's file"),
         ] {
             if given && !allowed {
-                return Err(Failure::Usage(format!(
-                    "{what}: {} is {}",
-                    self.file.display(),
-                    kind.name()
-                )));
+                return usage(format!("{what}: {} is {}", self.file.display(), kind.name()));
             }
         }
         Ok(())
@@ -292,15 +246,9 @@ fn of_database(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
         let own = cases.first().map_or(ForceKind::Contact, |case| case.curves.force_kind);
         return Ok(charts::group_curves(group, cases, args.force.unwrap_or(own)));
     };
-    let bar = Bar::new(options, "leaving the speed out");
-    let chart = charts::left_out_at(
-        group,
-        cases,
-        speed,
-        Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None },
-    );
-    bar.end();
-    Ok(chart?)
+    let _bar = Bar::new(options, "leaving the speed out");
+    let choice = Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None };
+    Ok(charts::left_out_at(group, cases, speed, choice)?)
 }
 
 /// A model's curve over its neighbours.
@@ -325,7 +273,7 @@ fn of_force(
 
 fn speed_of_model(model: &Model) -> Failure {
     let (low, high) = model.range_m_per_s();
-    Failure::Usage(format!(
+    usage_error(format!(
         "name the speed of the model's curve with --speed ({} to {})",
         km_per_h(low),
         km_per_h(high)
@@ -335,9 +283,8 @@ fn speed_of_model(model: &Model) -> Failure {
 fn of_train(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
     let scenario = scenario::read(&args.file)?;
     let settings = ComparisonSettings { nsdm_seeds: 0, ..ComparisonSettings::default() };
-    let bar = Bar::new(options, "comparing in the train");
+    let _bar = Bar::new(options, "comparing in the train");
     let comparison = compare_train(&args.file, &scenario, &settings)?;
-    bar.end();
     Ok(charts::train_speeds("Train: FE and the methods", &comparison))
 }
 
@@ -346,7 +293,7 @@ fn of_motion(args: &Args, motion: &Motion) -> Result<Chart, Failure> {
     let (quantity, ..) =
         QUANTITIES.iter().find(|(_, q, _)| *q == args.quantity).expect("one of the list");
     motion.chart(&format!("{stem}: {quantity}"), args.quantity).ok_or_else(|| {
-        Failure::Usage(format!(
+        usage_error(format!(
             "{} has no energies, which need the masses: give the scenario itself",
             args.file.display()
         ))
@@ -354,13 +301,7 @@ fn of_motion(args: &Args, motion: &Motion) -> Result<Chart, Failure> {
 }
 
 fn of_solver_file(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
-    let selection = Selection {
-        ids: (!args.ids.is_empty()).then(|| args.ids.clone()),
-        components: (!args.components.is_empty()).then(|| args.components.clone()),
-        section: args.section.clone(),
-        access: Access::Plain,
-        audit: false,
-    };
+    let selection = selection(&args.ids, &args.components, args.section.as_deref());
     let file = match solver::read(&args.file, args.format.as_deref(), &selection) {
         // Not what a solver wrote, so a curve's file, if any reader of these knows it.
         Err(error)
@@ -378,14 +319,12 @@ fn of_solver_file(args: &Args, options: GlobalOptions) -> Result<Chart, Failure>
         }
         file => file?,
     };
-    for problem in &file.problems {
-        options.warn(&format!("{}: {problem}", args.file.display()));
-    }
+    options.warn_of(&args.file, &file.problems);
     let title = match &file.title {
         Some(title) => format!("{}: {title}", args.file.display()),
         None => args.file.display().to_string(),
     };
     let histories: Vec<_> = file.histories.iter().collect();
     let options = HistoryOptions { units: args.units, filter_class: args.cfc };
-    charts::histories(&title, &histories, options).map_err(|e| named(&args.file, e))
+    charts::histories(&title, &histories, options).map_err(|e| failed_at(&args.file, e))
 }

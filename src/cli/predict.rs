@@ -6,17 +6,14 @@ use std::path::{Path, PathBuf};
 
 use crate::curve::{ForceKind, Parameter};
 use crate::file::write_all_whole;
-use crate::formats::{Exported, Format};
 use crate::surrogate::band::{Band, LeftOutSpeeds};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{Model, PredictedCurve, Query, predict};
 use crate::unit::{Shown, km_per_h};
-use serde::Serialize;
 
 use super::arguments::{self, MAX_CRUSH_RULES, one_of};
 use super::file_kind::FileKind;
-use super::output;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_input};
+use super::{CommandResult, GlobalOptions, is_stdout, keep_input, output, usage};
 
 /// Predict the force-deflection curve at a speed, with energy audit and warnings
 #[derive(clap::Args)]
@@ -63,12 +60,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         .map(|path| args.target.format(Some(path.as_path()).filter(|path| !is_stdout(path))))
         .collect::<Result<Vec<_>, _>>()?;
     args.target.check(&formats)?;
-    let to_stdout = args.output.iter().filter(|path| is_stdout(path)).count();
-    if to_stdout > 1 || to_stdout == 1 && options.json {
-        return Err(Failure::Usage(
-            "standard output can take only one of them: one \"-o -\", or --json".into(),
-        ));
-    }
+    options.on_stdout(&args.output)?;
     args.output.iter().try_for_each(|output| keep_input(&args.model, output))?;
     args.output.iter().try_for_each(|output| options.keep_others(output, FileKind::Curve))?;
     let model = Model::read(&args.model)?;
@@ -81,83 +73,38 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         extrapolate: args.extrapolate,
     };
     let curve = &predict(&model, &query)?;
-    let files = files(args, &formats, curve, options)?;
-    let named = files.iter().map(|file| (file.path, &*file.bytes));
+    // All are encoded before the first is written.
+    let mut files: Vec<(&Path, Vec<u8>)> = Vec::new();
+    let mut exports = Vec::new();
+    for (path, format) in args.output.iter().zip(&formats) {
+        let (exported, name) =
+            (args.target.export(format, std::slice::from_ref(curve), Some(path))?, format.name);
+        let shown = path.display();
+        let Ok([(_, bytes)]) = <[_; 1]>::try_from(exported.files) else {
+            return usage(format!(
+                "-o {shown}: this gives several files: crumple export --to {name} -o FOLDER"
+            ));
+        };
+        options.say_notes(&exported.notes);
+        files.push((path, bytes));
+        exports.push(document! { output: shown.to_string(), format: name, notes: exported.notes });
+    }
+    let named = files.iter().map(|(path, bytes)| (*path, &**bytes));
     let (printed, written): (Vec<_>, Vec<_>) = named.partition(|(path, _)| is_stdout(path));
     write_all_whole(&written)?;
-    for warning in &curve.warnings {
-        options.warn(&warning.to_string());
-    }
+    let outcome = options.warn_all(&curve.warnings);
     if let Some((_, bytes)) = printed.first() {
         output::print(|out| out.write_all(bytes))?;
-    } else if options.json {
-        let exports = files.iter().map(|file| Export {
-            output: file.path.display().to_string(),
-            format: file.format,
-            notes: &file.notes,
-        });
-        output::print_json(&Document { curve, exports: exports.collect() })?;
-    } else {
-        options.print(|out| {
+        return Ok(outcome);
+    }
+    options.show(
+        &document! { #[serde(flatten)] curve: curve, exports if_any: &exports },
+        |out| {
             print(out, curve)?;
             args.output.iter().try_for_each(|path| writeln!(out, "wrote {}", path.display()))
-        })?;
-    }
-    Ok(if curve.warnings.is_empty() { Outcome::Clean } else { Outcome::Warned })
-}
-
-/// The curve, and notes on its files.
-#[derive(Serialize)]
-struct Document<'a> {
-    #[serde(flatten)]
-    curve: &'a PredictedCurve,
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    exports: Vec<Export<'a>>,
-}
-
-#[derive(Serialize)]
-struct Export<'a> {
-    output: String,
-    format: &'static str,
-    notes: &'a [String],
-}
-
-/// An output that is to be written.
-struct File<'a> {
-    path: &'a Path,
-    format: &'static str,
-    bytes: Vec<u8>,
-    notes: Vec<String>,
-}
-
-/// Every output: all are encoded before the first is written.
-fn files<'a>(
-    args: &'a Args,
-    formats: &[&Format],
-    curve: &PredictedCurve,
-    options: GlobalOptions,
-) -> Result<Vec<File<'a>>, Failure> {
-    let mut files = Vec::new();
-    for (path, format) in args.output.iter().zip(formats) {
-        let Exported { files: mut exported, notes, .. } =
-            args.target.export(format, std::slice::from_ref(curve), Some(path))?;
-        match (exported.pop(), exported.is_empty()) {
-            (Some((_, bytes)), true) => {
-                if !options.quiet && !options.json {
-                    notes.iter().for_each(|note| output::say(&format!("note: {note}")));
-                }
-                files.push(File { path, format: format.name, bytes, notes });
-            }
-            _ => {
-                return Err(Failure::Usage(format!(
-                    "-o {}: this gives several files: crumple export --to {} -o FOLDER",
-                    path.display(),
-                    format.name
-                )));
-            }
-        }
-    }
-    Ok(files)
+        },
+    )?;
+    Ok(outcome)
 }
 
 /// Where a band's curve lies, and what the band comes from.
@@ -172,98 +119,83 @@ fn rests_on(band: &Band, in_range: bool) -> String {
     format!("{place}, from {} {how}", counted(band.curves, one))
 }
 
-/// The unloading stiffness of each force, and the rebound.
-fn print_unloading(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
-    let unloading = |out: &mut dyn Write, kind: ForceKind, stiffness: f64| {
-        writeln!(
-            out,
-            "  unloading            {} of the {} force, which drives {}",
-            Shown::stiffness(stiffness).text(stiffness),
-            kind.name(),
-            kind.drives()
-        )
-    };
-    unloading(out, curve.provenance.force_kind, curve.unloading_stiffness_n_per_m)?;
-    if let Some(stiffness) = curve.body_unloading_stiffness_n_per_m {
-        unloading(out, ForceKind::Body, stiffness)?;
-    }
-    if let Some(rebound) = curve.rebound {
-        writeln!(out, "  rebound              {}", km_per_h(rebound.speed_m_per_s))?;
-    }
-    Ok(())
-}
-
-/// How far FE may lie from each force of the curve, and what of it lies between repeated runs.
-fn print_bands(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
-    for (force, band) in curve.provenance.bands() {
-        writeln!(
-            out,
-            "  band                 ±{:.1} % of the local {} force: empirical range for {:.0} % {}",
-            band.pointwise_share * 100.0,
-            force.name(),
-            band.level * 100.0,
-            rests_on(&band, curve.provenance.in_range)
-        )?;
-        let Some(scatter) = band.scatter else { continue };
-        writeln!(
-            out,
-            "  of this              interpolation ±{:.1} %, scatter between repeated runs ±{:.1} %",
-            band.interpolation_share() * 100.0,
-            scatter.pointwise_share * 100.0
-        )?;
-    }
-    let provenance = &curve.provenance;
-    if provenance.band.is_some() && provenance.body_band.is_none() && curve.body_force_n.is_some() {
-        writeln!(out, "  band of body force   unknown until the model is trained again")?;
-    }
-    Ok(())
-}
-
-fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
+/// The lines about a curve: name and text of each.
+fn lines(curve: &PredictedCurve) -> Vec<(&'static str, String)> {
     let provenance = &curve.provenance;
     let crush = provenance.max_crush;
     let metres = |d: Option<f64>| d.map_or("-".into(), |d| format!("{d:.4} m"));
-    let speed = km_per_h(curve.speed_m_per_s);
-    writeln!(
-        out,
-        "{} at {speed} ({}) by {}",
-        provenance.group,
-        curve.speed_kind.name(),
-        curve.model
-    )?;
+    let percent = |share: f64| format!("{:.1} %", share * 100.0);
     let energy = Shown::energy(provenance.kinetic_energy_j);
-    let peak = curve.force_n.iter().copied().fold(0.0, f64::max);
+    let peak = curve.peak_force_n();
     let kind = provenance.force_kind.name();
-    writeln!(out, "  peak force           {} ({kind})", Shown::force(peak).text(peak))?;
-    writeln!(
-        out,
-        "  max crush            {:.4} m ({}); spline {}, monotone {}, energy {}, motion {}",
-        curve.max_deflection_m,
-        provenance.max_crush_rule.map_or("recorded", |rule| rule.name()),
-        metres(crush.spline_m),
-        metres(crush.monotone_m),
-        metres(crush.energy_m),
-        metres(crush.motion_m)
-    )?;
-    writeln!(
-        out,
-        "  energy               {}, {:.1} % of the impact's {}",
-        energy.text(curve.energy_j),
-        provenance.energy_over_kinetic * 100.0,
-        energy.text(provenance.kinetic_energy_j)
-    )?;
-    if let Some(share) = provenance.body_energy_over_kinetic {
-        writeln!(out, "  energy of body force {:.1} %", share * 100.0)?;
+    let mut lines = vec![
+        ("peak force", format!("{} ({kind})", Shown::force(peak).text(peak))),
+        (
+            "max crush",
+            format!(
+                "{:.4} m ({}); spline {}, monotone {}, energy {}, motion {}",
+                curve.max_deflection_m,
+                provenance.max_crush_rule.map_or("recorded", |rule| rule.name()),
+                metres(crush.spline_m),
+                metres(crush.monotone_m),
+                metres(crush.energy_m),
+                metres(crush.motion_m)
+            ),
+        ),
+        (
+            "energy",
+            format!(
+                "{}, {} of the impact's {}",
+                energy.text(curve.energy_j),
+                percent(provenance.energy_over_kinetic),
+                energy.text(provenance.kinetic_energy_j)
+            ),
+        ),
+    ];
+    let of_body = provenance.body_energy_over_kinetic;
+    lines.extend(of_body.map(|share| ("energy of body force", percent(share))));
+    for (kind, stiffness) in [
+        (provenance.force_kind, Some(curve.unloading_stiffness_n_per_m)),
+        (ForceKind::Body, curve.body_unloading_stiffness_n_per_m),
+    ] {
+        let Some(stiffness) = stiffness else { continue };
+        let (shown, name) = (Shown::stiffness(stiffness).text(stiffness), kind.name());
+        let drives = kind.drives();
+        lines.push(("unloading", format!("{shown} of the {name} force, which drives {drives}")));
     }
-    print_unloading(out, curve)?;
-    print_bands(out, curve)?;
-    writeln!(
-        out,
-        "  nearest training     {} away",
-        km_per_h(provenance.distance_to_nearest_m_per_s)
-    )?;
-    for warning in &curve.warnings {
-        writeln!(out, "  warning              {warning}")?;
+    lines.extend(curve.rebound.map(|rebound| ("rebound", km_per_h(rebound.speed_m_per_s))));
+    for (force, band) in provenance.bands() {
+        let (share, level) = (percent(band.pointwise_share), band.level * 100.0);
+        let (force, rests_on) = (force.name(), rests_on(&band, provenance.in_range));
+        lines.push((
+            "band",
+            format!(
+                "±{share} of the local {force} force: empirical range for {level:.0} % {rests_on}"
+            ),
+        ));
+        lines.extend(band.scatter.map(|scatter| {
+            let interpolation = percent(band.interpolation_share());
+            let scatter = percent(scatter.pointwise_share);
+            (
+                "of this",
+                format!("interpolation ±{interpolation}, scatter between repeated runs ±{scatter}"),
+            )
+        }));
+    }
+    if provenance.band.is_some() && provenance.body_band.is_none() && curve.body_force_n.is_some() {
+        lines.push(("band of body force", "unknown until the model is trained again".into()));
+    }
+    let away = km_per_h(provenance.distance_to_nearest_m_per_s);
+    lines.push(("nearest training", format!("{away} away")));
+    lines.extend(curve.warnings.iter().map(|warning| ("warning", warning.to_string())));
+    lines
+}
+
+fn print(out: &mut dyn Write, curve: &PredictedCurve) -> io::Result<()> {
+    let (speed, kind) = (km_per_h(curve.speed_m_per_s), curve.speed_kind.name());
+    writeln!(out, "{} at {speed} ({kind}) by {}", curve.provenance.group, curve.model)?;
+    for (name, line) in lines(curve) {
+        writeln!(out, "  {name:<20} {line}")?;
     }
     writeln!(out, "\nforce over deflection")?;
     draw_curve(out, &curve.deflection_m, &curve.force_n)

@@ -8,17 +8,32 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::GlobalOptions;
 use super::output::plain;
 
-/// A spinner that names the step just done.
+/// A spinner that names the step just done, or a bar over a known number of items; gone when it is dropped.
 pub(super) struct Bar(Option<ProgressBar>);
 
 impl Bar {
     pub(super) fn new(options: GlobalOptions, what: &'static str) -> Self {
-        let visible = !options.quiet && std::io::stderr().is_terminal();
-        Self(visible.then(|| {
+        Self::visible(options, || {
             let bar = ProgressBar::new_spinner().with_message(what);
             bar.enable_steady_tick(Duration::from_millis(100));
             bar
-        }))
+        })
+    }
+
+    /// With the time that is left.
+    pub(super) fn over(options: GlobalOptions, items: u64) -> Self {
+        Self::visible(options, || {
+            let bar = ProgressBar::new(items);
+            let template = "{wide_bar} {human_pos}/{human_len}, {per_sec}, {eta} left";
+            match ProgressStyle::with_template(template) {
+                Ok(style) => bar.with_style(style),
+                Err(_) => bar,
+            }
+        })
+    }
+
+    fn visible(options: GlobalOptions, make: impl FnOnce() -> ProgressBar) -> Self {
+        Self((!options.quiet && std::io::stderr().is_terminal()).then(make))
     }
 
     pub(super) fn step(&self, done: &str) {
@@ -27,45 +42,20 @@ impl Bar {
         }
     }
 
-    pub(super) fn end(self) {
-        if let Some(bar) = self.0 {
-            bar.finish_and_clear();
+    /// Sets how many items are done; what was done before the first call says nothing of the time left.
+    pub(super) fn set(&self, done: u64, is_first: bool) {
+        if let Some(bar) = &self.0 {
+            bar.set_position(done);
+            if is_first {
+                bar.reset_eta();
+            }
         }
     }
 }
 
-/// A bar over a known number of items, with the time that is left.
-pub(super) struct Count(Option<ProgressBar>);
-
-impl Count {
-    pub(super) fn new(options: GlobalOptions, items: u64) -> Self {
-        let visible = !options.quiet && std::io::stderr().is_terminal();
-        Self(visible.then(|| {
-            let bar = ProgressBar::new(items);
-            let template = "{wide_bar} {human_pos}/{human_len}, {per_sec}, {eta} left";
-            if let Ok(style) = ProgressStyle::with_template(template) {
-                bar.set_style(style);
-            }
-            bar
-        }))
-    }
-
-    /// Sets where it begins; what was done before says nothing of the time left.
-    pub(super) fn begin(&self, done: u64) {
+impl Drop for Bar {
+    fn drop(&mut self) {
         if let Some(bar) = &self.0 {
-            bar.set_position(done);
-            bar.reset_eta();
-        }
-    }
-
-    pub(super) fn set(&self, done: u64) {
-        if let Some(bar) = &self.0 {
-            bar.set_position(done);
-        }
-    }
-
-    pub(super) fn end(self) {
-        if let Some(bar) = self.0 {
             bar.finish_and_clear();
         }
     }

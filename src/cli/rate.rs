@@ -4,7 +4,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use super::arguments::one_of;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
+use super::histories::check_section;
+use super::{CommandResult, Failure, GlobalOptions, Outcome, failed, output, usage, usage_error};
 use crate::error::Error;
 use crate::file;
 use crate::formats;
@@ -13,6 +14,7 @@ use crate::rating::differences::MagnitudePhase;
 use crate::rating::iso18571::Iso18571;
 use crate::rating::{self, Quantity, Rating, RatingSettings, Signal};
 use crate::solver::{self, Selection, WantedId};
+use crate::table::Table;
 use crate::unit::TIME;
 
 /// Maximum number of bytes of a table that is rated: some million rows.
@@ -41,7 +43,7 @@ pub(super) struct Args {
     #[arg(value_name = "B", value_parser = Address::parse, allow_hyphen_values = true)]
     prediction: Address,
     #[command(flatten)]
-    both: Both,
+    both: SignalOptions,
     /// Filter both with this channel frequency class, such as 60 or 180
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     cfc: Option<u32>,
@@ -58,7 +60,7 @@ pub(super) struct Args {
 
 /// Where the signal is in both files.
 #[derive(clap::Args)]
-struct Both {
+struct SignalOptions {
     /// Column of the CSV files
     #[arg(long)]
     column: Option<String>,
@@ -117,13 +119,13 @@ impl Address {
 
 /// The history of a solver file that an address names.
 #[derive(Clone, Debug, Default, PartialEq)]
-struct History<'a> {
+struct HistoryAddress<'a> {
     section: Option<&'a str>,
     id: Option<WantedId>,
     component: Option<&'a str>,
 }
 
-impl<'a> History<'a> {
+impl<'a> HistoryAddress<'a> {
     /// `ID`, `COMPONENT`, `ID:COMPONENT` or `SECTION:ID:COMPONENT`; an id may have a side,
     /// `3:surfa`.
     fn parse(text: &'a str) -> Result<Self, String> {
@@ -184,18 +186,13 @@ fn factor(text: &str) -> Result<f64, String> {
 }
 
 /// Where one signal stands, by its address and the options for both.
-struct Wanted<'a> {
+struct SignalRequest<'a> {
     address: &'a Address,
-    path: &'a Path,
-    column: Option<&'a str>,
-    id: Option<WantedId>,
-    component: Option<&'a str>,
-    section: Option<&'a str>,
-    format: Option<&'a str>,
+    both: &'a SignalOptions,
 }
 
 /// A signal as it was read, and what shows its kind.
-struct Read {
+struct LoadedSignal {
     signal: Signal,
     column: String,
     is_table: bool,
@@ -204,16 +201,7 @@ struct Read {
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let both = &args.both;
-    let wanted = |address| Wanted {
-        address,
-        path: address.path.as_path(),
-        column: address.within.as_deref().or(both.column.as_deref()),
-        id: both.id,
-        component: both.component.as_deref(),
-        section: both.section.as_deref(),
-        format: both.format.as_deref(),
-    };
-    let (a, b) = (wanted(&args.reference), wanted(&args.prediction));
+    let [a, b] = [&args.reference, &args.prediction].map(|address| SignalRequest { address, both });
     let (reference, prediction) = (a.read(options)?, b.read(options)?);
     used(args, [reference.is_table, prediction.is_table])?;
     same_unit_of_time(&a, &reference.signal, &b, &prediction.signal)?;
@@ -225,16 +213,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     };
     let settings = RatingSettings { quantity, cfc: args.cfc, from_s: args.from, to_s: args.to };
     let rating = rating::rate(&reference.signal, &prediction.signal, &settings)?;
-    for warning in &rating.warnings {
-        options.warn(warning);
-    }
-    if options.json {
-        output::print_json(&rating)?;
-    } else {
-        options.print(|out| print(out, &rating))?;
-    }
-    let clean = rating.warnings.is_empty() && reference.problems + prediction.problems == 0;
-    Ok(if clean { Outcome::Clean } else { Outcome::Warned })
+    let outcome = options.warn_all(&rating.warnings);
+    options.show(&rating, |out| print(out, &rating))?;
+    Ok(outcome.max(Outcome::warned_if(reference.problems + prediction.problems > 0)))
 }
 
 /// Refuses what chooses nothing: a column of a solver file, a node of a table.
@@ -252,7 +233,7 @@ fn used(args: &Args, is_table: [bool; 2]) -> Result<(), Failure> {
         ("--section", both.section.is_some(), !all_tables, history),
     ] {
         if given && !fits {
-            return Err(Failure::Usage(format!("{option} {why}")));
+            return usage(format!("{option} {why}"));
         }
     }
     Ok(())
@@ -262,7 +243,12 @@ fn used(args: &Args, is_table: [bool; 2]) -> Result<(), Failure> {
 const LENGTHS: f64 = 100.0;
 
 /// Units are not guessed: for records of very different lengths they must be given.
-fn same_unit_of_time(a: &Wanted, of_a: &Signal, b: &Wanted, of_b: &Signal) -> Result<(), Failure> {
+fn same_unit_of_time(
+    a: &SignalRequest,
+    of_a: &Signal,
+    b: &SignalRequest,
+    of_b: &Signal,
+) -> Result<(), Failure> {
     let length = |signal: &Signal| signal.range_s().1 - signal.range_s().0;
     let (long_a, long_b) = (length(of_a), length(of_b));
     let ratio = (long_a / long_b).max(long_b / long_a);
@@ -271,35 +257,36 @@ fn same_unit_of_time(a: &Wanted, of_a: &Signal, b: &Wanted, of_b: &Signal) -> Re
     }
     Err(failed(format!(
         "{} lasts {long_a} s and {} {long_b} s, if both count time in s: write the unit of each after its name, such as {},time=s and {},time=ms",
-        a.path.display(),
-        b.path.display(),
-        a.path.display(),
-        b.path.display()
+        a.path().display(),
+        b.path().display(),
+        a.path().display(),
+        b.path().display()
     )))
 }
 
-/// A failure with a message of the command's own.
-fn failed(message: String) -> Failure {
-    Failure::Failed(message.into())
-}
+impl SignalRequest<'_> {
+    fn path(&self) -> &Path {
+        &self.address.path
+    }
 
-impl Wanted<'_> {
-    fn read(&self, options: GlobalOptions) -> Result<Read, Failure> {
-        let is_table = self.path.extension().is_some_and(|extension| {
+    fn column(&self) -> Option<&str> {
+        self.address.within.as_deref().or(self.both.column.as_deref())
+    }
+
+    fn read(&self, options: GlobalOptions) -> Result<LoadedSignal, Failure> {
+        let is_table = self.path().extension().is_some_and(|extension| {
             ["csv", "tsv", "txt", "crv", "cur"].iter().any(|e| extension.eq_ignore_ascii_case(e))
         });
-        if is_table && self.format.is_none() {
+        if is_table && self.both.format.is_none() {
             return self.read_table();
         }
         match self.read_solver_file(options) {
             // Any other name may hold a table as well.
-            Err(Failure::Failed(error))
-                if error.downcast_ref().is_some_and(|e: &Error| e.is_about("format")) =>
-            {
+            Err(error) if error.downcast_ref().is_some_and(|e: &Error| e.is_about("format")) => {
                 match self.read_table() {
-                    Err(_) if self.column.is_none() => Err(failed(format!(
+                    Err(_) if self.column().is_none() => Err(failed(format!(
                         "{error}; a CSV file has the extension .csv, or its column after its name: {}:COLUMN",
-                        self.path.display()
+                        self.path().display()
                     ))),
                     read => read,
                 }
@@ -308,11 +295,11 @@ impl Wanted<'_> {
         }
     }
 
-    fn read_table(&self) -> Result<Read, Failure> {
-        let path = self.path.display();
-        let text = file::read(self.path, MAX_TABLE_BYTES);
+    fn read_table(&self) -> Result<LoadedSignal, Failure> {
+        let path = self.path().display();
+        let text = file::read(self.path(), MAX_TABLE_BYTES);
         let text = text.map_err(|e| failed(format!("{path}: {e}")))?;
-        let read = formats::history(&text, self.column).map_err(|error| {
+        let read = formats::history(&text, self.column()).map_err(|error| {
             let how = if error.is_about("column") {
                 format!(" after the file's name: {path}:COLUMN")
             } else {
@@ -332,32 +319,27 @@ impl Wanted<'_> {
         }
         let signal = self.signal(&read.name, &read.time, &read.values)?;
         let column = format!("{} {}", read.name, read.title);
-        Ok(Read { signal, column, is_table: true, problems: 0 })
+        Ok(LoadedSignal { signal, column, is_table: true, problems: 0 })
     }
 
-    fn read_solver_file(&self, options: GlobalOptions) -> Result<Read, Failure> {
+    fn read_solver_file(&self, options: GlobalOptions) -> Result<LoadedSignal, Failure> {
         let within = self.address.within.as_deref();
-        let named = within.map(History::parse).transpose().map_err(Failure::Usage)?;
+        let named = within.map(HistoryAddress::parse).transpose().map_err(usage_error)?;
         let named = named.unwrap_or_default();
-        let section = named.section.or(self.section);
+        let section = named.section.or(self.both.section.as_deref());
         let selection = Selection {
-            ids: named.id.or(self.id).map(|id| vec![id]),
-            components: named.component.or(self.component).map(|name| vec![name.into()]),
+            ids: named.id.or(self.both.id).map(|id| vec![id]),
+            components: named
+                .component
+                .or(self.both.component.as_deref())
+                .map(|name| vec![name.into()]),
             section: section.map(Into::into),
             ..Selection::all()
         };
-        let file = solver::read(self.path, self.format, &selection)?;
-        if let Some(section) = section.filter(|section| **section != *file.section) {
-            return Err(Failure::Usage(format!(
-                "{} has no section \"{section}\": it is a text file with the one section \"{}\"",
-                self.path.display(),
-                file.format
-            )));
-        }
-        for problem in &file.problems {
-            options.warn(&format!("{}: {problem}", self.path.display()));
-        }
-        let path = self.path.display();
+        let file = solver::read(self.path(), self.both.format.as_deref(), &selection)?;
+        check_section(self.path(), &file, section)?;
+        options.warn_of(self.path(), &file.problems);
+        let path = self.path().display();
         let history = match &file.histories[..] {
             [history] => history,
             [] => return Err(failed(format!("{path}: it holds no history"))),
@@ -379,13 +361,13 @@ impl Wanted<'_> {
             )));
         }
         let signal = self.signal(&label, &history.time, &history.values)?;
-        Ok(Read { signal, column: label, is_table: false, problems: file.problems.len() })
+        Ok(LoadedSignal { signal, column: label, is_table: false, problems: file.problems.len() })
     }
 
     /// The signal in s and scaled.
     fn signal(&self, column: &str, time: &[f64], values: &[f64]) -> Result<Signal, Failure> {
         let seconds = self.address.unit.map_or(1.0, |(_, seconds)| seconds);
-        let name = format!("{}: {column}", self.path.display());
+        let name = format!("{}: {column}", self.path().display());
         let scaled = |values: &[f64], by: f64| values.iter().map(|v| v * by).collect();
         Signal::new(&name, scaled(time, seconds), scaled(values, self.address.scale))
             .map_err(|error| failed(format!("{name}: {error}")))
@@ -407,12 +389,15 @@ fn print(out: &mut dyn Write, rating: &Rating) -> io::Result<()> {
         milliseconds(rating.to_s),
         milliseconds(rating.interval_s),
     )?;
-    let (rows, notes): (Vec<_>, Vec<_>) =
-        rows(rating).into_iter().map(|[measure, value, note]| (vec![measure, value], note)).unzip();
+    let rows = rows(rating);
+    let measures = Table::of(&rows)
+        .column("measure", |[measure, ..]| measure)
+        .column("value", |[_, value, _]| value);
     let mut table = Vec::new();
-    output::table(&mut table, &["measure", "value"], &rows)?;
+    output::table(&mut table, measures)?;
     let table = String::from_utf8_lossy(&table).into_owned();
-    let notes = std::iter::once(String::new()).chain(notes);
+    // What belongs to a value goes on behind it.
+    let notes = std::iter::once("").chain(rows.iter().map(|[.., note]| note.as_str()));
     for (line, note) in table.lines().zip(notes) {
         writeln!(out, "{}", format!("{line}  {note}").trim_end())?;
     }

@@ -1,18 +1,15 @@
 //! `crumple report`: one HTML page about a database and its runs.
 
-use std::io::{self, Write};
 use std::path::PathBuf;
 
 use crate::database::Database;
 use crate::file::write_whole;
 use crate::report::{MethodSpeeds, ReportSettings, report};
-use serde::Serialize;
 
 use super::arguments::{self, one_of};
 use super::file_kind::FileKind;
-use super::output;
 use super::progress::Bar;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_input, keep_inputs};
+use super::{CommandResult, GlobalOptions, Outcome, keep_input, keep_inputs, output};
 
 /// Write one self-contained HTML page: curves, validation, predictions, methods, train results
 #[derive(clap::Args)]
@@ -55,22 +52,11 @@ const METHODS: &[(&str, MethodSpeeds, &str)] = &[
     ("all", MethodSpeeds::All, "Every inner speed"),
 ];
 
-#[derive(Serialize)]
-struct Document {
-    file: PathBuf,
-    bytes: usize,
-    warnings: usize,
-}
-
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     keep_input(&args.database, &args.output)?;
     args.scenarios.iter().try_for_each(|scenario| keep_inputs(scenario, &args.output))?;
     options.keep_others(&args.output, FileKind::Curve)?;
-    if is_stdout(&args.output) && options.json {
-        return Err(Failure::Usage(
-            "standard output can take only one of them: \"-o -\", or --json".into(),
-        ));
-    }
+    let to_stdout = options.on_stdout([&args.output])?;
     let database = Database::read(&args.database)?;
     let settings = ReportSettings {
         title: args.title.clone(),
@@ -81,30 +67,19 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         seed: args.seed,
     };
     let bar = Bar::new(options, "reporting");
-    let made =
-        report(&args.database, &database, &args.scenarios, &[], &settings, |step| bar.step(step));
-    bar.end();
-    let (page, warnings) = made?;
-    if is_stdout(&args.output) {
+    let (page, warnings) =
+        report(&args.database, &database, &args.scenarios, &[], &settings, |step| bar.step(step))?;
+    drop(bar);
+    let outcome = Outcome::warned_if(warnings > 0);
+    if to_stdout {
         output::print_data(|out| out.write_all(page.as_bytes()))?;
-        return Ok(outcome(warnings));
+        return Ok(outcome);
     }
     write_whole(&args.output, page.as_bytes())?;
-    let document = Document { file: args.output.clone(), bytes: page.len(), warnings };
-    if options.json {
-        output::print_json(&document)?;
-    } else {
-        options.print(|out| print(out, &document))?;
-    }
-    Ok(outcome(warnings))
-}
-
-fn outcome(warnings: usize) -> Outcome {
-    if warnings == 0 { Outcome::Clean } else { Outcome::Warned }
-}
-
-fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
-    let Document { file, bytes, warnings } = document;
-    let kilobytes = bytes.div_ceil(1000);
-    writeln!(out, "wrote {} ({kilobytes} kB); warnings in it: {warnings}", file.display())
+    let document = document! { file: &args.output, bytes: page.len(), warnings: warnings };
+    options.show(&document, |out| {
+        let (file, kilobytes) = (args.output.display(), page.len().div_ceil(1000));
+        writeln!(out, "wrote {file} ({kilobytes} kB); warnings in it: {warnings}")
+    })?;
+    Ok(outcome)
 }

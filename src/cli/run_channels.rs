@@ -7,18 +7,18 @@ use crate::formats::iso_mme::{Channel, Test, folder, interval_s, object};
 use crate::multibody::Run;
 use crate::scenario::Prepared;
 
-use super::Failure;
+use super::{Failure, usage};
 
 /// Writes the run into the folder at `path`, whose name without its extension names the files.
 pub(super) fn write(path: &Path, prepared: &Prepared, run: &Run) -> Result<(), Failure> {
     let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or("run");
     let bodies = prepared.chain.bodies();
     if bodies.len() > OBJECTS {
-        return Err(Failure::Usage(format!(
+        return usage(format!(
             "-o {}: ISO-MME names at most {OBJECTS} test objects, the chain has {} bodies: write a .csv file",
             path.display(),
             bodies.len()
-        )));
+        ));
     }
     let of = |k: usize| object(k).unwrap_or('?');
     let mut channels = Vec::new();

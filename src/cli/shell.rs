@@ -4,10 +4,8 @@ use std::path::{Path, PathBuf};
 
 use crate::file::write_whole;
 use clap::{Command, CommandFactory};
-use serde::Serialize;
 
-use super::output;
-use super::{Cli, CommandResult, GLOBAL, GlobalOptions, Outcome};
+use super::{Cli, CommandResult, GLOBAL, GlobalOptions, Outcome, output};
 
 /// Print a completion script for a shell
 #[derive(clap::Args)]
@@ -104,11 +102,6 @@ pub(super) fn man(args: &Man, options: GlobalOptions) -> CommandResult {
     print(&page, options)
 }
 
-#[derive(Serialize)]
-struct Pages {
-    written: Vec<PathBuf>,
-}
-
 /// Writes a page of every command and of each of its own commands.
 fn write_pages(folder: &Path, options: GlobalOptions) -> CommandResult {
     std::fs::create_dir_all(folder).map_err(|source| {
@@ -119,13 +112,9 @@ fn write_pages(folder: &Path, options: GlobalOptions) -> CommandResult {
     command.build();
     let mut written = Vec::new();
     pages(&command, "crumple", folder, &mut written)?;
-    if options.json {
-        output::print_json(&Pages { written })?;
-    } else {
-        options.print(|out| {
-            written.iter().try_for_each(|path| writeln!(out, "wrote {}", path.display()))
-        })?;
-    }
+    options.show(&document! { written: &written }, |out| {
+        written.iter().try_for_each(|path| writeln!(out, "wrote {}", path.display()))
+    })?;
     Ok(Outcome::Clean)
 }
 
@@ -146,14 +135,9 @@ fn pages(
     Ok(())
 }
 
-#[derive(Serialize)]
-struct Text {
-    text: String,
-}
-
 fn print(bytes: &[u8], options: GlobalOptions) -> CommandResult {
     if options.json {
-        output::print_json(&Text { text: String::from_utf8_lossy(bytes).into_owned() })?;
+        output::print_json(&document! { text: String::from_utf8_lossy(bytes) })?;
     } else {
         output::print_data(|out| out.write_all(bytes))?;
     }

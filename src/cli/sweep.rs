@@ -2,20 +2,21 @@
 
 use crate::plural::counted;
 use std::fs::OpenOptions;
-use std::io::{self, Write};
+use std::io::Write;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use crate::error::Error;
-use crate::sweep::{self, ColumnStatistics, Report, Shard, Sweep, VariableSummary, WriteOptions};
-use serde::Serialize;
+use crate::sweep::{self, ColumnStatistics, Report, Shard, Sweep, WriteOptions};
+use crate::table::Table;
 
-use super::output;
-use super::progress::Count;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, is_stdout, keep_input, keep_inputs};
+use super::progress::Bar;
+use super::{
+    CommandResult, Failure, GlobalOptions, Outcome, failed, is_stdout, keep_input, keep_inputs,
+    output, usage,
+};
 
 /// Run a scenario many times with varied speeds, masses, gaps and curves; a row of results each
 ///
@@ -90,7 +91,7 @@ pub(super) fn run(args: &Args, global: GlobalOptions) -> CommandResult {
         return merge(shards, output, global);
     }
     let Some(scenario) = &args.scenario else {
-        return Err(Failure::Usage("name the scenario".into()));
+        return usage("name the scenario");
     };
     if let Some(output) = &args.output {
         keep_inputs(scenario, output)?;
@@ -99,21 +100,16 @@ pub(super) fn run(args: &Args, global: GlobalOptions) -> CommandResult {
         }
         check_output(output)?;
         if args.shard.is_some_and(|shard| shard != Shard::WHOLE) && is_hdf5(output) {
-            return Err(Failure::Usage(format!(
+            return usage(format!(
                 "-o {}: a shard is written as .csv, which merge joins and writes as .csv, .h5 or .hdf5",
                 output.display()
-            )));
+            ));
         }
-        if is_stdout(output) && global.json {
-            let message = "-o - and --json both write to standard output: give one of them";
-            return Err(Failure::Usage(message.into()));
-        }
+        global.on_stdout([output])?;
     }
     let begun = Instant::now();
     let sweep = Sweep::load(scenario, args.plan.as_deref())?;
-    for warning in sweep.warnings() {
-        global.warn(warning);
-    }
+    global.warn_all(sweep.warnings());
     let shard = args.shard.unwrap_or(Shard::WHOLE);
     let output = match &args.output {
         Some(output) if !args.dry_run => output,
@@ -122,14 +118,12 @@ pub(super) fn run(args: &Args, global: GlobalOptions) -> CommandResult {
     let options = WriteOptions { shard, restart: args.restart, ..WriteOptions::default() };
     let report = write(&sweep, output, &options, global)?;
     if !report.is_complete() {
-        let message = format!(
-            "stopped after {} of {} rows; the same command resumes there",
-            report.done, report.rows
-        );
-        return Err(Failure::Failed(message.into()));
+        let Report { done, rows, .. } = report;
+        let message =
+            format!("stopped after {done} of {rows} rows; the same command resumes there");
+        return Err(failed(message));
     }
-    let document = Document::new(&report, begun, output);
-    say(&document, global, is_stdout(output))
+    say(&report, begun, output, global)
 }
 
 fn is_hdf5(output: &Path) -> bool {
@@ -142,10 +136,7 @@ fn check_output(output: &Path) -> Result<(), Failure> {
     match output.extension().and_then(|e| e.to_str()) {
         _ if is_stdout(output) || is_device => Ok(()),
         Some("csv" | "h5" | "hdf5") => Ok(()),
-        _ => Err(Failure::Usage(format!(
-            "-o {}: results are written as .csv, .h5 or .hdf5",
-            output.display()
-        ))),
+        _ => usage(format!("-o {}: results are written as .csv, .h5 or .hdf5", output.display())),
     }
 }
 
@@ -156,13 +147,11 @@ fn write(
     global: GlobalOptions,
 ) -> Result<Report, Failure> {
     let items = options.shard.items(sweep.items());
-    let bar = Count::new(global, items.end - items.start);
-    let mut begun = false;
+    let bar = Bar::over(global, items.end - items.start);
+    let mut is_first = true;
     let is_device = output.metadata().is_ok_and(|meta| !meta.is_file() && !meta.is_dir());
-    let mut step = |done: u64| {
-        if std::mem::replace(&mut begun, true) { bar.set(done) } else { bar.begin(done) }
-    };
-    let report = if is_stdout(output) || is_device {
+    let mut step = |done: u64| bar.set(done, std::mem::take(&mut is_first));
+    if is_stdout(output) || is_device {
         let mut progress = |done| {
             step(done);
             ControlFlow::Continue(())
@@ -187,9 +176,7 @@ fn write(
             }
         })
         .map_err(Failure::from)
-    };
-    bar.end();
-    report
+    }
 }
 
 /// Set by the first Ctrl-C (or SIGTERM), so that a run ends after the chunk it is at; the
@@ -213,27 +200,11 @@ fn merge(shards: &[PathBuf], output: &Path, global: GlobalOptions) -> CommandRes
         keep_input(input, output)?;
     }
     let begun = Instant::now();
-    let report: Result<Report, Error> = sweep::merge(shards, output);
-    say(&Document::new(&report?, begun, output), global, false)
+    say(&sweep::merge(shards, output)?, begun, output, global)
 }
 
-/// What `--json` prints.
-#[derive(Serialize)]
-struct Document<'a> {
-    #[serde(flatten)]
-    report: &'a Report,
-    seconds: f64,
-    output: &'a Path,
-}
-
-impl<'a> Document<'a> {
-    fn new(report: &'a Report, begun: Instant, output: &'a Path) -> Self {
-        Self { report, seconds: begun.elapsed().as_secs_f64(), output }
-    }
-}
-
-fn say(document: &Document<'_>, global: GlobalOptions, to_stdout: bool) -> CommandResult {
-    let Document { report, seconds, output } = document;
+fn say(report: &Report, begun: Instant, output: &Path, global: GlobalOptions) -> CommandResult {
+    let seconds = begun.elapsed().as_secs_f64();
     if report.failed > 0 {
         let mut text = format!(
             "{} of {} items failed; their rows give the reason",
@@ -250,42 +221,39 @@ fn say(document: &Document<'_>, global: GlobalOptions, to_stdout: bool) -> Comma
             report.warned, report.rows
         ));
     }
-    if global.json {
-        output::print_json(document)?;
-    } else if !to_stdout {
-        global.print(|out| {
-            table(out, &report.columns)?;
-            let resumed = match report.resumed {
-                0 => String::new(),
-                n if n == report.rows => ", all from an earlier run".into(),
-                n => format!(", {n} of them from an earlier run"),
-            };
-            writeln!(
-                out,
-                "{}{resumed}, {} failed, {seconds:.1} s",
-                counted(report.rows, "item"),
-                report.failed
-            )?;
-            if report.resumed == report.rows && report.rows > 0 {
-                writeln!(out, "{} is complete: nothing was left to run", output.display())
-            } else {
-                writeln!(out, "wrote {}", output.display())
-            }
-        })?;
+    let outcome = Outcome::warned_if(report.failed + report.warned > 0);
+    if is_stdout(output) {
+        return Ok(outcome);
     }
-    Ok(if report.failed + report.warned > 0 { Outcome::Warned } else { Outcome::Clean })
+    let document = document! { #[serde(flatten)] report: report, seconds: seconds, output: output };
+    global.show(&document, |out| {
+        output::table(out, statistics(&report.columns))?;
+        let resumed = match report.resumed {
+            0 => String::new(),
+            n if n == report.rows => ", all from an earlier run".into(),
+            n => format!(", {n} of them from an earlier run"),
+        };
+        let (items, failed) = (counted(report.rows, "item"), report.failed);
+        writeln!(out, "{items}{resumed}, {failed} failed, {seconds:.1} s")?;
+        if report.resumed == report.rows && report.rows > 0 {
+            writeln!(out, "{} is complete: nothing was left to run", output.display())
+        } else {
+            writeln!(out, "wrote {}", output.display())
+        }
+    })?;
+    Ok(outcome)
 }
 
-fn table(out: &mut dyn Write, columns: &[ColumnStatistics]) -> io::Result<()> {
+fn statistics(columns: &[ColumnStatistics]) -> impl Into<Table> {
     let number = |value: Option<f64>| value.map_or("-".into(), digits);
-    let rows: Vec<Vec<String>> = columns
-        .iter()
-        .map(|c| {
-            let numbers = [c.min, c.p5, c.median, c.p95, c.max, c.mean].map(number);
-            [c.column.clone()].into_iter().chain(numbers).collect()
-        })
-        .collect();
-    output::table(out, &["column", "min", "5 %", "median", "95 %", "max", "mean"], &rows)
+    Table::of(columns)
+        .column("column", |c| &c.column)
+        .column("min", |c| number(c.min))
+        .column("5 %", |c| number(c.p5))
+        .column("median", |c| number(c.median))
+        .column("95 %", |c| number(c.p95))
+        .column("max", |c| number(c.max))
+        .column("mean", |c| number(c.mean))
 }
 
 /// Six digits.
@@ -299,57 +267,39 @@ fn digits(value: f64) -> String {
     }
 }
 
-#[derive(Serialize)]
-struct Preview {
-    items: u64,
-    shard: Shard,
-    rows: u64,
-    hash: String,
-    variables: Vec<VariableSummary>,
-    columns: Vec<String>,
-    /// The first items with their varied values.
-    first: Vec<(u64, Vec<String>)>,
-}
-
 fn dry_run(sweep: &Sweep, shard: Shard, global: GlobalOptions) -> CommandResult {
     let items = shard.items(sweep.items());
-    let preview = Preview {
+    let (rows, from) = (items.end - items.start, items.start);
+    let (variables, columns) = (sweep.variables(), sweep.columns());
+    let first: Vec<(u64, Vec<String>)> =
+        items.take(SHOWN as usize).map(|item| (item, sweep.values(item))).collect();
+    let document = document! {
         items: sweep.items(),
-        shard,
-        rows: items.end - items.start,
-        hash: sweep.hash().into(),
-        variables: sweep.variables(),
-        columns: sweep.columns(),
-        first: items.clone().take(SHOWN as usize).map(|k| (k, sweep.values(k))).collect(),
+        shard: shard,
+        rows: rows,
+        hash: sweep.hash(),
+        variables: &variables,
+        columns: &columns,
+        first: &first,
     };
-    if global.json {
-        output::print_json(&preview)?;
-        return Ok(Outcome::Clean);
-    }
-    global.print(|out| {
-        writeln!(out, "{}", counted(preview.items, "item"))?;
+    global.show(&document, |out| {
+        writeln!(out, "{}", counted(sweep.items(), "item"))?;
         if shard != Shard::WHOLE {
             let (index, count) = (shard.index(), shard.count());
-            writeln!(
-                out,
-                "shard {index}/{count}: {} from {} on",
-                counted(preview.rows, "item"),
-                items.start
-            )?;
+            writeln!(out, "shard {index}/{count}: {} from {from} on", counted(rows, "item"))?;
         }
-        for variable in &preview.variables {
+        for variable in &variables {
             match variable.values {
                 Some(count) => writeln!(out, "{}: {}", variable.column, counted(count, "value"))?,
                 None => writeln!(out, "{}: drawn", variable.column)?,
             }
         }
-        writeln!(out, "columns: {}", preview.columns.join(", "))?;
-        let mut heading = vec!["item"];
-        heading.extend(preview.variables.iter().map(|v| v.column.as_str()));
-        let row = |(item, values): &(u64, Vec<String>)| {
-            [item.to_string()].into_iter().chain(values.iter().cloned()).collect()
-        };
-        output::table(out, &heading, &preview.first.iter().map(row).collect::<Vec<_>>())
+        writeln!(out, "columns: {}", columns.join(", "))?;
+        let items = Table::of(&first).column("item", |(item, _)| item.to_string());
+        let table = variables.iter().enumerate().fold(items, |table, (k, variable)| {
+            table.column(&variable.column, |(_, values)| &values[k])
+        });
+        output::table(out, table)
     })?;
     Ok(Outcome::Clean)
 }

@@ -2,7 +2,7 @@
 
 use crate::plural::counted;
 use std::iter;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use crate::assess::choose::Purpose;
 use crate::assess::validate::{self, Choice};
@@ -10,18 +10,15 @@ use crate::curve::StoppedMass;
 use crate::database::Database;
 use crate::forest::{StopRule, Thresholds};
 use crate::surrogate::forest::ForestOptions;
-use crate::surrogate::leave_one_out::Validation;
-use crate::surrogate::max_crush::MaxCrushRule;
-use crate::surrogate::{CrushLaw, MODELS, Model, ModelKind, WarningCode};
+use crate::surrogate::{MODELS, ModelKind, WarningCode};
 use crate::unit::{Shown, SpeedKind, km_per_h};
 use clap::builder::{PossibleValue, PossibleValuesParser};
-use serde::Serialize;
 
 use super::arguments::one_of;
 use super::file_kind::FileKind;
-use super::output;
 use super::progress::Bar;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input};
+use super::validate::print_validation;
+use super::{CommandResult, Failure, GlobalOptions, keep_input, usage};
 
 /// Fit a model to the curves of a group and save it
 #[derive(clap::Args)]
@@ -105,21 +102,6 @@ const STOP_RULES: &[(&str, StopRuleAt, &str)] = &[
     ("std-over-mean", StopRule::StdOverMean, "sqrt(Var)/|Mean|"),
 ];
 
-#[derive(Serialize)]
-struct Document<'a> {
-    output: String,
-    group: &'a str,
-    model: &'a str,
-    options: &'a ModelKind,
-    max_crush_rule: MaxCrushRule,
-    training_speeds_m_per_s: Vec<f64>,
-    training_hash: &'a str,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    out_of_bag: Option<crate::forest::OutOfBag>,
-    crush_law: &'a Option<CrushLaw>,
-    validation: &'a Option<Validation>,
-}
-
 impl Args {
     fn choice(&self) -> Result<Choice, Failure> {
         let seed = self.seed;
@@ -130,9 +112,7 @@ impl Args {
         let kind = ModelKind::named(&self.model, seed);
         let has_forest = kind.is_some_and(|kind| kind.forest_options().is_some());
         if !has_forest && (self.thresholds.is_some() || kind.is_some() && self.trees.is_some()) {
-            return Err(Failure::Usage(
-                "--trees and --thresholds need --model forest or --model extra".into(),
-            ));
+            return usage("--trees and --thresholds need --model forest or --model extra");
         }
         let Some(kind) = kind else {
             return Ok(Choice::Auto {
@@ -160,10 +140,7 @@ impl Args {
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if !(args.stop_threshold >= 0.0 && args.stop_threshold.is_finite()) {
-        return Err(Failure::Usage(format!(
-            "--stop-threshold {} must be 0 or more",
-            args.stop_threshold
-        )));
+        return usage(format!("--stop-threshold {} must be 0 or more", args.stop_threshold));
     }
     let choice = args.choice()?;
     keep_input(&args.database, &args.output)?;
@@ -173,74 +150,60 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let bar = Bar::new(options, "training");
     bar.step(&format!("training {group}, with every speed left out"));
     let model = validate::train(group, cases, choice)?;
-    bar.end();
+    drop(bar);
     model.write(&args.output)?;
     let truncated: Vec<&str> =
         model.cases.iter().filter(|c| c.truncated).map(|c| c.name.as_str()).collect();
+    let mut warnings = Vec::new();
     if !truncated.is_empty() {
-        options.warn(&format!(
-            "runs that ended while loading are left out of the maximum crush: {}",
-            truncated.join(", ")
+        let names = truncated.join(", ");
+        warnings.push(format!(
+            "runs that ended while loading are left out of the maximum crush: {names}"
         ));
     }
     if model.cases.len() < 3 {
-        options.warn(&format!(
-            "the group has {}: with fewer than 3, no speed can be left out to assess the model",
-            counted(model.cases.len(), "curve")
+        let curves = counted(model.cases.len(), "curve");
+        warnings.push(format!(
+            "the group has {curves}: with fewer than 3, no speed can be left out to assess the model"
         ));
     }
-    let of_cases = model.case_warnings();
-    let of_cases = of_cases.iter().filter(|w| w.code == WarningCode::CaseWarning);
-    of_cases.clone().for_each(|warning| options.warn(&warning.message));
-    let warned = !truncated.is_empty() || model.cases.len() < 3 || of_cases.count() > 0;
-    print(&args.output, group, &model, options)?;
-    Ok(if warned { Outcome::Warned } else { Outcome::Clean })
-}
-
-/// Says what was trained and how good it is.
-fn print(path: &Path, group: &str, model: &Model, options: GlobalOptions) -> Result<(), Failure> {
+    let of_cases = model.case_warnings().into_iter();
+    warnings.extend(
+        of_cases.filter(|w| w.code == WarningCode::CaseWarning).map(|warning| warning.message),
+    );
+    let outcome = options.warn_all(warnings);
     let out_of_bag = model.forest().and_then(|forest| forest.forest().out_of_bag());
-    let speeds = || model.cases.iter().map(|c| c.speed_m_per_s);
-    if options.json {
-        output::print_json(&Document {
-            output: path.display().to_string(),
-            group,
-            model: model.name(),
-            options: &model.kind,
-            max_crush_rule: model.max_crush_rule,
-            training_speeds_m_per_s: speeds().collect(),
-            training_hash: &model.training_hash,
-            out_of_bag,
-            crush_law: &model.crush_law,
-            validation: &model.leave_one_out,
-        })?;
-    } else {
-        options.print(|out| {
-            let speeds: Vec<String> = speeds().map(km_per_h).collect();
-            writeln!(out, "{} on {}", model.name(), speeds.join(", "))?;
-            if let Some(oob) = out_of_bag {
-                let r2 = oob.r2.map_or("-".into(), |r2| format!("{r2:.5}"));
-                writeln!(
-                    out,
-                    "out-of-bag: rmse {}, r² {r2}",
-                    Shown::force(oob.rmse).text(oob.rmse)
-                )?;
-            }
-            let stopped = model.crush_law.as_ref().map(|law| &law.stopped);
-            if let Some(stopped) = stopped.filter(|stopped| stopped.is_known()) {
-                writeln!(out, "{}", stopped_mass_line(stopped, model.speed_kind))?;
-            }
-            if let Some(validation) = &model.leave_one_out {
-                if options.verbose {
-                    super::validate::print_means(out, validation)?;
-                } else {
-                    super::validate::print_summary(out, validation)?;
-                }
-            }
-            writeln!(out, "wrote {}", path.display())
-        })?;
-    }
-    Ok(())
+    let speeds: Vec<f64> = model.cases.iter().map(|c| c.speed_m_per_s).collect();
+    let path = args.output.display();
+    let document = document! {
+        output: path.to_string(),
+        group: group,
+        model: model.name(),
+        options: &model.kind,
+        max_crush_rule: model.max_crush_rule,
+        training_speeds_m_per_s: &speeds,
+        training_hash: &model.training_hash,
+        out_of_bag if_any: out_of_bag,
+        crush_law: &model.crush_law,
+        validation: &model.leave_one_out,
+    };
+    options.show(&document, |out| {
+        let speeds: Vec<String> = speeds.iter().map(|speed| km_per_h(*speed)).collect();
+        writeln!(out, "{} on {}", model.name(), speeds.join(", "))?;
+        if let Some(oob) = out_of_bag {
+            let r2 = oob.r2.map_or("-".into(), |r2| format!("{r2:.5}"));
+            writeln!(out, "out-of-bag: rmse {}, r² {r2}", Shown::force(oob.rmse).text(oob.rmse))?;
+        }
+        let stopped = model.crush_law.as_ref().map(|law| &law.stopped);
+        if let Some(stopped) = stopped.filter(|stopped| stopped.is_known()) {
+            writeln!(out, "{}", stopped_mass_line(stopped, model.speed_kind))?;
+        }
+        if let Some(validation) = &model.leave_one_out {
+            print_validation(out, validation, options)?;
+        }
+        writeln!(out, "wrote {path}")
+    })?;
+    Ok(outcome)
 }
 
 /// How much of the crush zone stops before the body, over which deflection, and how well the runs agree.

@@ -13,14 +13,14 @@ use crate::dataset::{TrainingSet, is_same_speed};
 use crate::surrogate::ModelKind;
 use crate::surrogate::band::{Band, LeftOutSpeeds, POWER_OF_GAP};
 use crate::surrogate::leave_one_out::{
-    Floor, LeftOut, Means, PeakError, Scatter, SpeedScatter, Validation,
+    Floor, LeftOut, PeakError, Scatter, SpeedScatter, Validation,
 };
 use crate::surrogate::max_crush::MaxCrushRule;
+use crate::table::Table;
 use crate::unit::km_per_h;
 
-use super::output;
 use super::progress::Bar;
-use super::{CommandResult, Failure, GlobalOptions, Outcome};
+use super::{CommandResult, GlobalOptions, Outcome, output, usage};
 
 /// Leave out every speed in turn, predict it with every model, and compare with FE
 #[derive(clap::Args)]
@@ -64,10 +64,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         None => database.groups().collect(),
     };
     if groups.is_empty() {
-        return Err(Failure::Usage(format!(
-            "{} has no groups: build a study into it",
-            args.database.display()
-        )));
+        return usage(format!("{} has no groups: build a study into it", args.database.display()));
     }
     let bar = Bar::new(options, "validating");
     let mut report = Report { groups: Vec::new() };
@@ -77,60 +74,55 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         let cases = database.group(&args.database, group)?;
         report.groups.push(match validated(args, group, cases) {
             Ok((validation, next_run)) => {
-                if !validation.notes.is_empty() && outcome == Outcome::Clean {
-                    outcome = Outcome::Warned;
-                }
                 GroupReport::Validated { validation: Box::new(validation), next_run }
             }
             Err(error) if groups.len() == 1 => return Err(error.into()),
             // The others can be validated all the same.
-            Err(error) => {
-                outcome = Outcome::Partly;
-                GroupReport::Failed { group: group.into(), error: error.to_string() }
+            Err(error) => GroupReport::Failed { group: group.into(), error: error.to_string() },
+        });
+    }
+    drop(bar);
+    for group in &report.groups {
+        outcome = outcome.max(match group {
+            GroupReport::Validated { validation, .. } => {
+                let (group, notes) = (&validation.group, &validation.notes);
+                options.warn_all(notes.iter().map(|note| format!("{group}: {note}")))
+            }
+            GroupReport::Failed { group, error } => {
+                output::eprint_line(&format!("error: {group}: {error}"));
+                Outcome::Partly
             }
         });
     }
-    bar.end();
-    say_notes(&report, options);
-    if options.json {
-        output::print_json(&report)?;
-    } else {
-        options.print(|out| {
-            let mut first = true;
-            for group in &report.groups {
-                let GroupReport::Validated { validation, next_run } = group else { continue };
-                if !std::mem::take(&mut first) {
-                    writeln!(out)?;
-                }
-                if options.verbose {
-                    print_group(out, validation)?;
-                } else {
-                    print_summary(out, validation)?;
-                }
-                if let Some(next) = next_run {
-                    print_next(out, next)?;
-                }
+    options.show(&report, |out| {
+        let mut first = true;
+        for group in &report.groups {
+            let GroupReport::Validated { validation, next_run } = group else { continue };
+            if !std::mem::take(&mut first) {
+                writeln!(out)?;
             }
-            Ok(())
-        })?;
-    }
+            if options.verbose {
+                print_means(out, validation)?;
+                print_speeds(out, validation)?;
+            } else {
+                print_summary(out, validation)?;
+            }
+            if let Some(next) = next_run {
+                print_next(out, next)?;
+            }
+        }
+        Ok(())
+    })?;
     Ok(outcome)
 }
 
-/// Says what was left out of the tables, and which groups have none.
-fn say_notes(report: &Report, options: GlobalOptions) {
-    for group in &report.groups {
-        match group {
-            GroupReport::Validated { validation, .. } => {
-                for note in &validation.notes {
-                    options.warn(&format!("{}: {note}", validation.group));
-                }
-            }
-            GroupReport::Failed { group, error } => {
-                output::say(&format!("error: {group}: {error}"));
-            }
-        }
-    }
+/// How good the models of a group are, in as much detail as was requested.
+pub(super) fn print_validation(
+    out: &mut dyn Write,
+    validation: &Validation,
+    options: GlobalOptions,
+) -> io::Result<()> {
+    if options.verbose { print_means(out, validation) } else { print_summary(out, validation) }
 }
 
 fn validated(
@@ -166,36 +158,56 @@ fn signed(error: f64) -> String {
     format!("{:+.1} %", error * 100.0)
 }
 
-/// Every table and line of a validation.
-fn print_group(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
-    print_means(out, validation)?;
+/// A model's name, marked if it is the chosen one.
+fn marked(model: &str, chosen: &str) -> String {
+    format!("{model}{}", if model == chosen { " *" } else { "" })
+}
+
+/// The errors at each speed that was left out.
+fn print_speeds(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
     for (inner, title) in [
         (true, "every inner speed left out"),
         (false, "the ends of the range left out: extrapolation"),
     ] {
-        let rows: Vec<Vec<String>> = validation
-            .rows
-            .iter()
-            .filter(|r| r.inner == inner)
-            .map(|r| row(r, &validation.chosen))
-            .chain(validation.floors.iter().filter(|f| f.inner == inner).map(floor))
-            .chain(scatter_rows(validation, inner))
-            .collect();
-        if !rows.is_empty() {
+        let rows = validation.rows.iter().filter(|row| row.inner == inner);
+        let peak = |row: &LeftOut, k: usize| row.peaks.get(k).map_or("-".into(), peak);
+        let mut table = Table::of(rows.clone())
+            .column("model", |row| marked(&row.model, &validation.chosen))
+            .column("speed", |row| km_per_h(row.speed_m_per_s))
+            .column("force", |row| percent(row.force_l1))
+            .column("energy", |row| signed(row.energy_error))
+            .column("crush", |row| signed(row.max_crush_error))
+            .column("peak 1", |row| peak(row, 0))
+            .column("peak 2", |row| peak(row, 1))
+            .column("velocity", |row| percent(row.velocity_l1))
+            .column("acceleration", |row| {
+                acceleration(row.acceleration_l1, row.acceleration_unfiltered_l1)
+            })
+            .column("in band", |row| row.coverage.map_or("-".into(), percent));
+        for floor in validation.floors.iter().filter(|floor| floor.inner == inner) {
+            let unfiltered = floor.acceleration_unfiltered_l1;
+            table = table.row(&[
+                ("model", own_curve(&floor.force)),
+                ("speed", km_per_h(floor.speed_m_per_s)),
+                ("velocity", percent(floor.velocity_l1)),
+                ("acceleration", acceleration(floor.acceleration_l1, unfiltered)),
+            ]);
+        }
+        for at in validation.scatter.iter().flat_map(|scatter| &scatter.speeds) {
+            // Of speeds that have rows of models.
+            if rows.clone().any(|row| is_same_speed(row.speed_m_per_s, at.speed_m_per_s)) {
+                table = table.row(&[
+                    ("model", SCATTER.into()),
+                    ("speed", km_per_h(at.speed_m_per_s)),
+                    ("force", percent(at.force_l1)),
+                    ("velocity", percent(at.velocity_l1)),
+                ]);
+            }
+        }
+        let table = Table::from(table);
+        if !table.rows.is_empty() {
             writeln!(out, "\n{}: {title}", validation.group)?;
-            let heading = [
-                "model",
-                "speed",
-                "force",
-                "energy",
-                "crush",
-                "peak 1",
-                "peak 2",
-                "velocity",
-                "acceleration",
-                "in band",
-            ];
-            output::table(out, &heading, &rows)?;
+            output::table(out, table)?;
         }
     }
     Ok(())
@@ -213,17 +225,17 @@ fn print_next(out: &mut dyn Write, next: &NextRun) -> io::Result<()> {
 }
 
 /// The mean errors of each model, which is chosen and why, and a line for each band.
-pub(super) fn print_summary(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
+fn print_summary(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
     let group = &validation.group;
     if let Some(first) = validation.means.first() {
         writeln!(out, "{group}: mean errors over {} inner speeds left out in turn", first.speeds)?;
-        let of_model = |m: &Means| {
-            let mark = if m.model == validation.chosen { " *" } else { "" };
-            let errors = [m.force_l1, m.max_crush_error, m.velocity_l1, m.acceleration_l1];
-            [format!("{}{mark}", m.model)].into_iter().chain(errors.map(percent)).collect()
-        };
-        let rows: Vec<Vec<String>> = validation.means.iter().map(of_model).collect();
-        output::table(out, &["model", "force", "crush", "velocity", "acceleration"], &rows)?;
+        let table = Table::of(&validation.means)
+            .column("model", |m| marked(&m.model, &validation.chosen))
+            .column("force", |m| percent(m.force_l1))
+            .column("crush", |m| percent(m.max_crush_error))
+            .column("velocity", |m| percent(m.velocity_l1))
+            .column("acceleration", |m| percent(m.acceleration_l1));
+        output::table(out, table)?;
     }
     writeln!(out, "{} chosen (*): {}", validation.chosen, validation.reason)?;
     for (force, band) in bands(validation) {
@@ -243,23 +255,6 @@ pub(super) fn print_summary(out: &mut dyn Write, validation: &Validation) -> io:
         )?;
     }
     Ok(())
-}
-
-fn row(row: &LeftOut, chosen: &str) -> Vec<String> {
-    let mark = if row.model == chosen { " *" } else { "" };
-    let peak = |k: usize| row.peaks.get(k).map_or("-".into(), peak);
-    vec![
-        format!("{}{mark}", row.model),
-        km_per_h(row.speed_m_per_s),
-        percent(row.force_l1),
-        signed(row.energy_error),
-        signed(row.max_crush_error),
-        peak(0),
-        peak(1),
-        percent(row.velocity_l1),
-        acceleration(row.acceleration_l1, row.acceleration_unfiltered_l1),
-        row.coverage.map_or("-".into(), percent),
-    ]
 }
 
 fn acceleration(filtered: f64, unfiltered: f64) -> String {
@@ -282,17 +277,8 @@ fn own_curve(force: &str) -> String {
     }
 }
 
-fn floor(floor: &Floor) -> Vec<String> {
-    let mut cells = vec![own_curve(&floor.force), km_per_h(floor.speed_m_per_s)];
-    cells.extend(["-"; 5].map(String::from));
-    cells.push(percent(floor.velocity_l1));
-    cells.push(acceleration(floor.acceleration_l1, floor.acceleration_unfiltered_l1));
-    cells.push("-".into());
-    cells
-}
-
 /// The means over the inner speeds with the floors, and the choice.
-pub(super) fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
+fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
     let group = &validation.group;
     if let Some(first) = validation.means.first() {
         let speeds = first.speeds;
@@ -300,18 +286,43 @@ pub(super) fn print_means(out: &mut dyn Write, validation: &Validation) -> io::R
             out,
             "{group}: means over {speeds} inner speeds left out in turn; the body force drives the runs"
         )?;
-        let by_rule = MaxCrushRule::ALL.map(|rule| format!("by {}", rule.name()));
-        let mut heading = vec!["model", "force", "energy", "crush"];
-        heading.extend(by_rule.iter().map(String::as_str));
-        heading.extend(["velocity", "acceleration"]);
-        let rows: Vec<Vec<String>> = validation
-            .means
-            .iter()
-            .map(|m| means(m, &validation.chosen))
-            .chain(["contact", "body"].iter().filter_map(|f| mean_floor(validation, f)))
-            .chain(validation.scatter.as_ref().map(mean_scatter))
-            .collect();
-        output::table(out, &heading, &rows)?;
+        let mut table = Table::of(&validation.means)
+            .column("model", |m| marked(&m.model, &validation.chosen))
+            .column("force", |m| percent(m.force_l1))
+            .column("energy", |m| percent(m.energy_error))
+            .column("crush", |m| percent(m.max_crush_error));
+        for rule in MaxCrushRule::ALL {
+            table = table.column(format!("by {}", rule.name()), |m| {
+                let mark = if rule == m.max_crush_rule { " *" } else { "" };
+                let error = m.max_crush_errors.get(&rule);
+                error.map_or("-".into(), |e| format!("{}{mark}", percent(*e)))
+            });
+        }
+        table = table.column("velocity", |m| percent(m.velocity_l1)).column("acceleration", |m| {
+            acceleration(m.acceleration_l1, m.acceleration_unfiltered_l1)
+        });
+        for force in ["contact", "body"] {
+            let floors = validation.floors.iter().filter(|f| f.inner && f.force == force);
+            let count = floors.clone().count();
+            let mean = |of: fn(&Floor) -> f64| floors.clone().map(of).sum::<f64>() / count as f64;
+            if count > 0 {
+                let unfiltered = mean(|f| f.acceleration_unfiltered_l1);
+                table = table.row(&[
+                    ("model", own_curve(force)),
+                    ("velocity", percent(mean(|f| f.velocity_l1))),
+                    ("acceleration", acceleration(mean(|f| f.acceleration_l1), unfiltered)),
+                ]);
+            }
+        }
+        // Pooled over the speeds that have several runs.
+        if let Some(scatter) = &validation.scatter {
+            table = table.row(&[
+                ("model", SCATTER.into()),
+                ("force", percent(scatter.force_l1)),
+                ("velocity", percent(scatter.velocity_l1)),
+            ]);
+        }
+        output::table(out, table)?;
     }
     writeln!(out, "{group}: {} chosen (*): {}", validation.chosen, validation.reason)?;
     for model in &validation.unsuited {
@@ -337,30 +348,6 @@ fn bands(validation: &Validation) -> impl Iterator<Item = (&'static str, &Band)>
 
 /// What the rows of the scatter are called.
 const SCATTER: &str = "FE scatter (floor)";
-
-/// The scatter at the speeds that have several runs and rows of models, inner or not.
-fn scatter_rows(validation: &Validation, inner: bool) -> impl Iterator<Item = Vec<String>> + '_ {
-    let is_in_table = move |at: &&SpeedScatter| {
-        let mut rows = validation.rows.iter().filter(|row| row.inner == inner);
-        rows.any(|row| is_same_speed(row.speed_m_per_s, at.speed_m_per_s))
-    };
-    validation.scatter.iter().flat_map(|of| &of.speeds).filter(is_in_table).map(|at| {
-        let mut cells = vec![SCATTER.into(), km_per_h(at.speed_m_per_s), percent(at.force_l1)];
-        cells.extend(["-"; 4].map(String::from));
-        cells.push(percent(at.velocity_l1));
-        cells.extend(["-"; 2].map(String::from));
-        cells
-    })
-}
-
-/// The scatter, pooled over the speeds that have several runs.
-fn mean_scatter(scatter: &Scatter) -> Vec<String> {
-    let mut cells = vec![SCATTER.into(), percent(scatter.force_l1)];
-    cells.extend(["-"; 6].map(String::from));
-    cells.push(percent(scatter.velocity_l1));
-    cells.push("-".into());
-    cells
-}
 
 /// How far repeated runs lie from their mean.
 fn scatter_line(scatter: &Scatter) -> String {
@@ -410,40 +397,4 @@ fn band_line(force: &str, band: &Band) -> String {
         band.level * 100.0,
         counted(band.curves, of)
     )
-}
-
-fn means(means: &Means, chosen: &str) -> Vec<String> {
-    let mark = if means.model == chosen { " *" } else { "" };
-    let mut cells = vec![
-        format!("{}{mark}", means.model),
-        percent(means.force_l1),
-        percent(means.energy_error),
-        percent(means.max_crush_error),
-    ];
-    cells.extend(MaxCrushRule::ALL.iter().map(|rule| {
-        let mark = if *rule == means.max_crush_rule { " *" } else { "" };
-        let error = means.max_crush_errors.get(rule);
-        error.map_or("-".into(), |e| format!("{}{mark}", percent(*e)))
-    }));
-    cells.push(percent(means.velocity_l1));
-    cells.push(acceleration(means.acceleration_l1, means.acceleration_unfiltered_l1));
-    cells
-}
-
-/// FE's own curves over the inner speeds.
-fn mean_floor(validation: &Validation, force: &str) -> Option<Vec<String>> {
-    let inner: Vec<&Floor> =
-        validation.floors.iter().filter(|f| f.inner && f.force == force).collect();
-    let mean =
-        |of: fn(&Floor) -> f64| inner.iter().map(|f| of(f)).sum::<f64>() / inner.len() as f64;
-    (!inner.is_empty()).then(|| {
-        let mut cells = vec![own_curve(force)];
-        cells.extend(["-"; 7].map(String::from));
-        cells.push(percent(mean(|f| f.velocity_l1)));
-        cells.push(acceleration(
-            mean(|f| f.acceleration_l1),
-            mean(|f| f.acceleration_unfiltered_l1),
-        ));
-        cells
-    })
 }

@@ -27,9 +27,9 @@ use crate::study::StudyKind;
 use crate::unit::UnitSystem;
 pub use folders::LeftOut;
 pub use proposal::Proposal;
-pub(crate) use proposal::{Proposed, ProposedRun};
+pub(crate) use proposal::Proposed;
 pub use propose::{Request, propose};
-pub(crate) use scenario::{ScenarioProposal, propose_scenario};
+pub(crate) use scenario::propose_scenario;
 
 /// Refuses a file that exists already.
 pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {

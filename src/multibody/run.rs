@@ -1,7 +1,7 @@
 //! Settings and results of a run: method, times, histories, warnings, errors.
 
 use schemars::JsonSchema;
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 
 use super::chain::{Body, Chain, Interface};
 use super::law::ForceLaw;
@@ -124,21 +124,28 @@ pub struct BodyHistory {
 }
 
 /// Histories of one interface, one value per output, and its extremes over all steps.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct InterfaceHistory {
     /// Deflection in m, below 0 while a gap is open.
+    #[serde(skip)]
     pub deflection_m: Vec<f64>,
     /// Net force in N, below 0 where a coupling pulls.
+    #[serde(skip)]
     pub force_n: Vec<f64>,
     /// Maximum deflection so far, in m.
+    #[serde(skip)]
     pub largest_deflection_m: Vec<f64>,
     /// Energy that is returned, in J.
+    #[serde(skip)]
     pub stored_j: Vec<f64>,
     /// Energy that is lost, in J.
+    #[serde(skip)]
     pub dissipated_j: Vec<f64>,
     /// Largest pushing force in N.
+    #[serde(rename = "peak_force_N")]
     pub peak_force_n: f64,
     /// Largest pulling force in N; 0 without a coupling.
+    #[serde(rename = "peak_tension_N")]
     pub peak_tension_n: f64,
     /// Largest extension of the coupling in m; 0 without one.
     pub max_extension_m: f64,

@@ -2,18 +2,19 @@
 
 use super::figure::Figure;
 use super::page::{energy, force, mass, metres, percent, signed_percent};
-use super::{Cell, Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, Table};
-use crate::assess::ComparisonSettings;
+use super::{Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section};
 use crate::assess::choose::{Purpose, Selection, next_run};
-use crate::assess::compare::{Comparison, compare, inner_speeds};
+use crate::assess::compare::{Comparison, compare, inner_speeds, mean};
 use crate::assess::validate::{Choice, train_chosen, validate};
+use crate::assess::{ComparisonSettings, Row};
 use crate::charts;
 use crate::curve::{Case, ForceKind};
 use crate::dataset::TrainingSet;
 use crate::error::Error;
 use crate::plural::counted;
-use crate::surrogate::leave_one_out::{LeftOut, Means, Validation};
+use crate::surrogate::leave_one_out::{LeftOut, Validation};
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
+use crate::table::{Cell, Table};
 use crate::unit::km_per_h;
 
 /// Adds the section of a group.
@@ -30,7 +31,7 @@ pub(super) fn add(
             format!("g{number}-curves"),
             charts::group_curves(group, cases, own_force(cases)),
         )),
-        Part::Table(runs(group, cases)),
+        Part::table(format!("FE runs of {group}"), runs(cases)),
     ];
     for case in cases {
         for warning in &case.quality.warnings {
@@ -76,40 +77,24 @@ fn own_force(cases: &[Case]) -> ForceKind {
 }
 
 /// Speed, mass, peak, crush and audit of every run.
-fn runs(group: &str, cases: &[Case]) -> Table {
+fn runs(cases: &[Case]) -> impl Into<Table> {
     let kind = cases.first().map_or("impact", |case| case.conditions.speed.kind.name());
-    let heading = [
-        "run",
-        &format!("{kind} speed"),
-        "mass",
-        "peak force",
-        "maximum crush",
-        "work",
-        "work / energy",
-        "warnings",
-    ];
-    let rows = cases.iter().map(|case| {
-        let warnings = case.quality.warnings.len();
-        vec![
-            case.id.name.as_str().into(),
-            km_per_h(case.conditions.speed.m_per_s).into(),
-            masses(case).into(),
-            force(case.peak_force_n()).into(),
-            metres(case.max_deflection_m()).into(),
-            energy(case.quality.audit.work_j).into(),
-            format!("{:.3}", case.quality.audit.ratio()).into(),
-            Cell {
-                text: if warnings == 0 { "none".into() } else { warnings.to_string() },
-                title: case.quality.warnings.join("; "),
-                is_chosen: false,
-            },
-        ]
-    });
-    Table {
-        caption: format!("FE runs of {group}"),
-        heading: heading.map(String::from).to_vec(),
-        rows: rows.collect(),
-    }
+    Table::of(cases)
+        .column("run", |case| &case.id.name)
+        .column(format!("{kind} speed"), |case| km_per_h(case.conditions.speed.m_per_s))
+        .column("mass", |case| masses(case))
+        .column("peak force", |case| force(case.peak_force_n()))
+        .column("maximum crush", |case| metres(case.max_deflection_m()))
+        .column("work", |case| energy(case.quality.audit.work_j))
+        .column("work / energy", |case| format!("{:.3}", case.quality.audit.ratio()))
+        .column("warnings", |case| {
+            let warnings = &case.quality.warnings;
+            let text = match warnings.len() {
+                0 => "none".into(),
+                count => count.to_string(),
+            };
+            Cell { text, title: warnings.join("; "), is_chosen: false }
+        })
 }
 
 fn masses(case: &Case) -> String {
@@ -148,7 +133,12 @@ impl Validated<'_> {
             content.figures.push(KeyFigure { value, name: format!("velocity error, {group}") });
         }
         if !validation.means.is_empty() {
-            parts.push(Part::Table(self.models()));
+            let speeds = validation.means.first().map_or(0, |means| means.speeds);
+            let left_out = counted(speeds, "inner speed");
+            let caption = format!(
+                "{group}: errors against FE, means over {left_out}, each left out in turn (Σ|p − r|/Σ|r|; the body force drives one mass)"
+            );
+            parts.push(Part::table(caption, self.models()));
         }
         parts.push(Part::Text(format!("Chosen: {} ({}).", validation.chosen, validation.reason)));
         if let Some(scatter) = &validation.scatter {
@@ -185,32 +175,15 @@ impl Validated<'_> {
         inner.max_by(|a, b| a.force_l1.total_cmp(&b.force_l1))
     }
 
-    fn models(&self) -> Table {
-        let Self { group, validation, .. } = self;
-        let speeds = validation.means.first().map_or(0, |means| means.speeds);
-        let heading =
-            ["model", "force", "energy", "maximum crush", "velocity", "acceleration (CFC 60)"];
-        let row = |means: &Means| {
-            let is_chosen = means.model == validation.chosen;
-            let texts = [
-                means.model.clone(),
-                percent(means.force_l1),
-                percent(means.energy_error),
-                percent(means.max_crush_error),
-                percent(means.velocity_l1),
-                percent(means.acceleration_l1),
-            ];
-            let cell = |text| Cell { text, title: String::new(), is_chosen };
-            texts.map(cell).to_vec()
-        };
-        let left_out = counted(speeds, "inner speed");
-        Table {
-            caption: format!(
-                "{group}: errors against FE, means over {left_out}, each left out in turn (Σ|p − r|/Σ|r|; the body force drives one mass)"
-            ),
-            heading: heading.map(String::from).to_vec(),
-            rows: validation.means.iter().map(row).collect(),
-        }
+    fn models(&self) -> impl Into<Table> {
+        Table::of(&self.validation.means)
+            .column("model", |means| &means.model)
+            .column("force", |means| percent(means.force_l1))
+            .column("energy", |means| percent(means.energy_error))
+            .column("maximum crush", |means| percent(means.max_crush_error))
+            .column("velocity", |means| percent(means.velocity_l1))
+            .column("acceleration (CFC 60)", |means| percent(means.acceleration_l1))
+            .chosen(|means| means.model == self.validation.chosen)
     }
 
     /// The curve at the requested speed, or in the middle of the widest interval.
@@ -249,10 +222,9 @@ impl Validated<'_> {
     fn add_curve(&self, parts: &mut Vec<Part>, model: &Model, curve: &PredictedCurve) {
         let chart = charts::prediction(curve, &model.cases);
         parts.push(Part::Figure(Figure::new(self.id("prediction"), chart)));
-        let peak = curve.force_n.iter().copied().fold(0.0, f64::max);
         let mut rows = vec![
             ("model".to_string(), curve.model.clone()),
-            ("peak force".into(), force(peak)),
+            ("peak force".into(), force(curve.peak_force_n())),
             ("maximum crush".into(), metres(curve.max_deflection_m)),
             ("energy of the curve".into(), energy(curve.energy_j)),
             ("energy over kinetic energy".into(), percent(curve.provenance.energy_over_kinetic)),
@@ -272,11 +244,10 @@ impl Validated<'_> {
                 rows.push((name, format!("±{}", percent(scatter.pointwise_share))));
             }
         }
-        parts.push(Part::Table(Table {
-            caption: "The curve".into(),
-            heading: vec!["quantity".into(), "value".into()],
-            rows: rows.into_iter().map(|(name, value)| vec![name.into(), value.into()]).collect(),
-        }));
+        let table = Table::of(&rows)
+            .column("quantity", |(name, _)| name)
+            .column("value", |(_, value)| value);
+        parts.push(Part::table("The curve", table));
     }
 
     /// FE, FDRM, NSDM, DDTCM and the best model at the inner speeds, left out in turn.
@@ -297,33 +268,22 @@ impl Validated<'_> {
             .map(|speed| compare(group, cases, *speed, &asked))
             .collect::<Result<Vec<Comparison>, _>>()?;
         let Some(first) = comparisons.first() else { return Ok(()) };
-        let rows = first.rows.iter().map(|row| {
-            let all =
-                || comparisons.iter().flat_map(|c| &c.rows).filter(|r| r.method == row.method);
-            let mean = |of: fn(&crate::assess::Row) -> f64| {
-                all().map(of).sum::<f64>() / all().count() as f64
-            };
-            let texts = [
-                row.method.clone(),
-                row.driven_by.map_or("spring and damper", ForceKind::name).into(),
-                percent(mean(|r| r.velocity_l1)),
-                percent(mean(|r| r.acceleration_l1)),
-                signed_percent(mean(|r| r.max_crush_m) / mean_crush(&comparisons) - 1.0),
-            ];
-            texts
-                .map(|text| Cell { text, title: String::new(), is_chosen: row.method == "best" })
-                .to_vec()
-        });
-        let heading = ["method", "driven by", "velocity", "acceleration (CFC 60)", "maximum crush"];
+        let mean = |row: &Row, of: fn(&Row) -> f64| mean(&comparisons, &row.method, of);
+        let table = Table::of(&first.rows)
+            .column("method", |row| &row.method)
+            .column("driven by", |row| row.driven_by.map_or("spring and damper", ForceKind::name))
+            .column("velocity", |row| percent(mean(row, |r| r.velocity_l1)))
+            .column("acceleration (CFC 60)", |row| percent(mean(row, |r| r.acceleration_l1)))
+            .column("maximum crush", |row| {
+                signed_percent(mean(row, |r| r.max_crush_m) / mean_crush(&comparisons) - 1.0)
+            })
+            .chosen(|row| row.method == "best");
+        let left_out = left_out_speeds(&speeds);
         parts.push(Part::Heading("Methods".into()));
-        parts.push(Part::Table(Table {
-            caption: format!(
-                "{group}: each method in one multi-body model against FE, {}",
-                left_out_speeds(&speeds)
-            ),
-            heading: heading.map(String::from).to_vec(),
-            rows: rows.collect(),
-        }));
+        parts.push(Part::table(
+            format!("{group}: each method in one multi-body model against FE, {left_out}"),
+            table,
+        ));
         parts.push(Part::Text(methods_explained(settings.nsdm_seeds)));
         Ok(())
     }
@@ -367,30 +327,24 @@ const HASH: usize = 12;
 
 /// The section of files that the curves come from.
 pub(super) fn add_sources<'a>(content: &mut Content, cases: impl Iterator<Item = &'a Case>) {
-    let mut rows = Vec::new();
-    for case in cases {
-        for source in &case.provenance.sources {
+    let sources =
+        cases.flat_map(|case| case.provenance.sources.iter().map(move |source| (&case.id, source)));
+    let table = Table::of(sources)
+        .column("run", |(id, _)| format!("{}, {}", id.group, id.name))
+        .column("file", |(_, source)| &source.path)
+        .column("format", |(_, source)| &source.format)
+        .column("solver", |(_, source)| {
             let solver = [&source.solver, &source.version].into_iter().flatten();
-            let solver: Vec<&str> = solver.map(String::as_str).collect();
-            rows.push(vec![
-                format!("{}, {}", case.id.group, case.id.name).into(),
-                source.path.as_str().into(),
-                source.format.as_str().into(),
-                solver.join(" ").into(),
-                format!("{} kB", source.size_bytes.div_ceil(1000)).into(),
-                Cell {
-                    text: source.blake3.chars().take(HASH).collect(),
-                    title: format!("BLAKE3 {}", source.blake3),
-                    is_chosen: false,
-                },
-            ]);
-        }
+            solver.map(String::as_str).collect::<Vec<_>>().join(" ")
+        })
+        .column("size", |(_, source)| format!("{} kB", source.size_bytes.div_ceil(1000)))
+        .column("BLAKE3", |(_, source)| Cell {
+            text: source.blake3.chars().take(HASH).collect(),
+            title: format!("BLAKE3 {}", source.blake3),
+            is_chosen: false,
+        });
+    if !table.items().is_empty() {
+        let parts = vec![Part::table("Files that the curves were made from", table)];
+        content.sections.push(Section { id: "sources".into(), title: "Sources".into(), parts });
     }
-    if rows.is_empty() {
-        return;
-    }
-    let heading = ["run", "file", "format", "solver", "size", "BLAKE3"].map(String::from).to_vec();
-    let table = Table { caption: "Files that the curves were made from".into(), heading, rows };
-    let parts = vec![Part::Table(table)];
-    content.sections.push(Section { id: "sources".into(), title: "Sources".into(), parts });
 }

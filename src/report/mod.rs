@@ -16,6 +16,7 @@ use serde::Serialize;
 use crate::database::Database;
 use crate::error::Error;
 use crate::surrogate::Model;
+use crate::table::Table;
 use figure::Figure;
 
 /// What a report is about.
@@ -46,36 +47,6 @@ pub(crate) enum MethodSpeeds {
     All,
 }
 
-/// A table of texts; the first column names, the others hold values.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct Table {
-    caption: String,
-    heading: Vec<String>,
-    rows: Vec<Vec<Cell>>,
-}
-
-/// A text with details.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct Cell {
-    text: String,
-    /// Shown where the pointer rests; empty for nothing.
-    title: String,
-    /// Whether its row is what was chosen.
-    is_chosen: bool,
-}
-
-impl From<String> for Cell {
-    fn from(text: String) -> Self {
-        Self { text, title: String::new(), is_chosen: false }
-    }
-}
-
-impl From<&str> for Cell {
-    fn from(text: &str) -> Self {
-        Self::from(text.to_string())
-    }
-}
-
 /// A number that stands out at the top, with its name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct KeyFigure {
@@ -91,7 +62,17 @@ pub(crate) enum Part {
     Heading(String),
     Text(String),
     Figure(Figure),
-    Table(Table),
+    Table {
+        caption: String,
+        #[serde(flatten)]
+        table: Table,
+    },
+}
+
+impl Part {
+    fn table(caption: impl Into<String>, table: impl Into<Table>) -> Self {
+        Self::Table { caption: caption.into(), table: table.into() }
+    }
 }
 
 /// A part of the page with a heading.

@@ -24,7 +24,7 @@ pub(super) fn html(content: &Content) -> String {
     let figures: Vec<&Figure> = parts
         .filter_map(|part| match part {
             Part::Figure(figure) => Some(figure),
-            Part::Heading(_) | Part::Text(_) | Part::Table(_) => None,
+            Part::Heading(_) | Part::Text(_) | Part::Table { .. } => None,
         })
         .collect();
     let looks =
@@ -87,16 +87,14 @@ pub(super) fn mass(mass_kg: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::{Cell, KeyFigure, Section, Table};
+    use crate::report::{KeyFigure, Section};
+    use crate::table::{Cell, Table};
 
     #[test]
     fn names_of_files_are_text() {
         let name = "</script><b>\"'&";
-        let table = Table {
-            caption: name.into(),
-            heading: vec![name.into()],
-            rows: vec![vec![Cell { text: name.into(), title: name.into(), is_chosen: true }]],
-        };
+        let cell = |_: &&str| Cell { text: name.into(), title: name.into(), is_chosen: true };
+        let table = Table::of([name]).column(name, cell);
         let chart = crate::plot::Chart::of(
             name,
             crate::plot::Panel {
@@ -120,7 +118,7 @@ mod tests {
                     Part::Heading(name.into()),
                     Part::Text(name.into()),
                     Part::Figure(figure),
-                    Part::Table(table),
+                    Part::table(name, table),
                 ],
             }],
         };

@@ -4,13 +4,14 @@ use std::path::Path;
 
 use super::figure::Figure;
 use super::page::{energy, file_name, force, mass, metres, percent};
-use super::{Cell, Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, Table};
+use super::{Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section};
 use crate::assess::ComparisonSettings;
 use crate::assess::train::{TrainComparison, compare_train};
 use crate::charts::{Motion, Quantity, train_speeds};
 use crate::error::Error;
-use crate::multibody::{Run, STANDARD_GRAVITY_M_PER_S2};
-use crate::scenario::{self, Prepared};
+use crate::scenario;
+use crate::scenario::summary::{Limits, Summary};
+use crate::table::Table;
 use crate::unit::km_per_h;
 
 /// Runs a scenario and adds its section; with FE's run as reference also the comparison of methods.
@@ -36,18 +37,17 @@ pub(super) fn add(
             parts.push(Part::Figure(Figure::new(id, chart)));
         }
     }
-    parts.push(Part::Table(vehicles(&prepared, &run)));
-    parts.push(Part::Table(interfaces(&prepared, &run)));
-    if let Some(limits) = limits(&prepared, &run) {
-        parts.push(Part::Text(limits));
-    }
+    let summary = prepared.summary(&run);
+    parts.push(Part::table("Vehicles", vehicles(&summary)));
+    parts.push(Part::table("Interfaces", interfaces(&summary)));
+    parts.extend(summary.limits.as_ref().map(|of| Part::Text(limits(of))));
     let crush = run.interfaces.iter().map(|i| i.max_deflection_m).fold(0.0, f64::max);
     content
         .figures
         .push(KeyFigure { value: metres(crush), name: format!("maximum crush, {name}") });
-    let mut warnings = prepared.warnings.clone();
-    warnings.extend(run.all_warnings());
-    warnings.into_iter().for_each(|warning| content.warn(format!("{name}: {warning}")));
+    for warning in prepared.warnings.iter().chain(&run.all_warnings()) {
+        content.warn(format!("{name}: {warning}"));
+    }
     if read.reference.is_some() && settings.methods != MethodSpeeds::None {
         let (seed, nsdm_seeds) = (settings.seed, settings.nsdm_seeds);
         let asked = ComparisonSettings { seed, nsdm_seeds, ..ComparisonSettings::default() };
@@ -55,7 +55,9 @@ pub(super) fn add(
         parts.push(Part::Heading("Comparison with FE's run of the whole train".into()));
         let chart = train_speeds(&format!("{name}: speeds by FE and by the methods"), &comparison);
         parts.push(Part::Figure(Figure::new(format!("s{number}-train"), chart)));
-        parts.push(Part::Table(methods(&comparison)));
+        let caption =
+            format!("Velocity errors up to {:.0} ms, Σ|p − r|/Σ|r|", 1e3 * comparison.until_s);
+        parts.push(Part::table(caption, methods(&comparison)));
     }
     content.sections.push(Section {
         id: format!("scenario-{number}"),
@@ -65,115 +67,60 @@ pub(super) fn add(
     Ok(())
 }
 
-fn table(caption: &str, heading: &[&str], rows: Vec<Vec<Cell>>) -> Table {
-    Table { caption: caption.into(), heading: heading.iter().map(|h| (*h).into()).collect(), rows }
-}
-
-fn in_g(a_m_per_s2: f64) -> String {
-    format!("{:.2} g", a_m_per_s2 / STANDARD_GRAVITY_M_PER_S2)
-}
-
 /// Masses, speeds and decelerations.
-fn vehicles(prepared: &Prepared, run: &Run) -> Table {
-    let row = |&i: &usize| {
-        let (body, history) = (&prepared.chain.bodies()[i], &run.bodies[i]);
-        let so_far = if history.is_loaded_at_end { " so far" } else { "" };
-        vec![
-            body.name.as_str().into(),
-            mass(body.mass_kg).into(),
-            format!("{:.2} m/s", body.speed_m_per_s).into(),
-            format!("{:.2} m/s", history.final_v_m_per_s).into(),
-            format!("{}{so_far}", in_g(history.mean_deceleration_m_per_s2)).into(),
-            history.moving_mean_deceleration_m_per_s2.map_or("–".into(), in_g).into(),
-        ]
-    };
-    table(
-        "Vehicles",
-        &[
-            "vehicle",
-            "mass",
-            "speed before",
-            "speed at the end",
-            "mean deceleration",
-            "largest over 120 ms",
-        ],
-        prepared.order.iter().map(row).collect(),
-    )
+fn vehicles(summary: &Summary<'_>) -> impl Into<Table> {
+    Table::of(&summary.bodies)
+        .column("vehicle", |body| body.name)
+        .column("mass", |body| mass(body.mass_kg))
+        .column("speed before", |body| format!("{:.2} m/s", body.initial_v_m_per_s))
+        .column("speed at the end", |body| format!("{:.2} m/s", body.final_v_m_per_s))
+        .column("mean deceleration", |body| {
+            let so_far = if body.still_loaded_at_end { " so far" } else { "" };
+            format!("{:.2} g{so_far}", body.mean_deceleration_g)
+        })
+        .column("largest over 120 ms", |body| {
+            body.moving_mean_deceleration_g.map_or("–".into(), |a| format!("{a:.2} g"))
+        })
 }
 
 /// Crush and energy of each interface.
-fn interfaces(prepared: &Prepared, run: &Run) -> Table {
-    let all = prepared.chain.interfaces().iter().zip(&run.interfaces).zip(&prepared.used);
-    let row = all.map(|((interface, history), used)| {
-        let last = |values: &[f64]| values.last().copied().unwrap_or_default();
-        vec![
-            interface.name.as_str().into(),
-            force(history.peak_force_n).into(),
-            metres(history.max_deflection_m).into(),
-            format!("{:.1} ms", 1e3 * history.max_deflection_time_s).into(),
-            energy(last(&history.dissipated_j)).into(),
-            energy(last(&history.stored_j)).into(),
-            used.curve.as_str().into(),
-            used.force.unwrap_or("unknown").into(),
-            used.speed_m_per_s.map_or("–".into(), km_per_h).into(),
-        ]
-    });
-    let rows = row.collect();
-    let heading = [
-        "interface",
-        "peak force",
-        "maximum crush",
-        "at",
-        "energy lost",
-        "energy stored",
-        "curve",
-        "force",
-        "curve for",
-    ];
-    table("Interfaces", &heading, rows)
+fn interfaces(summary: &Summary<'_>) -> impl Into<Table> {
+    let last = |values: &[f64]| energy(values.last().copied().unwrap_or_default());
+    Table::of(&summary.interfaces)
+        .column("interface", |of| of.name)
+        .column("peak force", |of| force(of.history.peak_force_n))
+        .column("maximum crush", |of| metres(of.history.max_deflection_m))
+        .column("at", |of| format!("{:.1} ms", 1e3 * of.history.max_deflection_time_s))
+        .column("energy lost", move |of| last(&of.history.dissipated_j))
+        .column("energy stored", move |of| last(&of.history.stored_j))
+        .column("curve", |of| &of.used.curve)
+        .column("force", |of| of.used.force.unwrap_or("unknown"))
+        .column("curve for", |of| of.used.speed_m_per_s.map_or("–".into(), km_per_h))
 }
 
 /// How the mean decelerations stand to the scenario's limits.
-fn limits(prepared: &Prepared, run: &Run) -> Option<String> {
-    let limits = prepared.limits.as_ref()?;
-    let limit = limits.mean_deceleration_g * STANDARD_GRAVITY_M_PER_S2;
-    let is_over = |i: &&usize| run.bodies[**i].mean_deceleration_m_per_s2.abs() > limit;
-    let over: Vec<&str> = prepared
-        .limited
-        .iter()
-        .filter(is_over)
-        .map(|i| prepared.chain.bodies()[*i].name.as_str())
-        .collect();
-    let beyond = run.beyond_data().map(|k| prepared.chain.interfaces()[k].name.as_str());
-    let beyond: Vec<&str> = beyond.collect();
-    let over = if !beyond.is_empty() {
-        format!("unknown, because {} went beyond the data of its curve", beyond.join(", "))
-    } else if over.is_empty() {
+fn limits(limits: &Limits<'_>) -> String {
+    let over = if !limits.beyond_data.is_empty() {
+        let beyond = limits.beyond_data.join(", ");
+        format!("unknown, because {beyond} went beyond the data of its curve")
+    } else if limits.over.is_empty() {
         "no vehicle".into()
     } else {
-        over.join(", ")
+        limits.over.join(", ")
     };
-    Some(format!(
+    format!(
         "Mean deceleration over {} g ({}:{}): {over}. They come from a one-dimensional model, say nothing about survival space, and are not evidence of conformity.",
-        limits.mean_deceleration_g, limits.standard, limits.edition
-    ))
+        limits.mean_deceleration_limit_g, limits.standard, limits.edition
+    )
 }
 
 /// Errors of each method in the whole train.
-fn methods(comparison: &TrainComparison) -> Table {
-    let vehicles: Vec<&str> = comparison.fe.keys().map(String::as_str).collect();
-    let mut heading = vec!["method", "driven by", "mean"];
-    heading.extend(&vehicles);
-    let rows = comparison.rows.iter().map(|row| {
-        let mut cells: Vec<Cell> = vec![
-            row.method.as_str().into(),
-            row.driven_by.as_str().into(),
-            percent(row.mean_velocity_l1).into(),
-        ];
-        cells.extend(row.vehicles.iter().map(|v| percent(v.velocity_l1).into()));
-        cells
-    });
-    let caption =
-        format!("Velocity errors up to {:.0} ms, Σ|p − r|/Σ|r|", 1e3 * comparison.until_s);
-    table(&caption, &heading, rows.collect())
+fn methods(comparison: &TrainComparison) -> impl Into<Table> {
+    let table = Table::of(&comparison.rows)
+        .column("method", |row| &row.method)
+        .column("driven by", |row| &row.driven_by)
+        .column("mean", |row| percent(row.mean_velocity_l1));
+    comparison.fe.keys().enumerate().fold(table, |table, (k, vehicle)| {
+        table.column(vehicle, |row| percent(row.vehicles[k].velocity_l1))
+    })
 }

@@ -36,9 +36,12 @@ mod local;
 mod place;
 mod sources;
 mod spring;
+pub(crate) mod summary;
 mod tables;
 
 use std::path::Path;
+
+use serde::Serialize;
 
 use crate::error::{Document, Error, Place};
 use crate::manifest;
@@ -87,13 +90,15 @@ impl Prepared {
 }
 
 /// What an interface uses.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct CurveInUse {
     /// Name of its curve in the scenario.
     pub(crate) curve: String,
     /// Which force it is, where that is known: `contact` or `body`.
+    #[serde(rename = "curve_force")]
     pub(crate) force: Option<&'static str>,
     /// Speed that its curve was predicted for, in m/s.
+    #[serde(rename = "curve_speed_m_per_s")]
     pub(crate) speed_m_per_s: Option<f64>,
 }
 

@@ -191,6 +191,11 @@ impl Provenance {
 }
 
 impl PredictedCurve {
+    /// Peak force, in N.
+    pub(crate) fn peak_force_n(&self) -> f64 {
+        self.force_n.iter().copied().fold(0.0, f64::max)
+    }
+
     /// Mass of the other body of a pair, in kg; `None` against a wall.
     pub(crate) fn other_mass_kg(&self) -> Option<f64> {
         match (self.speed_kind, self.provenance.parameters.get(OTHER_MASS)) {

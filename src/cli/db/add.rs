@@ -7,15 +7,12 @@ use crate::curve::{Case, ForceKind, Parameter};
 use crate::formats::read::{READERS, ReadOptions};
 use crate::import::{self, Item, Settings};
 use crate::unit::UnitSystem;
-use serde::Serialize;
 
 use super::super::curve_file::CurveFile;
-use super::super::export::{FORCES, units};
-use super::arguments::{mass, one_of, parameter, speed};
+use super::arguments::{FORCES, mass, one_of, parameter, speed, units};
 use super::list::print_group;
-use super::row::CaseRow;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
-use output::ListedFormat;
+use super::row::case_row;
+use super::{CommandResult, Failure, GlobalOptions, output, usage};
 
 /// Files, the group they join, and data missing from them.
 #[derive(clap::Args)]
@@ -58,16 +55,10 @@ pub(super) struct Args {
     file: CurveFile,
 }
 
-#[derive(Serialize)]
-struct Document {
-    database: String,
-    group: String,
-    cases: Vec<CaseRow>,
-}
-
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let (Some(database), Some(group), false) = (&args.database, &args.group, args.list) else {
-        return list(options);
+        let listed = READERS.iter().map(|r| (r.name, r.extensions, r.description));
+        return output::formats(listed, options);
     };
     let items = items(args)?;
     let said = args.file.settings();
@@ -88,11 +79,11 @@ fn items(args: &Args) -> Result<Vec<Item>, Failure> {
     let files = args.files.len();
     for (option, given) in [("--speed", args.speed.len()), ("--case", args.case.len())] {
         if given != 0 && given != files {
-            return Err(Failure::Usage(format!(
+            return usage(format!(
                 "{option} is given {} for {}: give it once for each file, in the same order",
                 counted(given, "time"),
                 counted(files, "file")
-            )));
+            ));
         }
     }
     let items = args.files.iter().enumerate().map(|(k, path)| Item {
@@ -104,37 +95,19 @@ fn items(args: &Args) -> Result<Vec<Item>, Failure> {
 }
 
 fn report(cases: &[Case], database: &str, group: &str, options: GlobalOptions) -> CommandResult {
-    let rows: Vec<CaseRow> = cases.iter().map(CaseRow::of).collect();
-    let mut outcome = Outcome::Clean;
-    for (case, row) in cases.iter().zip(&rows) {
-        for warning in &row.warnings {
-            options.warn(&format!("{}: {warning}", case.id.name));
-            outcome = Outcome::Warned;
-        }
-    }
-    if options.json {
-        let (database, group) = (database.into(), group.into());
-        output::print_json(&Document { database, group, cases: rows })?;
-        return Ok(outcome);
-    }
-    options.print(|out| {
-        print_group(out, "case", &rows)?;
-        for (case, row) in cases.iter().zip(&rows) {
-            for note in &row.notes {
+    let warnings = |case: &Case| -> Vec<String> {
+        case.quality.warnings.iter().map(|w| format!("{}: {w}", case.id.name)).collect()
+    };
+    let outcome = options.warn_all(cases.iter().flat_map(warnings));
+    let rows: Vec<_> = cases.iter().map(case_row).collect();
+    options.show(&document! { database: database, group: group, cases: rows }, |out| {
+        print_group(out, "case", &cases.iter().collect::<Vec<_>>())?;
+        for case in cases {
+            for note in &case.quality.notes {
                 writeln!(out, "note: {}: {note}", case.id.name)?;
             }
         }
         writeln!(out, "wrote {database} (group {group})")
     })?;
     Ok(outcome)
-}
-
-fn list(options: GlobalOptions) -> CommandResult {
-    let listed = READERS.iter().map(|r| ListedFormat {
-        name: r.name,
-        extensions: r.extensions,
-        description: r.description,
-    });
-    output::formats(listed.collect(), options)?;
-    Ok(Outcome::Clean)
 }

@@ -2,7 +2,7 @@
 
 use crate::curate::{Selection, SpeedRange};
 
-use super::Failure;
+use super::{Failure, usage};
 
 /// Which cases; every option narrows the choice.
 #[derive(clap::Args)]
@@ -35,9 +35,7 @@ impl Chosen {
     pub(super) fn some(&self, what: &str) -> Result<Selection, Failure> {
         let selection = self.selection();
         if selection.is_all() {
-            Err(Failure::Usage(format!(
-                "choose the cases to be {what} with --group, --case, --speed or --tag"
-            )))
+            usage(format!("choose the cases to be {what} with --group, --case, --speed or --tag"))
         } else {
             Ok(selection)
         }

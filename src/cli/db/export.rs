@@ -5,10 +5,9 @@ use std::path::PathBuf;
 use crate::curate::{self, Tables};
 use crate::curve::Case;
 use crate::database::Database;
-use serde::Serialize;
 
 use super::chosen::Chosen;
-use super::{CommandResult, GlobalOptions, Outcome, output};
+use super::{CommandResult, GlobalOptions, Outcome};
 
 /// Cases, and the folder for their tables.
 #[derive(clap::Args)]
@@ -25,13 +24,6 @@ pub(super) struct Args {
     originals: bool,
 }
 
-#[derive(Serialize)]
-struct Document {
-    database: String,
-    cases: usize,
-    files: Vec<String>,
-}
-
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let database = Database::read(&args.database)?;
     let selection = args.chosen.selection();
@@ -39,11 +31,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let tables = if args.originals { Tables::WithOriginals } else { Tables::Sampled };
     let files = curate::write_tables(&cases, &args.output, tables)?;
     let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
-    if options.json {
-        let database = args.database.display().to_string();
-        output::print_json(&Document { database, cases: cases.len(), files })?;
-    } else {
-        options.print(|out| files.iter().try_for_each(|file| writeln!(out, "wrote {file}")))?;
-    }
+    let database = args.database.display().to_string();
+    let document = document! { database: database, cases: cases.len(), files: &files };
+    options
+        .show(&document, |out| files.iter().try_for_each(|file| writeln!(out, "wrote {file}")))?;
     Ok(Outcome::Clean)
 }

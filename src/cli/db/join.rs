@@ -6,14 +6,15 @@ use std::path::{Path, PathBuf};
 
 use crate::curate::{self, Effect, Joined, OnConflict, Target};
 use crate::database::CasePath;
+use crate::plural::counted;
 use serde::Serialize;
 
 use super::chosen::Chosen;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
+use super::{CommandResult, GlobalOptions, usage};
 
 /// What happens to a case whose name another curve has, and whether anything is written.
 #[derive(clap::Args)]
-struct How {
+struct JoinOptions {
     /// Rename a new case whose name is taken by a different curve, such as 36kmh_2
     #[arg(long, conflicts_with = "replace")]
     rename: bool,
@@ -25,7 +26,7 @@ struct How {
     dry_run: bool,
 }
 
-impl How {
+impl JoinOptions {
     fn on_conflict(&self) -> OnConflict {
         match (self.rename, self.replace) {
             (true, _) => OnConflict::Rename,
@@ -49,7 +50,7 @@ pub(super) struct MergeArgs {
     #[arg(short, long)]
     output: PathBuf,
     #[command(flatten)]
-    how: How,
+    how: JoinOptions,
 }
 
 pub(super) fn merge(args: &MergeArgs, options: GlobalOptions) -> CommandResult {
@@ -72,14 +73,12 @@ pub(super) struct CopyArgs {
     #[arg(long, value_name = "GROUP")]
     to_group: Option<String>,
     #[command(flatten)]
-    how: How,
+    how: JoinOptions,
 }
 
 pub(super) fn copy(args: &CopyArgs, options: GlobalOptions) -> CommandResult {
     if args.to.is_none() && args.to_group.is_none() {
-        return Err(Failure::Usage(
-            "name the destination with --to-group, --to (another database) or both".into(),
-        ));
+        return usage("name the destination with --to-group, --to (another database) or both");
     }
     let selection = args.chosen.some("copied")?;
     let target = Target { database: args.to.clone(), group: args.to_group.clone() };
@@ -89,98 +88,83 @@ pub(super) fn copy(args: &CopyArgs, options: GlobalOptions) -> CommandResult {
     report(&joined, output, args.how.dry_run, options)
 }
 
-#[derive(Serialize)]
-struct Document {
-    database: String,
-    added: Vec<From>,
-    equal: Vec<From>,
-    renamed: Vec<From>,
-    replaced: Vec<From>,
-    dry_run: bool,
-}
-
 /// A case with its database, and what it is called now if that is another name.
 #[derive(Serialize)]
-struct From {
+struct CaseOrigin {
     from: String,
     case: String,
     #[serde(skip_serializing_if = "Option::is_none")]
     now: Option<String>,
 }
 
-impl From {
+impl CaseOrigin {
     fn own((path, case): &(PathBuf, CasePath)) -> Self {
         Self { from: path.display().to_string(), case: case.to_string(), now: None }
     }
 
     fn other((path, case, now): &(PathBuf, CasePath, CasePath)) -> Self {
-        let now = Some(now.to_string());
-        Self { from: path.display().to_string(), case: case.to_string(), now }
+        Self { now: Some(now.to_string()), ..Self::own(&(path.clone(), case.clone())) }
     }
 }
 
 fn report(joined: &Joined, path: &Path, dry_run: bool, options: GlobalOptions) -> CommandResult {
-    for (from, items) in &joined.not_taken {
-        options.warn(&format!(
-            "{} holds objects that crumple did not write and does not copy: {items}",
-            from.display()
-        ));
-    }
-    let document = Document {
-        database: path.display().to_string(),
-        added: joined.added.iter().map(From::own).collect(),
-        equal: joined.equal.iter().map(From::other).collect(),
-        renamed: joined.renamed.iter().map(From::other).collect(),
-        replaced: joined.replaced.iter().map(From::own).collect(),
-        dry_run,
+    let outcome = options.warn_all(joined.not_taken.iter().map(|(from, items)| {
+        let from = from.display();
+        format!("{from} holds objects that crumple did not write and does not copy: {items}")
+    }));
+    let database = path.display().to_string();
+    let own = |cases: &[_]| cases.iter().map(CaseOrigin::own).collect::<Vec<_>>();
+    let other = |cases: &[_]| cases.iter().map(CaseOrigin::other).collect::<Vec<_>>();
+    let (added, replaced) = (own(&joined.added), own(&joined.replaced));
+    let (equal, renamed) = (other(&joined.equal), other(&joined.renamed));
+    let document = document! {
+        database: &database,
+        added: &added,
+        equal: &equal,
+        renamed: &renamed,
+        replaced: &replaced,
+        dry_run: dry_run,
     };
-    if options.json {
-        output::print_json(&document)?;
-    } else {
-        options.print(|out| print(out, &document))?;
-    }
-    Ok(if joined.not_taken.is_empty() { Outcome::Clean } else { Outcome::Warned })
-}
-
-fn print(out: &mut dyn Write, document: &Document) -> io::Result<()> {
-    let Document { database, added, equal, renamed, replaced, dry_run } = document;
-    print_together(out, "added", added)?;
-    let (own, other): (Vec<&From>, Vec<&From>) =
-        equal.iter().partition(|case| case.now.as_ref() == Some(&case.case));
-    print_together(out, "already present:", own)?;
-    for (what, cases) in [
-        ("already present:", other),
-        ("renamed", renamed.iter().collect()),
-        ("replaced", replaced.iter().collect()),
-    ] {
-        for From { from, case, now } in cases {
-            let now = now.as_ref().map_or(String::new(), |now| format!(" as {now}"));
-            writeln!(out, "{what} {case}{now} (of {from})")?;
+    options.show(&document, |out| {
+        print_together(out, "added", &added)?;
+        let (same, other): (Vec<&CaseOrigin>, Vec<&CaseOrigin>) =
+            equal.iter().partition(|case| case.now.as_ref() == Some(&case.case));
+        print_together(out, "already present:", same)?;
+        for (what, cases) in [
+            ("already present:", other),
+            ("renamed", renamed.iter().collect()),
+            ("replaced", replaced.iter().collect()),
+        ] {
+            for CaseOrigin { from, case, now } in cases {
+                let now = now.as_ref().map_or(String::new(), |now| format!(" as {now}"));
+                writeln!(out, "{what} {case}{now} (of {from})")?;
+            }
         }
-    }
-    let did = if *dry_run { "would write" } else { "wrote" };
-    writeln!(
-        out,
-        "{did} {database}: {} added, {} replaced, {} already present",
-        output::counted(added.len() + renamed.len(), "case"),
-        replaced.len(),
-        equal.len()
-    )
+        writeln!(
+            out,
+            "{} {database}: {} added, {} replaced, {} already present",
+            if dry_run { "would write" } else { "wrote" },
+            counted(added.len() + renamed.len(), "case"),
+            replaced.len(),
+            equal.len()
+        )
+    })?;
+    Ok(outcome)
 }
 
 /// A line for the cases of each group of each database.
 fn print_together<'a>(
     out: &mut dyn Write,
     what: &str,
-    cases: impl IntoIterator<Item = &'a From>,
+    cases: impl IntoIterator<Item = &'a CaseOrigin>,
 ) -> io::Result<()> {
     let mut groups: BTreeMap<(&str, &str), usize> = BTreeMap::new();
-    for From { from, case, .. } in cases {
+    for CaseOrigin { from, case, .. } in cases {
         let group = case.split('/').next().unwrap_or_default();
         *groups.entry((from, group)).or_default() += 1;
     }
     for ((from, group), count) in groups {
-        writeln!(out, "{what} {} of group {group} (of {from})", output::counted(count, "case"))?;
+        writeln!(out, "{what} {} of group {group} (of {from})", counted(count, "case"))?;
     }
     Ok(())
 }

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use crate::curate::{self, Labels, Selection};
 use crate::database::CasePath;
-use serde::Serialize;
+use crate::plural::counted;
 
 use super::chosen::Chosen;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
+use super::{CommandResult, GlobalOptions, Outcome, usage};
 
 /// Cases, and the tags that they get and lose.
 #[derive(clap::Args)]
@@ -65,21 +65,6 @@ pub(super) fn note(args: &NoteArgs, options: GlobalOptions) -> CommandResult {
     run(&args.database, &args.chosen.some("noted on")?, &labels, options)
 }
 
-#[derive(Serialize)]
-struct Document {
-    database: String,
-    cases: Vec<Labelled>,
-}
-
-/// A case with its current tags and notes.
-#[derive(Serialize)]
-struct Labelled {
-    group: String,
-    case: String,
-    tags: Vec<String>,
-    user_notes: Vec<String>,
-}
-
 fn run(
     database: &Path,
     selection: &Selection,
@@ -87,21 +72,20 @@ fn run(
     options: GlobalOptions,
 ) -> CommandResult {
     if *labels == Labels::default() {
-        return Err(Failure::Usage("nothing to do: give --add, --remove or --clear".into()));
+        return usage("nothing to do: give --add, --remove or --clear");
     }
     let cases = curate::label(database, selection, labels)?;
     let database = database.display().to_string();
-    if options.json {
-        let labelled = cases.into_iter().map(|case| Labelled {
-            group: case.id.group,
-            case: case.id.name,
-            tags: case.provenance.tags,
-            user_notes: case.provenance.user_notes,
-        });
-        output::print_json(&Document { database, cases: labelled.collect() })?;
-        return Ok(Outcome::Clean);
-    }
-    options.print(|out| {
+    let labelled = cases.iter().map(|case| {
+        document! {
+            group: &case.id.group,
+            case: &case.id.name,
+            tags: &case.provenance.tags,
+            user_notes: &case.provenance.user_notes,
+        }
+    });
+    let document = document! { database: &database, cases: labelled.collect::<Vec<_>>() };
+    options.show(&document, |out| {
         for case in &cases {
             let tags = if case.provenance.tags.is_empty() {
                 "no tags".into()
@@ -113,7 +97,7 @@ fn run(
                 writeln!(out, "  note: {note}")?;
             }
         }
-        writeln!(out, "wrote {database} ({})", output::counted(cases.len(), "case"))
+        writeln!(out, "wrote {database} ({})", counted(cases.len(), "case"))
     })?;
     Ok(Outcome::Clean)
 }

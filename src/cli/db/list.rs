@@ -7,11 +7,11 @@ use std::path::PathBuf;
 use crate::curve::{Case, StoppedMass, group as siblings};
 use crate::database::Database;
 use crate::dataset::of_one_kind;
-use serde::Serialize;
+use crate::table::Table;
 
 use super::chosen::Chosen;
-use super::row::CaseRow;
-use super::{CommandResult, GlobalOptions, Outcome, output};
+use super::row::{case_columns, case_row};
+use super::{CommandResult, GlobalOptions, output};
 use crate::cli::train::stopped_mass_line;
 
 /// A database, and which of its cases.
@@ -23,17 +23,6 @@ pub(super) struct Args {
     chosen: Chosen,
 }
 
-#[derive(Serialize)]
-pub(super) struct Groups<T> {
-    pub groups: BTreeMap<String, Vec<T>>,
-    /// The mass that the crush zone of a group stops, where its cases give one.
-    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    pub stopped_mass: BTreeMap<String, StoppedMass>,
-    /// What no command can use a group for.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub warnings: Vec<String>,
-}
-
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let database = Database::read(&args.database)?;
     let selection = args.chosen.selection();
@@ -43,61 +32,54 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     } else {
         selection.find(&args.database, &database)?
     };
-    let mut groups: BTreeMap<String, Vec<CaseRow>> = BTreeMap::new();
+    let mut groups: BTreeMap<&str, Vec<&Case>> = BTreeMap::new();
     for case in cases {
-        groups.entry(case.id.group.clone()).or_default().push(CaseRow::of(case));
+        groups.entry(&case.id.group).or_default().push(case);
     }
-    let mixed =
-        |g: &String| of_one_kind(database.cases(g)).err().map(|e| format!("group {g}: {e}"));
+    let mixed = |g: &&str| of_one_kind(database.cases(g)).err().map(|e| format!("group {g}: {e}"));
     let mut warnings: Vec<String> = groups.keys().filter_map(mixed).collect();
     let mut of_cases = Vec::new();
-    for (group, rows) in &groups {
-        let is_listed = |name: &String| rows.iter().any(|row| row.name == *name);
+    for (group, cases) in &groups {
+        let is_listed = |name: &String| cases.iter().any(|case| case.id.name == *name);
         let beside = siblings::remarks(database.cases(group)).into_iter();
         let beside = beside.filter(|(name, ..)| is_listed(name));
         warnings.extend(beside.map(|(name, _, words)| format!("{group}/{name}: {words}")));
         // Warnings of the builds, which the rows of the document have.
-        let of_row = |row: &CaseRow| {
-            let name = row.name.clone();
-            row.warnings.clone().into_iter().map(move |w| format!("{group}/{name}: {w}"))
-        };
-        of_cases.extend(rows.iter().flat_map(of_row));
+        for case in cases {
+            let own = case.quality.warnings.iter();
+            of_cases.extend(own.map(|warning| format!("{group}/{}: {warning}", case.id.name)));
+        }
     }
-    for warning in warnings.iter().chain(&of_cases) {
-        options.warn(warning);
-    }
-    let of_group = |group: &String| Some((group.clone(), database.stopped_mass(group)?));
+    let outcome = options.warn_all(warnings.iter().chain(&of_cases));
+    let of_group = |group: &&'_ str| Some((group.to_string(), database.stopped_mass(group)?));
     let stopped_mass: BTreeMap<String, StoppedMass> = groups.keys().filter_map(of_group).collect();
-    let outcome =
-        if warnings.is_empty() && of_cases.is_empty() { Outcome::Clean } else { Outcome::Warned };
-    if options.json {
-        output::print_json(&Groups { groups, stopped_mass, warnings })?;
-    } else {
-        options.print(|out| {
-            groups.iter().try_for_each(|(group, rows)| {
-                print_group(out, group, rows)?;
-                if let Some(stopped) = stopped_mass.get(group) {
-                    let kind = database.cases(group)[0].conditions.speed.kind;
-                    writeln!(out, "{}", stopped_mass_line(stopped, kind))?;
-                }
-                writeln!(out)
-            })
-        })?;
-    }
+    let rows = groups.iter().map(|(group, cases)| {
+        (*group, cases.iter().map(|case| case_row(case)).collect::<Vec<_>>())
+    });
+    let document = document! {
+        groups: rows.collect::<BTreeMap<_, _>>(),
+        stopped_mass if_any: &stopped_mass,
+        warnings if_any: &warnings,
+    };
+    options.show(&document, |out| {
+        groups.iter().try_for_each(|(group, cases)| {
+            print_group(out, group, cases)?;
+            if let Some(stopped) = stopped_mass.get(*group) {
+                let kind = database.cases(group)[0].conditions.speed.kind;
+                writeln!(out, "{}", stopped_mass_line(stopped, kind))?;
+            }
+            writeln!(out)
+        })
+    })?;
     Ok(outcome)
 }
 
 /// A table of cases under the name of their group, with their tags if one has any.
-pub(super) fn print_group(out: &mut dyn Write, group: &str, rows: &[CaseRow]) -> io::Result<()> {
-    let is_tagged = rows.iter().any(|row| !row.tags.is_empty());
-    let mut heading: Vec<&str> = [group].into_iter().chain(CaseRow::HEADING).collect();
-    heading.extend(is_tagged.then_some("tags"));
-    let units = CaseRow::units(rows.iter());
-    let cells = |row: &CaseRow| {
-        let mut cells: Vec<String> =
-            [row.name.clone()].into_iter().chain(row.cells(units)).collect();
-        cells.extend(is_tagged.then(|| row.tags.join(", ")));
-        cells
-    };
-    output::table(out, &heading, &rows.iter().map(cells).collect::<Vec<_>>())
+pub(super) fn print_group(out: &mut dyn Write, group: &str, cases: &[&Case]) -> io::Result<()> {
+    let named = Table::of(cases).column(group, |case| &case.id.name);
+    let mut table = case_columns(named, |case| Some(case));
+    if cases.iter().any(|case| !case.provenance.tags.is_empty()) {
+        table = table.column("tags", |case| case.provenance.tags.join(", "));
+    }
+    output::table(out, table)
 }

@@ -14,8 +14,8 @@ mod show;
 
 use std::path::PathBuf;
 
-use super::{CommandResult, Failure, GlobalOptions, Outcome, arguments, output};
-pub(super) use row::CaseRow;
+use super::{CommandResult, Failure, GlobalOptions, Outcome, arguments, output, usage};
+pub(super) use row::{case_columns, case_row};
 
 /// List, show, check, add, rename, join, tag and export cases of a curve database
 #[derive(clap::Args)]

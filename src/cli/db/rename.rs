@@ -3,12 +3,12 @@
 use std::path::PathBuf;
 
 use crate::curate::{self, Effect};
-use serde::Serialize;
+use crate::plural::counted;
 
 use super::chosen::Chosen;
 use super::list::print_group;
-use super::row::CaseRow;
-use super::{CommandResult, GlobalOptions, Outcome, output};
+use super::row::case_row;
+use super::{CommandResult, GlobalOptions, Outcome};
 
 /// A database, and which of its cases are removed.
 #[derive(clap::Args)]
@@ -22,39 +22,25 @@ pub(super) struct RemoveArgs {
     dry_run: bool,
 }
 
-#[derive(Serialize)]
-struct Removed {
-    database: String,
-    removed: Vec<Named>,
-    dry_run: bool,
-}
-
-#[derive(Serialize)]
-struct Named {
-    group: String,
-    #[serde(flatten)]
-    row: CaseRow,
-}
-
 pub(super) fn remove(args: &RemoveArgs, options: GlobalOptions) -> CommandResult {
     let selection = args.chosen.some("removed")?;
     let effect = if args.dry_run { Effect::DryRun } else { Effect::Written };
     let cases = curate::remove(&args.database, &selection, effect)?;
     let database = args.database.display().to_string();
-    if options.json {
-        let removed =
-            cases.iter().map(|c| Named { group: c.id.group.clone(), row: CaseRow::of(c) });
-        let (removed, dry_run) = (removed.collect(), args.dry_run);
-        output::print_json(&Removed { database, removed, dry_run })?;
-        return Ok(Outcome::Clean);
-    }
-    options.print(|out| {
+    let removed = cases.iter().map(|case| {
+        document! { group: &case.id.group, #[serde(flatten)] row: case_row(case) }
+    });
+    let document = document! {
+        database: &database,
+        removed: removed.collect::<Vec<_>>(),
+        dry_run: args.dry_run,
+    };
+    options.show(&document, |out| {
         for cases in cases.chunk_by(|a, b| a.id.group == b.id.group) {
-            let rows: Vec<CaseRow> = cases.iter().map(CaseRow::of).collect();
-            print_group(out, &cases[0].id.group, &rows)?;
+            print_group(out, &cases[0].id.group, &cases.iter().collect::<Vec<_>>())?;
         }
         let did = if args.dry_run { "would remove" } else { "removed" };
-        writeln!(out, "{did} {} from {database}", output::counted(cases.len(), "case"))
+        writeln!(out, "{did} {} from {database}", counted(cases.len(), "case"))
     })?;
     Ok(Outcome::Clean)
 }
@@ -75,15 +61,6 @@ pub(super) struct RenameArgs {
     to: String,
 }
 
-#[derive(Serialize)]
-struct Renamed {
-    database: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    from: Option<String>,
-    to: String,
-    cases: Vec<String>,
-}
-
 pub(super) fn rename(args: &RenameArgs, options: GlobalOptions) -> CommandResult {
     let database = args.database.display().to_string();
     let (from, to, cases) = match (&args.case, &args.group) {
@@ -98,11 +75,9 @@ pub(super) fn rename(args: &RenameArgs, options: GlobalOptions) -> CommandResult
             (group, args.to.clone(), cases.iter().map(ToString::to_string).collect())
         }
     };
-    if options.json {
-        output::print_json(&Renamed { database, from: Some(from), to, cases })?;
-    } else {
-        let count = output::counted(cases.len(), "case");
-        options.print(|out| writeln!(out, "renamed {from} to {to} in {database} ({count})"))?;
-    }
+    let document = document! { database: &database, from: &from, to: &to, cases: &cases };
+    let count = counted(cases.len(), "case");
+    options
+        .show(&document, |out| writeln!(out, "renamed {from} to {to} in {database} ({count})"))?;
     Ok(Outcome::Clean)
 }

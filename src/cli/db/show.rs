@@ -1,19 +1,21 @@
 //! `crumple db show`: cases with their curves, or side by side.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
 use crate::curate::{self, Difference, Selection};
 use crate::curve::{Case, Parameter};
 use crate::database::Database;
+use crate::table::Table;
 use crate::unit::{Shown, km_per_h};
 
 use super::super::predict::draw_curve;
 use super::chosen::Chosen;
-use super::list::{Groups, print_group};
-use super::row::{CaseRow, FullCase};
-use super::{CommandResult, Failure, GlobalOptions, Outcome, output};
+use super::list::print_group;
+use super::row::full_case;
+use super::{CommandResult, Failure, GlobalOptions, Outcome, output, usage};
 
 /// A database, and which of its cases are shown how.
 #[derive(clap::Args)]
@@ -29,18 +31,16 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let selection = args.chosen.selection();
-    let alone = |selection: &Selection| {
-        let Selection { groups, cases, speed, tags } = selection;
-        let is_one = cases.len() == 1 && groups.len() <= 1 && speed.is_none() && tags.is_empty();
-        is_one.then(|| (groups.first().cloned(), cases[0].clone()))
-    };
-    if let Some((group, name)) = alone(&selection).filter(|_| !args.compare) {
+    let Selection { groups, cases, speed, tags } = &selection;
+    if let ([name], [] | [_], None, []) = (&cases[..], &groups[..], speed, &tags[..])
+        && !args.compare
+    {
         // A name of one group is read by itself.
-        let (group, name) = match (group, name.split_once('/')) {
-            (None, Some((group, name))) => (Some(group.to_string()), name.to_string()),
-            (group, _) => (group, name),
+        let (group, name) = match (groups.first(), name.split_once('/')) {
+            (None, Some((group, name))) => (Some(group), name),
+            (group, _) => (group.map(String::as_str), name.as_str()),
         };
-        let case = Database::read_case(&args.database, group.as_deref(), &name)?;
+        let case = Database::read_case(&args.database, group, name)?;
         return show(&[&case], options);
     }
     let database = Database::read(&args.database)?;
@@ -76,15 +76,11 @@ impl Args {
 
 fn show(cases: &[&Case], options: GlobalOptions) -> CommandResult {
     if options.json {
-        let mut groups: BTreeMap<String, Vec<FullCase<'_>>> = BTreeMap::new();
+        let mut groups: BTreeMap<&str, Vec<_>> = BTreeMap::new();
         for case in cases {
-            groups.entry(case.id.group.clone()).or_default().push(FullCase::of(case)?);
+            groups.entry(&case.id.group).or_default().push(full_case(case)?);
         }
-        output::print_json(&Groups {
-            groups,
-            stopped_mass: BTreeMap::new(),
-            warnings: Vec::new(),
-        })?;
+        output::print_json(&document! { groups: groups })?;
         return Ok(Outcome::Clean);
     }
     options.print(|out| cases.iter().try_for_each(|case| print_case(out, case)))?;
@@ -92,7 +88,7 @@ fn show(cases: &[&Case], options: GlobalOptions) -> CommandResult {
 }
 
 fn print_case(out: &mut dyn Write, case: &Case) -> io::Result<()> {
-    print_group(out, &case.id.group, &[CaseRow::of(case)])?;
+    print_group(out, &case.id.group, &[case])?;
     writeln!(out)?;
     if let Some(built) = &case.provenance.built_utc {
         writeln!(out, "built {built}")?;
@@ -109,10 +105,11 @@ fn print_case(out: &mut dyn Write, case: &Case) -> io::Result<()> {
         )?;
     }
     for (name, value) in &case.conditions.parameters {
-        match value {
-            Parameter::Number(value) => writeln!(out, "parameter: {name} = {value}")?,
-            Parameter::Category(value) => writeln!(out, "parameter: {name} = {value}")?,
-        }
+        let value: &dyn Display = match value {
+            Parameter::Number(value) => value,
+            Parameter::Category(value) => value,
+        };
+        writeln!(out, "parameter: {name} = {value}")?;
     }
     for note in &case.quality.notes {
         writeln!(out, "note: {note}")?;
@@ -131,32 +128,21 @@ fn print_case(out: &mut dyn Write, case: &Case) -> io::Result<()> {
 
 fn compare(cases: &[&Case], options: GlobalOptions) -> CommandResult {
     if cases.len() < 2 {
-        return Err(Failure::Usage(
-            "--compare needs at least two cases: name each with --case, or choose them with --group, --speed or --tag".into(),
-        ));
+        return usage(
+            "--compare needs at least two cases: name each with --case, or choose them with --group, --speed or --tag",
+        );
     }
     let Some(comparison) = curate::compare(cases)? else { return Ok(Outcome::Clean) };
-    if options.json {
-        output::print_json(&comparison)?;
-        return Ok(Outcome::Clean);
-    }
     let is_one_group = cases.iter().all(|case| case.id.group == cases[0].id.group);
     let name = |case: &Difference| {
         if is_one_group { case.case.clone() } else { format!("{}/{}", case.group, case.case) }
     };
-    let names: Vec<String> = comparison.cases.iter().map(name).collect();
-    let heading: Vec<&str> = [if is_one_group { cases[0].id.group.as_str() } else { "" }]
-        .into_iter()
-        .chain(names.iter().map(String::as_str))
-        .collect();
-    let rows: Vec<Vec<String>> = QUANTITIES
-        .iter()
-        .map(|(name, cell)| {
-            let cells = comparison.cases.iter().enumerate().map(|(k, case)| cell(case, k == 0));
-            [name.to_string()].into_iter().chain(cells).collect()
-        })
-        .collect();
-    options.print(|out| output::table(out, &heading, &rows))?;
+    let corner = if is_one_group { &cases[0].id.group } else { "" };
+    let quantities = Table::of(QUANTITIES).column(corner, |(name, _)| *name);
+    let table = comparison.cases.iter().enumerate().fold(quantities, |table, (k, case)| {
+        table.column(name(case), |(_, cell)| cell(case, k == 0))
+    });
+    options.show(&comparison, |out| output::table(out, table))?;
     Ok(Outcome::Clean)
 }
 

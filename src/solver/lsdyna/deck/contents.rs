@@ -1,5 +1,7 @@
 //! The metadata of a run in its deck, and the resulting speed.
 
+use serde::Serialize;
+
 use super::parameters::Value;
 use crate::solver::problem::Problem;
 use crate::unit::UnitSystem;
@@ -91,49 +93,59 @@ pub(crate) enum Scope {
 }
 
 /// One ASCII file that the deck requests.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Output {
     /// As the keyword names it, in small letters: `nodout`.
     pub file: &'static str,
     /// Output interval, in the deck's unit of time. `None` when left out or not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub interval: Option<f64>,
     /// 1 ASCII, 2 binout, 3 both; 0 or `None` leaves it to the solver.
+    #[serde(skip)]
     pub binary: Option<i64>,
     /// Where its keyword is.
+    #[serde(skip)]
     pub at: DeckPlace,
 }
 
 /// An id and the title that goes with it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TitledEntity {
     /// As in the deck.
     pub id: i64,
     /// `None` where the deck gives none.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub title: Option<String>,
     /// Where its card is.
+    #[serde(skip)]
     pub at: DeckPlace,
 }
 
 /// A contact or a rigid wall.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DeckInterface {
     /// From `_ID`, or the order number when no contact (no wall) of the deck has an id
     /// and all are of a kind that is numbered together; else `None`.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub id: Option<i64>,
     /// `None` where the deck gives none.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub title: Option<String>,
     /// In capitals and without its star.
+    #[serde(skip)]
     pub keyword: String,
     /// Where its keyword is.
+    #[serde(skip)]
     pub at: DeckPlace,
 }
 
 /// One included file.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Include {
     /// As the deck writes it.
     pub name: String,
     /// Where it is included.
+    #[serde(skip)]
     pub at: DeckPlace,
     /// Whether the file is there.
     pub found: bool,

@@ -24,7 +24,6 @@ pub use contents::DeckInterface;
 pub(crate) use contents::Include;
 pub use contents::TitledEntity;
 pub(crate) use keyword::signature;
-pub(crate) use parameters::Value;
 
 /// Reads a deck.
 ///
@@ -47,6 +46,7 @@ pub fn parse_deck(
 mod tests {
     use super::super::super::problem::ProblemCode;
     use super::contents::{DeckInterface, DeckPlace, Scope, TitledEntity};
+    use super::parameters::Value;
     use super::*;
     use crate::unit::UnitSystem;
     use proptest::prelude::*;
