@@ -139,7 +139,11 @@ pub(crate) struct Diagnostics {
 }
 
 impl Diagnostics {
-    pub(crate) fn add(
+    pub(crate) fn add(&mut self, code: ProblemCode, place: Option<Place>, message: String) {
+        self.push(Problem::at(code, place, message));
+    }
+
+    pub(crate) fn add_in_columns(
         &mut self,
         code: ProblemCode,
         place: Option<Place>,
@@ -159,7 +163,7 @@ impl Diagnostics {
 
     /// A problem of a binary file, which has no lines.
     pub(crate) fn add_at_byte(&mut self, code: ProblemCode, byte: u64, message: String) {
-        self.add(code, Some(Place::at_byte(byte)), None, message);
+        self.add(code, Some(Place::at_byte(byte)), message);
     }
 
     /// Adds the problems of another list behind these.

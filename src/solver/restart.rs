@@ -76,3 +76,10 @@ pub(crate) fn is_known_apart(time: &[f64], above: usize, below: usize, digits: i
     let exponent = if at == 0.0 { f64::NEG_INFINITY } else { at.abs().log10().floor() };
     nearest.is_some_and(|gap| gap >= STEPS * 10f64.powf(exponent - f64::from(digits - 1)))
 }
+
+/// Keeps the values of some states; none where no history is kept.
+pub(crate) fn take<T: Copy>(values: &mut Vec<T>, kept: &[usize]) {
+    if !values.is_empty() {
+        *values = kept.iter().map(|&i| values[i]).collect();
+    }
+}

@@ -87,7 +87,6 @@ fn read_file_at(file: &File, buffer: &mut [u8], offset: u64) -> io::Result<usize
     std::os::windows::fs::FileExt::seek_read(file, buffer, offset)
 }
 
-/// A file mapped into memory.
 struct Mapped(memmap2::Mmap);
 
 impl Mapped {
@@ -167,6 +166,13 @@ pub(crate) fn encoded(head: &[u8]) -> Option<&'static str> {
 
 const UTF_16: &str = "this is UTF-16 text, which iconv -f UTF-16 -t UTF-8 makes plain";
 
+/// The text of a field of a binary file without its padding; `None` if there is nothing else.
+pub(super) fn unpadded(bytes: &[u8]) -> Option<String> {
+    let text = String::from_utf8_lossy(bytes);
+    let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0');
+    (!text.is_empty()).then(|| text.to_string())
+}
+
 /// Fills as much of `buffer` as the source has from `offset` on; returns how much.
 pub(crate) fn fill_at(source: &dyn Source, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
     let mut filled = 0;
@@ -190,7 +196,6 @@ pub(super) fn read_buffered(input: &mut impl BufRead, out: &mut [u8]) -> io::Res
     Ok(count)
 }
 
-/// Bytes per read of a [`Stream`].
 const STREAM_BUFFER: usize = 1 << 16;
 
 /// A source read from front to back, with jumps.
@@ -203,12 +208,10 @@ pub(crate) struct Stream<'a> {
 }
 
 impl<'a> Stream<'a> {
-    /// From the first byte on.
     pub(crate) fn new(source: &'a dyn Source) -> Self {
         Self { source, at: 0, buffer: Vec::new(), used: 0 }
     }
 
-    /// Position of the next byte.
     pub(crate) fn position(&self) -> u64 {
         self.at - (self.buffer.len() - self.used) as u64
     }
@@ -258,7 +261,6 @@ pub struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
-    /// A window that holds nothing yet.
     pub(crate) fn new(source: &'a dyn Source) -> Self {
         Self { source, buffer: Vec::new(), start: 0 }
     }

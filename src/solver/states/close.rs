@@ -10,14 +10,9 @@ impl StateReader<'_> {
         match (pending.time, self.missing(&pending, at_end)) {
             (Some(time), None) if self.skip > 0 => {
                 self.skip -= 1;
-                self.problems.add(
-                    ProblemCode::IncompleteState,
-                    Some(pending.place),
-                    None,
-                    format!(
+                self.problems.add(ProblemCode::IncompleteState, Some(pending.place), format!(
                         "the state at time {time:?} has other entities than the states below it; it is left out"
-                    ),
-                );
+                    ));
                 for table in &mut self.tables {
                     table.forget_rows();
                 }
@@ -31,7 +26,6 @@ impl StateReader<'_> {
                 self.problems.add(
                     ProblemCode::IncompleteState,
                     Some(pending.place),
-                    None,
                     format!(
                         "state {}{at} is not complete and is left out: {missing}",
                         self.time.len() + 1

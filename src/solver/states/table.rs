@@ -8,7 +8,7 @@ use crate::history::{EntityId, History};
 use crate::solver::Selection;
 use crate::solver::problem::{Diagnostics, Problem, ProblemCode};
 
-/// Rows of the same components.
+#[derive(Default)]
 pub(crate) struct Table {
     pub name: &'static str,
     pub components: Vec<Arc<str>>,
@@ -54,16 +54,7 @@ impl Table {
             seen_columns: vec![false; components.len()],
             components,
             wanted_columns,
-            rows: Vec::new(),
-            row_of: HashMap::new(),
-            varies: false,
-            last_row: None,
-            states_with: Vec::new(),
-            channel_of: Vec::new(),
-            channels: Vec::new(),
-            filled: Vec::new(),
-            filled_rows: Vec::new(),
-            next_row: 0,
+            ..Self::default()
         }
     }
 
@@ -75,14 +66,8 @@ impl Table {
     }
 
     pub(crate) fn forget_rows(&mut self) {
-        self.rows.clear();
-        self.row_of.clear();
-        self.channel_of.clear();
-        self.channels.clear();
-        self.states_with.clear();
-        self.filled.clear();
-        self.filled_rows.clear();
-        self.seen_columns.fill(false);
+        let (components, wanted) = (self.components.clone(), self.wanted_columns.clone());
+        *self = Self { varies: self.varies, ..Self::new(self.name, components, wanted) };
     }
 
     /// Adds a row that the first `states` kept states do not have.

@@ -82,15 +82,7 @@ fn unread(name: &str, records: usize) -> SolverFile {
     SolverFile {
         format: FORMAT.name,
         section: name.into(),
-        solver: None,
-        version: None,
-        title: None,
-        entities: Vec::new(),
-        without_data: Vec::new(),
-        components: Vec::new(),
-        time: [].into(),
-        histories: Vec::new(),
         problems: vec![Problem::new(ProblemCode::UnreadRows, message)],
-        notes: Vec::new(),
+        ..SolverFile::default()
     }
 }

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::bytes::Bytes;
 use super::metadata::Metadata;
-use super::owners::{Entities, EntityList, Found, row_name};
+use super::owners::{Entities, EntityList, OwnerSearch, row_name};
 use super::records::Section;
 use super::states::StateReader;
 use super::values::Series;
@@ -20,7 +20,6 @@ use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
 /// Components of a state that are not results.
 const NOT_RESULTS: [&str; 4] = ["time", "cycle", "ids", "system"];
 
-/// Reads one section.
 pub(super) struct SectionReader<'a> {
     section: &'a Section,
     bytes: Bytes<'a>,
@@ -72,8 +71,7 @@ impl<'a> SectionReader<'a> {
             components: if self.states.whole.is_empty() { Vec::new() } else { components },
             time: self.states.time,
             histories,
-            problems: Vec::new(),
-            notes: Vec::new(),
+            ..SolverFile::default()
         };
         Ok((file, self.problems))
     }
@@ -107,9 +105,9 @@ impl<'a> SectionReader<'a> {
         for component in results {
             let found = Entities::of(section, component, &self.metadata, &self.states, self.bytes)?;
             let (owners, points) = match found {
-                Found::Entities(owners, points) => (owners, points),
-                Found::Nothing => continue,
-                Found::Unfit(problem) => {
+                OwnerSearch::Found(owners, points) => (owners, points),
+                OwnerSearch::NoValues => continue,
+                OwnerSearch::NoIds(problem) => {
                     self.problems.push(problem);
                     continue;
                 }

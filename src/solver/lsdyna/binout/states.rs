@@ -9,7 +9,6 @@ use super::records::{Component, DataRecord, LISTS, Section};
 use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::solver::restart;
 
-/// The whole states of a section.
 pub(super) struct StateReader {
     /// Indices of the states, in order of their numbers.
     pub whole: Vec<usize>,
@@ -83,7 +82,6 @@ fn order_of(section: &Section) -> Option<Problem> {
     (!section.states.is_sorted()).then(|| Problem::new(ProblemCode::TimeGoesBack, message))
 }
 
-/// States and their times.
 struct Timed {
     states: Vec<usize>,
     time: Vec<f64>,
@@ -138,8 +136,8 @@ impl Timed {
     }
 
     fn keep(&mut self, kept: &[usize]) {
-        self.time = kept.iter().map(|&i| self.time[i]).collect();
-        self.states = kept.iter().map(|&i| self.states[i]).collect();
+        restart::take(&mut self.time, kept);
+        restart::take(&mut self.states, kept);
     }
 
     /// Leaves out states that were written before a list of ids changed: their rows cannot be
@@ -220,7 +218,6 @@ fn ids_by_order(
     Ok(Some(whole.iter().map(of).collect()))
 }
 
-/// Ids that one state has twice.
 fn repeated_ids(section: &Section, ids: &[Ids]) -> Option<Problem> {
     let twice = |ids: &Ids| ids.len() - ids.iter().collect::<HashSet<_>>().len();
     let mut above: Option<&Ids> = None;
@@ -236,7 +233,6 @@ fn repeated_ids(section: &Section, ids: &[Ids]) -> Option<Problem> {
     (twice > 0).then(|| Problem::new(ProblemCode::RepeatedLabel, message))
 }
 
-/// Where a state is in its file.
 fn place_of(section: &Section, state: usize) -> Option<Place> {
     let records = || section.components.iter().filter_map(|c| c.records.get(&state));
     let time = section.component("time").and_then(|t| t.records.get(&state));

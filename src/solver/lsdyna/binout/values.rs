@@ -26,7 +26,6 @@ pub(super) struct Series<'a> {
 /// Index of an entity among the owners, and the entity itself.
 type Kept = (usize, Option<EntityId>);
 
-/// What a series lacks.
 #[derive(Default)]
 struct Lacks {
     /// States without it, or with another number of values.

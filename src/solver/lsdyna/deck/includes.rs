@@ -5,8 +5,7 @@ use std::io::BufRead;
 use super::card::Card;
 use super::contents::Include;
 use super::context::{Block, Context, MAX_INCLUDES};
-use super::keyword::Format;
-use super::kind::Kind;
+use super::keyword::Kind;
 use crate::solver::lsdyna::line::shown;
 use crate::solver::problem::{Place, ProblemCode};
 
@@ -17,22 +16,18 @@ const MAX_FILE_NAME: usize = 1024;
 /// Gives the bytes of an included file by its name.
 pub(super) type Open<'a> = dyn FnMut(&str) -> Option<Box<dyn BufRead>> + 'a;
 
-/// Finds included files.
 pub(super) struct Includes<'a, 'o> {
     open: &'a mut Open<'o>,
     /// Of `*INCLUDE_PATH`.
     folders: Vec<String>,
 }
 
-/// An included file that is there.
 pub(super) struct Included {
     pub source: Box<dyn BufRead>,
-    /// As the deck writes it.
     pub name: String,
-    /// Where it is included.
     pub place: Place,
-    /// Format of the cards that include it, with which it begins.
-    pub format: Format,
+    /// Width of fields where it is included, with which it begins.
+    pub width: usize,
 }
 
 impl<'a, 'o> Includes<'a, 'o> {
@@ -64,7 +59,7 @@ impl<'a, 'o> Includes<'a, 'o> {
         } else if goes_on {
             block.text = Some(name);
         } else if block.kind == Kind::Include {
-            return self.include(context, name, card.place, block.format);
+            return self.include(context, name, card.place, block.width);
         } else if self.folders.len() < MAX_INCLUDES {
             self.folders.push(name.trim_end_matches(['/', '\\']).to_string());
         } else {
@@ -78,7 +73,7 @@ impl<'a, 'o> Includes<'a, 'o> {
         context: &mut Context,
         name: String,
         place: Place,
-        format: Format,
+        width: usize,
     ) -> Option<Included> {
         let index = context.deck.includes.len();
         if index >= MAX_INCLUDES {
@@ -95,7 +90,7 @@ impl<'a, 'o> Includes<'a, 'o> {
             }
             Some((path, source)) => {
                 context.reading.push((index, path));
-                return Some(Included { source, name, place, format });
+                return Some(Included { source, name, place, width });
             }
             None if too_deep => {
                 format!("include \"{name}\" is more than {MAX_DEPTH} files deep; it is left out")

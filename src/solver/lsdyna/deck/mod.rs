@@ -5,17 +5,14 @@
 //! that are not listed here are skipped; nothing of them is kept.
 
 mod card;
+mod cards;
 pub(crate) mod contents;
 mod context;
-mod definitions;
 mod includes;
 mod keyword;
-mod kind;
-mod named;
 pub(crate) mod parameters;
 mod reader;
 mod units;
-mod velocity;
 
 use std::io::{self, BufRead};
 

@@ -9,8 +9,7 @@ use super::card::{Card, start, text};
 use super::contents::{Deck, DeckInterface, Scope};
 use super::context::{Block, Context};
 use super::includes::{Included, Includes, Open};
-use super::keyword::{Format, Keyword};
-use super::kind::{Kind, kind};
+use super::keyword::{Keyword, Kind, STANDARD, kind};
 use super::units;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::read_buffered;
@@ -22,11 +21,11 @@ const MAX_BYTES: u64 = 4_000_000_000;
 pub(super) fn read(source: &mut dyn BufRead, open: &mut Open<'_>) -> io::Result<Deck> {
     let left = Rc::new(Cell::new(MAX_BYTES));
     let mut reader = Reader { context: Context::default(), includes: Includes::new(open) };
-    let mut files = vec![OpenFile::new(Box::new(source), &left, Format::Standard, None)];
+    let mut files = vec![OpenFile::new(Box::new(source), &left, STANDARD, None)];
     while let Some(file) = files.last_mut() {
         let failed = match reader.read_on(file) {
-            Ok(Some(Included { source, name, place, format })) => {
-                files.push(OpenFile::new(source, &left, format, Some((name, place))));
+            Ok(Some(Included { source, name, place, width })) => {
+                files.push(OpenFile::new(source, &left, width, Some((name, place))));
                 continue;
             }
             Ok(None) => None,
@@ -47,11 +46,10 @@ pub(super) fn read(source: &mut dyn BufRead, open: &mut Open<'_>) -> io::Result<
     Ok(reader.context.finish())
 }
 
-/// A file of the deck that is being read.
 struct OpenFile<'a> {
     lines: Lines<SizeLimited<'a>>,
-    /// Format of its cards where their keyword asks for none.
-    format: Format,
+    /// Width of the fields of its cards where their keyword asks for none.
+    width: usize,
     block: Option<Block>,
     /// Its name, and where in the file below on the stack it is included; `None` for the deck
     /// itself.
@@ -62,11 +60,11 @@ impl<'a> OpenFile<'a> {
     fn new(
         source: Box<dyn BufRead + 'a>,
         left: &Rc<Cell<u64>>,
-        format: Format,
+        width: usize,
         included: Option<(String, Place)>,
     ) -> Self {
         let lines = Lines::new(SizeLimited { source, left: left.clone() });
-        Self { lines, format, block: None, included }
+        Self { lines, width, block: None, included }
     }
 }
 
@@ -121,8 +119,8 @@ impl Reader<'_, '_> {
                     if keyword.name == "END" {
                         return Ok(None);
                     }
-                    file.format = keyword.deck_format().unwrap_or(file.format);
-                    file.block = self.begin(keyword, &line, file.format);
+                    file.width = keyword.deck_width().unwrap_or(file.width);
+                    file.block = self.begin(keyword, &line, file.width);
                 }
                 _ => {
                     if let Some(block) = &mut file.block
@@ -143,7 +141,7 @@ impl Reader<'_, '_> {
         }
     }
 
-    fn begin(&mut self, keyword: Keyword, line: &Line<'_>, deck: Format) -> Option<Block> {
+    fn begin(&mut self, keyword: Keyword, line: &Line<'_>, deck: usize) -> Option<Block> {
         let kind = kind(&keyword);
         let place: Place = line.into();
         let at = self.context.at(place);
@@ -166,8 +164,8 @@ impl Reader<'_, '_> {
             }
             _ => {}
         }
-        let format = keyword.format.unwrap_or(deck);
-        Some(Block { kind, keyword, place, format, cards: 0, ids: [None; 3], text: None })
+        let width = keyword.width.unwrap_or(deck);
+        Some(Block { kind, keyword, place, width, cards: 0, ids: [None; 3], text: None })
     }
 
     /// Reads a card; `Some` if it includes a file that is there.
@@ -176,7 +174,7 @@ impl Reader<'_, '_> {
             let message = "expected a card, found a line beyond 4096 bytes; its rest is left out";
             self.context.problem(ProblemCode::BadLine, line.into(), None, message.into());
         }
-        let card = Card::new(line, block.format);
+        let card = Card::new(line, block.width);
         let first = block.cards == 0;
         block.cards += 1;
         match block.kind {
@@ -192,7 +190,7 @@ impl Reader<'_, '_> {
             Kind::VelocityGeneration => self.context.velocity_generation(block, &card),
             Kind::InertiaBody { part, velocity } => {
                 if block.cards == part + 1 {
-                    block.ids[0] = self.context.integer(&card, 0).unwrap_or(None);
+                    block.ids[0] = self.context.integer(card.field(0)).unwrap_or(None);
                 } else if block.cards == velocity + 1 {
                     self.context.velocity_of_inertia(block, &card);
                 }
@@ -209,7 +207,7 @@ impl Reader<'_, '_> {
             Kind::HistoryNodesWithHeadings => self.context.history_with_heading(&card),
             Kind::Contact | Kind::Wall if first => {
                 let (field, title) = card.id_and_text();
-                let id = self.context.integer_of(field, card.place).unwrap_or(None);
+                let id = self.context.integer(field).unwrap_or(None);
                 let name = block.keyword.name.clone();
                 self.context.interface(block.kind, name, self.context.at(block.place), id, title);
             }

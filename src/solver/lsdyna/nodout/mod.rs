@@ -15,8 +15,7 @@ mod stride;
 use std::io;
 
 use super::ascii::{self, Body};
-use super::label_values::Widths;
-use super::line::{Field, Line, integer, real, shown};
+use super::line::{Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::format::Format;
 use crate::solver::problem::Place;
@@ -63,16 +62,14 @@ const FIELD_WIDTH: usize = 12;
 /// Digits, point and exponent of a time.
 const TIME: usize = 13;
 
-fn signature(line: &[u8]) -> bool {
-    line.starts_with(STATE)
-}
-
 pub(crate) const FORMAT: Format =
-    Format::text("nodout", "node", signature, ascii::read_default::<Nodout>);
+    Format::text("nodout", "node", |line| line.starts_with(STATE), ascii::read_default::<Nodout>);
+
+/// Tables of both blocks.
+const TABLES: [TableId; 2] = [TableId(0), TableId(1)];
 
 #[derive(Default)]
 struct Nodout {
-    tables: Option<[TableId; 2]>,
     /// Cycle and time of the state line above, until its column line comes.
     announced: Option<(i64, f64, Place)>,
     cycle: Option<i64>,
@@ -82,7 +79,6 @@ struct Nodout {
     new_start: Option<Place>,
     /// How states are laid out, from the last one that was read line by line.
     stride: Option<Stride>,
-    widths: Widths,
 }
 
 #[derive(Clone, Copy)]
@@ -92,11 +88,11 @@ struct Block {
 }
 
 impl Body for Nodout {
-    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
-        if line.is_blank() {
-            // The blank line between state line and column line ends nothing.
-            self.block = None;
-        } else if line.text.starts_with(STATE) {
+    const TABLES: ascii::Tables =
+        &[("translational rows", &TRANSLATIONS), ("rotational rows", &ROTATIONS)];
+
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
+        if line.text.starts_with(STATE) {
             self.block = None;
             self.announced = self.state_line(line, states);
             self.note_start(states);
@@ -106,13 +102,14 @@ impl Body for Nodout {
             row(block, line, states);
         } else {
             self.unfinished(line, states);
-            let found = shown(line.columns(1, 60));
-            states.damage(
-                line,
-                None,
-                format!("expected a state line, found \"{}\"", found.trim_end()),
-            );
+            states.unexpected(line, None, "a state line", 60);
         }
+        Some(())
+    }
+
+    /// The blank line between state line and column line ends nothing.
+    fn blank(&mut self, _: &mut StateReader<'_>) {
+        self.block = None;
     }
 
     fn unfinished(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
@@ -139,11 +136,10 @@ impl Body for Nodout {
         states.close(false);
         // A state that was left out tells no layout, but an earlier one may have told it.
         let above = above.filter(|_| states.kept() > kept);
-        let tables = self.tables.unwrap_or_default();
         for known in [true, false] {
             if !known {
                 let Some(above) = above else { break };
-                self.stride = Stride::learn(source, above, start, states, tables)?;
+                self.stride = Stride::learn(source, above, start, states)?;
             }
             let Some(stride) = &self.stride else { continue };
             if let Some(end) = stride.leap(source, start, states)? {
@@ -155,7 +151,7 @@ impl Body for Nodout {
         Ok(None)
     }
 
-    fn end(&mut self, _: Place, states: &mut StateReader<'_>) {
+    fn end(&mut self, states: &mut StateReader<'_>) {
         // A state line without the rows it announces.
         if self.continue_announced(states) {
             states.mark_damaged();
@@ -180,8 +176,7 @@ impl Nodout {
         states: &mut StateReader<'_>,
     ) -> Option<(i64, f64, Place)> {
         let parsed = cycle_and_time(line.text).filter(|_| {
-            let text = super::at_time(line.text).unwrap_or_default();
-            super::printed_time(text, TIME, &mut self.widths, line, states).is_some()
+            super::heading_time(super::at_time(line.text), TIME, line, states).is_some()
         });
         let parsed = parsed.map(|(cycle, time)| (cycle, time, line.into()));
         if parsed.is_none() {
@@ -209,18 +204,12 @@ impl Nodout {
     }
 
     fn column_line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<Block> {
-        let [translations, rotations] = *self.tables.get_or_insert_with(|| {
-            [
-                states.table("translational rows", &TRANSLATIONS),
-                states.table("rotational rows", &ROTATIONS),
-            ]
-        });
         let heading = &line.text[COLUMN_LINE.len()..];
         let starts = |name: &[u8]| heading.trim_ascii_start().starts_with(name);
         let block = if starts(b"x-disp") {
-            Block { table: translations, fields: TRANSLATIONS.len() }
+            Block { table: TABLES[0], fields: TRANSLATIONS.len() }
         } else if starts(b"x-rot") {
-            Block { table: rotations, fields: ROTATIONS.len() }
+            Block { table: TABLES[1], fields: ROTATIONS.len() }
         } else {
             if self.continue_announced(states) {
                 states.mark_damaged();
@@ -246,10 +235,8 @@ fn cycle_and_time(line: &[u8]) -> Option<(i64, f64)> {
     let at = memchr::memmem::find(rest, AT)?;
     let close = memchr::memchr(b')', rest)?;
     let cycle = integer(&rest[..at])?;
-    match real(rest.get(at + AT.len()..close)?) {
-        Field::Real(time) if rest[close + 1..].trim_ascii().is_empty() => Some((cycle, time)),
-        _ => None,
-    }
+    let time = real(rest.get(at + AT.len()..close)?).number()?;
+    rest[close + 1..].trim_ascii().is_empty().then_some((cycle, time))
 }
 
 /// One node. Ids of more than nine digits push l2a's rows to the right, so the first
