@@ -11,6 +11,8 @@ pub struct Format {
     pub name: &'static str,
     /// What an id in it counts, for messages.
     pub(super) entity: &'static str,
+    /// Whether a line below the header of a text file, or the first bytes of a binary one, show the kind.
+    signature: fn(&[u8]) -> bool,
     reader: Reader,
 }
 
@@ -19,10 +21,10 @@ type ReadSections = fn(&[Box<dyn Source>], &Selection) -> io::Result<Vec<SolverF
 type ReadText = fn(&'static Format, &dyn Source, &Selection) -> io::Result<SolverFile>;
 
 enum Reader {
-    /// Lines of text. A signature is a line below the header that shows the kind.
-    Text { signature: fn(&[u8]) -> bool, read: ReadText },
-    /// Bytes, told by the first of them; over one or several files; sections inside.
-    Binary { recognises: fn(&[u8]) -> bool, read: ReadSections },
+    /// Lines of text.
+    Text(ReadText),
+    /// Bytes, over one or several files; sections inside.
+    Binary(ReadSections),
 }
 
 impl Format {
@@ -32,33 +34,27 @@ impl Format {
         signature: fn(&[u8]) -> bool,
         read: ReadText,
     ) -> Self {
-        Self { name, entity, reader: Reader::Text { signature, read } }
+        Self { name, entity, signature, reader: Reader::Text(read) }
     }
 
     pub(super) const fn binary(
         name: &'static str,
-        recognises: fn(&[u8]) -> bool,
+        signature: fn(&[u8]) -> bool,
         read: ReadSections,
     ) -> Self {
-        Self { name, entity: "entity", reader: Reader::Binary { recognises, read } }
+        Self { name, entity: "entity", signature, reader: Reader::Binary(read) }
     }
 
     pub(super) fn is_signature(&self, line: &[u8]) -> bool {
-        match self.reader {
-            Reader::Text { signature, .. } => signature(line),
-            Reader::Binary { .. } => false,
-        }
-    }
-
-    pub(super) fn is_binary(&self) -> bool {
-        matches!(self.reader, Reader::Binary { .. })
+        !self.is_binary() && (self.signature)(line)
     }
 
     pub(super) fn recognises(&self, head: &[u8]) -> bool {
-        match self.reader {
-            Reader::Text { .. } => false,
-            Reader::Binary { recognises, .. } => recognises(head),
-        }
+        self.is_binary() && (self.signature)(head)
+    }
+
+    pub(super) fn is_binary(&self) -> bool {
+        matches!(self.reader, Reader::Binary(_))
     }
 
     /// One result per section; a text file is one section.
@@ -68,9 +64,9 @@ impl Format {
         selection: &Selection,
     ) -> io::Result<Vec<SolverFile>> {
         let mut sections = match (&self.reader, parts) {
-            (Reader::Text { read, .. }, [first, ..]) => vec![read(self, &**first, selection)?],
-            (Reader::Text { .. }, []) => Vec::new(),
-            (Reader::Binary { read, .. }, parts) => read(parts, selection)?,
+            (Reader::Text(read), [first, ..]) => vec![read(self, &**first, selection)?],
+            (Reader::Text(_), []) => Vec::new(),
+            (Reader::Binary(read), parts) => read(parts, selection)?,
         };
         for section in &mut sections {
             section.problems.extend(problem::of_time(&section.time));

@@ -24,7 +24,6 @@
 
 pub(crate) mod decks;
 mod detect;
-mod error;
 mod family;
 mod format;
 pub(crate) mod lsdyna;
@@ -46,8 +45,6 @@ pub use decks::read_deck;
 pub use detect::FORMATS;
 use detect::{check_format, detect, files_in, named};
 pub(crate) use detect::{entity_word, format_names, is_named_like_binary, without_job_id};
-use error::check_selection;
-pub(crate) use error::no_component;
 pub(crate) use family::family;
 use family::missing_continuation;
 pub use format::Format;
@@ -57,6 +54,8 @@ pub use lsdyna::deck::{Deck, DeckInterface, TitledEntity, parse_deck};
 pub use lsdyna::nodout::Blocks;
 pub use lsdyna::nodout::blocks::Column;
 pub use problem::{Problem, ProblemCode};
+use selection::check_selection;
+pub(crate) use selection::no_component;
 pub use selection::{Selection, WantedId};
 pub use solver_file::{Entity, NoDataReason, SolverFile, WithoutData};
 pub use source::{Access, Source, Window};

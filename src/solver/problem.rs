@@ -92,6 +92,11 @@ impl Problem {
         Self::at(code, None, message)
     }
 
+    pub(in crate::solver) fn at_place(self, place: Option<Place>) -> Self {
+        let columns = self.columns;
+        Self { columns, ..Self::at(self.code, place, self.message) }
+    }
+
     /// A problem at a place.
     pub(in crate::solver) fn at(code: ProblemCode, place: Option<Place>, message: String) -> Self {
         let line = place.map(|p| p.line).filter(|&line| line > 0);

@@ -39,22 +39,16 @@ pub(crate) fn resolve(
             let from = kept.iter().rposition(|&k| stays(k)).map_or(0, |k| k + 1);
             let left_out = kept.split_off(from);
             if let (Some(&first), Some(&last)) = (left_out.first(), left_out.last()) {
-                let twice = || {
+                let (at, from, to, count) = (time[i], time[first], time[last], left_out.len());
+                let message = if again && first == last {
                     format!(
-                        "{of}the state at time {:?} is written twice: the last writing counts",
-                        time[i]
+                        "{of}the state at time {at:?} is written twice: the last writing counts"
+                    )
+                } else {
+                    format!(
+                        "{of}a restart writes again from time {at:?} on: {count} states above, from time {from:?} to {to:?}, are left out"
                     )
                 };
-                let of_many = || {
-                    format!(
-                        "{of}a restart writes again from time {:?} on: {} states above, from time {:?} to {:?}, are left out",
-                        time[i],
-                        left_out.len(),
-                        time[first],
-                        time[last]
-                    )
-                };
-                let message = if again && first == last { twice() } else { of_many() };
                 problems.push(Problem::at(ProblemCode::RepeatedState, place(i), message));
             }
         }

@@ -47,7 +47,7 @@ pub(crate) fn open(path: &Path, access: Access) -> io::Result<Box<dyn Source>> {
     }
     Ok(match access {
         Access::Plain => Box::new(Opened::new(file)?),
-        Access::Map => Box::new(Mapped::new(&file)?),
+        Access::Map => Box::new(map(&file)?),
     })
 }
 
@@ -87,37 +87,20 @@ fn read_file_at(file: &File, buffer: &mut [u8], offset: u64) -> io::Result<usize
     std::os::windows::fs::FileExt::seek_read(file, buffer, offset)
 }
 
-struct Mapped(memmap2::Mmap);
-
-impl Mapped {
-    #[allow(unsafe_code, reason = "a map is only as safe as its file; see Access::Map")]
-    fn new(file: &File) -> io::Result<Self> {
-        // SAFETY: the user asked for a map and so promised that nothing writes to the file.
-        unsafe { memmap2::Mmap::map(file) }.map(Self)
-    }
+#[allow(unsafe_code, reason = "a map is only as safe as its file; see Access::Map")]
+fn map(file: &File) -> io::Result<memmap2::Mmap> {
+    // SAFETY: the user asked for a map and so promised that nothing writes to the file.
+    unsafe { memmap2::Mmap::map(file) }
 }
 
-impl Source for Mapped {
+/// Bytes in memory, a map of a file among them.
+impl<T: AsRef<[u8]> + Send + Sync> Source for T {
     fn size(&self) -> io::Result<u64> {
-        Ok(self.0.len() as u64)
+        Ok(self.as_ref().len() as u64)
     }
 
     fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
-        self.0.as_ref().read_at(offset, buffer)
-    }
-
-    fn bytes(&self) -> Option<&[u8]> {
-        Some(&self.0)
-    }
-}
-
-impl Source for &[u8] {
-    fn size(&self) -> io::Result<u64> {
-        Ok(self.len() as u64)
-    }
-
-    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
-        let rest = usize::try_from(offset).ok().and_then(|from| self.get(from..));
+        let rest = usize::try_from(offset).ok().and_then(|from| self.as_ref().get(from..));
         let rest = rest.unwrap_or_default();
         let count = rest.len().min(buffer.len());
         buffer[..count].copy_from_slice(&rest[..count]);
@@ -125,21 +108,7 @@ impl Source for &[u8] {
     }
 
     fn bytes(&self) -> Option<&[u8]> {
-        Some(self)
-    }
-}
-
-impl Source for Vec<u8> {
-    fn size(&self) -> io::Result<u64> {
-        self.as_slice().size()
-    }
-
-    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
-        self.as_slice().read_at(offset, buffer)
-    }
-
-    fn bytes(&self) -> Option<&[u8]> {
-        Some(self)
+        Some(self.as_ref())
     }
 }
 

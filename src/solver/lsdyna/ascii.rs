@@ -24,7 +24,7 @@ use crate::solver::format::Format;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::{Source, Stream};
 use crate::solver::states::StateReader;
-use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
+use crate::solver::{NoDataReason, Selection, SolverFile, WithoutData};
 
 /// Names of tables, for messages, each with its components.
 pub(crate) type Tables = &'static [(&'static str, &'static [&'static str])];
@@ -99,17 +99,17 @@ pub(crate) fn read<B: Body>(
     selection: &Selection,
     body: impl Fn() -> B,
 ) -> io::Result<SolverFile> {
-    let mut best = read_from_state(0, format, source, selection, body())?;
+    let (mut best, mut is_disputed) = read_from_state(0, format, source, selection, body())?;
     for skipped in 1..=MAX_SKIPPED {
-        if !best.disputed {
+        if !is_disputed {
             break;
         }
-        let next = read_from_state(skipped, format, source, selection, body())?;
-        if next.file.time.len() > best.file.time.len() {
-            best = next;
+        let (next, disputed) = read_from_state(skipped, format, source, selection, body())?;
+        if next.time.len() > best.time.len() {
+            (best, is_disputed) = (next, disputed);
         }
     }
-    Ok(best.file)
+    Ok(best)
 }
 
 /// The same through a body that needs nothing to begin with.
@@ -121,28 +121,24 @@ pub(crate) fn read_default<B: Body + Default>(
     read(format, source, selection, B::default)
 }
 
-struct Attempt {
-    file: SolverFile,
-    /// Whether more states disagree with the first whole state than agree.
-    disputed: bool,
-}
-
+/// The file as it is behind the first `skipped` whole states, and whether more states disagree with the first
+/// whole one than agree.
 fn read_from_state<B: Body>(
     skipped: usize,
     format: &'static Format,
     source: &dyn Source,
     selection: &Selection,
     mut body: B,
-) -> io::Result<Attempt> {
+) -> io::Result<(SolverFile, bool)> {
     let mut frame = AsciiReader::new::<B>(format, source, selection);
-    frame.states.skip(skipped);
+    frame.states.skip = skipped;
     while frame.step(&mut body)? {
         if let Some(place) = body.leap(source, &mut frame.states)? {
             frame.lines.go_to(place);
         }
     }
-    let disputed = frame.states.is_disputed();
-    Ok(Attempt { file: frame.finish(&mut body), disputed })
+    let is_disputed = frame.states.is_disputed();
+    Ok((frame.finish(&mut body), is_disputed))
 }
 
 impl<'a> AsciiReader<'a> {
@@ -152,7 +148,7 @@ impl<'a> AsciiReader<'a> {
         selection: &'a Selection,
     ) -> Self {
         let mut states = StateReader::new(selection);
-        states.allow_empty_states(B::EMPTY_STATES);
+        states.allow_empty_states = B::EMPTY_STATES;
         for (name, components) in B::TABLES {
             states.table(name, *components);
         }
@@ -174,7 +170,7 @@ impl<'a> AsciiReader<'a> {
         if in_header && (line.text.len() > MAX_HEADER_LINE || line.is_binary()) {
             let message =
                 "the line is not a title, version or legend entry: was the file overwritten?";
-            states.problems.add(ProblemCode::BadLine, Some((&line).into()), message.into());
+            states.note(ProblemCode::BadLine, &line, message);
         }
         if line.number == 1 {
             let text = String::from_utf8_lossy(line.text).trim().to_string();
@@ -183,8 +179,7 @@ impl<'a> AsciiReader<'a> {
             self.version = header::version(line.text);
             if self.version.is_none() {
                 let message = "expected LS-DYNA's version line (\"ls-dyna … date …\")";
-                let place = Some((&line).into());
-                states.problems.add(ProblemCode::NoVersionLine, place, message.into());
+                states.note(ProblemCode::NoVersionLine, &line, message);
             }
         } else if !line.ended && !line.is_blank() {
             // What is missing from it is not known, not even where all its numbers seem whole.
@@ -203,8 +198,7 @@ impl<'a> AsciiReader<'a> {
             {
                 self.in_legend = false;
                 let message = "expected {END LEGEND} before the first state";
-                let place = Some((&line).into());
-                states.problems.add(ProblemCode::BadLine, place, message.into());
+                states.note(ProblemCode::BadLine, &line, message);
             }
             // One l2a release wrote the opening line without its closing brace.
             let text = line.text.trim_ascii_start();
@@ -228,35 +222,23 @@ impl<'a> AsciiReader<'a> {
     }
 
     pub(crate) fn finish(mut self, body: &mut impl Body) -> SolverFile {
-        let end = self.lines.place();
-        if end.line < 2 {
-            self.states.problems.add(
-                ProblemCode::NoVersionLine,
-                None,
-                "the file ends before its header (title and version line) is complete".into(),
-            );
+        if self.lines.place().line < 2 {
+            let message = "the file ends before its header (title and version line) is complete";
+            self.states.problems.add(ProblemCode::NoVersionLine, None, message.into());
         }
         if self.in_legend {
-            self.states.problems.add(
-                ProblemCode::BadLine,
-                None,
-                "the file ends within its legend: expected {END LEGEND}".into(),
-            );
+            let message = "the file ends within its legend: expected {END LEGEND}";
+            self.states.problems.add(ProblemCode::BadLine, None, message.into());
         }
         body.end(&mut self.states);
         self.states.end_skipped_lines();
-        self.assemble()
-    }
-
-    fn assemble(mut self) -> SolverFile {
         let singles = std::mem::take(&mut self.states.single_surfaces);
         let titles: HashMap<i64, &Option<String>> =
             self.legend.iter().map(|(id, t)| (*id, t)).collect();
         let title_of = |id: i64| titles.get(&id).and_then(|t| (*t).clone());
-        let collected = self.states.finish();
-        let entities: Vec<Entity> =
-            collected.entities.iter().map(|&id| Entity { id, title: title_of(id.id) }).collect();
-        let with_data: HashSet<i64> = entities.iter().map(|e| e.id.id).collect();
+        let mut file = self.states.finish();
+        file.entities.iter_mut().for_each(|entity| entity.title = title_of(entity.id.id));
+        let with_data: HashSet<i64> = file.entities.iter().map(|e| e.id.id).collect();
         let single = singles.iter().map(|&id| (id, title_of(id)));
         let single = single.map(|of| (of, NoDataReason::SingleSurfaceContact));
         let known: HashSet<i64> = singles.iter().copied().collect();
@@ -273,13 +255,8 @@ impl<'a> AsciiReader<'a> {
             solver: self.version.is_some().then(|| "LS-DYNA".to_string()),
             version: self.version,
             title: self.title,
-            entities,
             without_data,
-            components: collected.components,
-            time: collected.time,
-            histories: collected.histories,
-            problems: collected.problems,
-            ..SolverFile::default()
+            ..file
         }
     }
 }
@@ -288,7 +265,7 @@ impl<'a> AsciiReader<'a> {
 fn is_text(line: &Line<'_>, states: &mut StateReader<'_>) -> bool {
     if line.overlong {
         let message = "the line is longer than any line of this file can be; its end is left out";
-        states.problems.add(ProblemCode::BadLine, Some(line.into()), message.into());
+        states.note(ProblemCode::BadLine, line, message);
     }
     let is_binary = line.is_binary();
     if is_binary {

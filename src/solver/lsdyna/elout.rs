@@ -4,8 +4,8 @@
 //! Seen with data: solids, beams, averages at nodes. Shells, thick shells and the details of
 //! elements (at integration points, at nodes) are read as the source of LSTC's converter `l2a`
 //! writes them. Components are named as in a binout; those of a second integration point end with
-//! `_ip2`, and so on, those of details with `_point1` or `_node7`. Elements may erode: their values
-//! are then NaN. Each kind of element has a block of its own in a state.
+//! `_ip2`, and so on, those of details with `_point1` or `_node7`. Each kind of element has
+//! a block of its own in a state.
 //!
 //! Rows may come and go, because elements erode; what a state lacks is NaN. How much of it is bounded, so that damage
 //! that looks like erosion cannot fill the memory.

@@ -62,7 +62,7 @@ impl Body for Matsum {
         let text = line.text;
         if let Some(rest) = text.strip_prefix(STATE) {
             states.entity = None;
-            states.set_time_digits(5);
+            states.time_digits = 5;
             // Five digits: two states may print one time, so the line begins a state.
             let time = super::heading_time(Some(rest), TIME, line, states);
             let time = time.filter(|_| rest.len() >= WIDTH);

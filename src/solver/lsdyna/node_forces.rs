@@ -142,7 +142,7 @@ impl NodeForces {
     fn state(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         self.current = None;
         self.begins = true;
-        states.set_time_digits(self.layout.time_digits);
+        states.time_digits = self.layout.time_digits;
         let at = memchr::memmem::find(line.text, b"t=").map(|at| &line.text[at + 2..]);
         let time = super::heading_time(at, super::TIME, line, states);
         // Every kind of boundary condition has a heading of its own at one time.

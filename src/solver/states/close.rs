@@ -10,9 +10,10 @@ impl StateReader<'_> {
         match (pending.time, self.missing(&pending, at_end)) {
             (Some(time), None) if self.skip > 0 => {
                 self.skip -= 1;
-                self.problems.add(ProblemCode::IncompleteState, Some(pending.place), format!(
-                        "the state at time {time:?} has other entities than the states below it; it is left out"
-                    ));
+                let message = format!(
+                    "the state at time {time:?} has other entities than the states below it; it is left out"
+                );
+                self.problems.add(ProblemCode::IncompleteState, Some(pending.place), message);
                 for table in &mut self.tables {
                     table.forget_rows();
                 }
@@ -23,16 +24,11 @@ impl StateReader<'_> {
                 self.disagreeing += usize::from(pending.disagrees);
                 let missing = missing.unwrap_or_else(|| "its time is missing".into());
                 let at = time.map_or(String::new(), |t| format!(" at time {t:?}"));
-                self.problems.add(
-                    ProblemCode::IncompleteState,
-                    Some(pending.place),
-                    format!(
-                        "state {}{at} is not complete and is left out: {missing}",
-                        self.time.len() + 1
-                    ),
-                );
-                // Labels that only dropped states had must not become components.
                 let states = self.time.len();
+                let message =
+                    format!("state {}{at} is not complete and is left out: {missing}", states + 1);
+                self.problems.add(ProblemCode::IncompleteState, Some(pending.place), message);
+                // Labels that only dropped states had must not become components.
                 self.scalars.retain(|s| s.absent < states);
             }
         }

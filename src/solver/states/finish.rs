@@ -4,49 +4,33 @@ use std::sync::Arc;
 
 use super::StateReader;
 use super::table::collect_tables;
-use crate::history::{EntityId, History};
-use crate::solver::problem::{Problem, ProblemCode};
-use crate::solver::restart;
-
-pub(crate) struct Collected {
-    pub entities: Vec<EntityId>,
-    pub components: Vec<Arc<str>>,
-    pub time: Arc<[f64]>,
-    pub histories: Vec<History>,
-    pub problems: Vec<Problem>,
-}
+use crate::history::History;
+use crate::solver::problem::ProblemCode;
+use crate::solver::{SolverFile, restart};
 
 impl StateReader<'_> {
-    pub(crate) fn finish(mut self) -> Collected {
+    /// The file without what its header says.
+    pub(crate) fn finish(mut self) -> SolverFile {
         self.close(true);
         self.resolve_restarts();
         let time: Arc<[f64]> = self.time.into();
-        let mut collected = Collected {
-            entities: Vec::new(),
-            components: Vec::new(),
-            time: time.clone(),
-            histories: Vec::new(),
-            problems: Vec::new(),
-        };
+        let mut file = SolverFile { time: time.clone(), ..SolverFile::default() };
         if self.sealed {
-            let found = collect_tables(self.tables, &mut collected);
+            let found = collect_tables(self.tables, &mut file);
             self.problems.append(found);
             for scalar in self.scalars {
                 if scalar.absent > 0 {
-                    self.problems.add(
-                        ProblemCode::AbsentComponent,
-                        None,
-                        format!(
-                            "{} is missing from {} of {} states; its values there are NaN",
-                            scalar.component,
-                            scalar.absent,
-                            time.len()
-                        ),
+                    let message = format!(
+                        "{} is missing from {} of {} states; its values there are NaN",
+                        scalar.component,
+                        scalar.absent,
+                        time.len()
                     );
+                    self.problems.add(ProblemCode::AbsentComponent, None, message);
                 }
-                collected.components.push(scalar.component.clone());
+                file.components.push(scalar.component.clone());
                 if scalar.kept {
-                    collected.histories.push(History {
+                    file.histories.push(History {
                         entity: None,
                         component: scalar.component,
                         time: time.clone(),
@@ -55,8 +39,8 @@ impl StateReader<'_> {
                 }
             }
         }
-        collected.problems = self.problems.into_list();
-        collected
+        file.problems = self.problems.into_list();
+        file
     }
 
     /// Leaves out the states that a restart wrote again.

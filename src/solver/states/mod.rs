@@ -17,7 +17,6 @@ use super::lsdyna::line::{Field, Line, real, shown};
 use super::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::history::EntityId;
 use crate::plural::counted;
-pub(crate) use finish::Collected;
 use table::Table;
 
 /// Values that states may lack, beyond a multiple of the values they have: more are no
@@ -52,7 +51,7 @@ struct Pending {
 
 /// The states of one file while it is read.
 pub(crate) struct StateReader<'a> {
-    selection: &'a Selection,
+    pub selection: &'a Selection,
     tables: Vec<Table>,
     scalars: Vec<Scalar>,
     time: Vec<f64>,
@@ -60,10 +59,11 @@ pub(crate) struct StateReader<'a> {
     /// Whether a whole state has fixed the entities.
     sealed: bool,
     /// Whole states to leave out before the first that is kept.
-    skip: usize,
+    pub skip: usize,
     /// States left out because their rows are not those of the first whole state.
     disagreeing: usize,
-    allow_empty_states: bool,
+    /// Whether a state without rows is whole.
+    pub allow_empty_states: bool,
     /// Values that the kept states have and lack, selected or not.
     present_cells: usize,
     absent_cells: usize,
@@ -71,7 +71,7 @@ pub(crate) struct StateReader<'a> {
     places: Vec<Place>,
     cycles: Vec<Option<i64>>,
     /// Digits that the file prints of times.
-    time_digits: i32,
+    pub time_digits: i32,
     widths: Widths,
     /// Lines between those that are read, which say nothing that is known, and the first of them.
     skipped_lines: usize,
@@ -142,19 +142,6 @@ impl<'a> StateReader<'a> {
         }
     }
 
-    pub(crate) fn skip(&mut self, count: usize) {
-        self.skip = count;
-    }
-
-    /// Says how many digits of times the file prints, if fewer than most.
-    pub(crate) fn set_time_digits(&mut self, digits: i32) {
-        self.time_digits = digits;
-    }
-
-    pub(crate) fn allow_empty_states(&mut self, allow: bool) {
-        self.allow_empty_states = allow;
-    }
-
     /// Whether more states disagree with the first whole state than agree with it.
     pub(crate) fn is_disputed(&self) -> bool {
         self.disagreeing > self.time.len()
@@ -162,10 +149,6 @@ impl<'a> StateReader<'a> {
 
     pub(crate) fn kept(&self) -> usize {
         self.time.len()
-    }
-
-    pub(crate) fn is_audit(&self) -> bool {
-        self.selection.audit
     }
 
     /// Adds a table whose rows may come and go.
@@ -227,6 +210,11 @@ impl<'a> StateReader<'a> {
     pub(crate) fn has_row(&self, table: TableId, entity: EntityId) -> bool {
         let table = &self.tables[table.0];
         table.row_of.get(&entity).is_some_and(|&row| table.filled[row])
+    }
+
+    /// Notes what is odd about a line.
+    pub(crate) fn note(&mut self, code: ProblemCode, line: &Line<'_>, message: &str) {
+        self.problems.add(code, Some(line.into()), message.into());
     }
 
     /// Notes a line that cannot be read; the state it belongs to is not whole.
@@ -314,18 +302,12 @@ impl<'a> StateReader<'a> {
                 if let Some(pending) = &mut self.pending {
                     pending.disagrees = true;
                 }
-                self.problems.add(
-                    ProblemCode::UnexpectedEntity,
-                    Some(line.into()),
-                    format!("{entity} is not among the entities of the first state"),
-                );
-                return;
+                let message = format!("{entity} is not among the entities of the first state");
+                return self.note(ProblemCode::UnexpectedEntity, line, &message);
             }
         };
         if std::mem::replace(&mut table.filled[row], true) {
-            let message = format!("{entity} appears twice in one state");
-            self.damage(line, None, message);
-            return;
+            return self.damage(line, None, format!("{entity} appears twice in one state"));
         }
         table.filled_rows.push(row);
         table.next_row = row + 1;
@@ -378,12 +360,9 @@ impl<'a> StateReader<'a> {
             _ => self.scalars.iter().position(|s| &*s.component == component),
         };
         if found.is_none() && self.scalars.len() == MAX_LABELS {
-            self.problems.add(
-                ProblemCode::UnreadRows,
-                Some(line.into()),
-                format!("{component} is left out: the file has more than {MAX_LABELS} labels"),
-            );
-            return;
+            let message =
+                format!("{component} is left out: the file has more than {MAX_LABELS} labels");
+            return self.note(ProblemCode::UnreadRows, line, &message);
         }
         let index = found.unwrap_or_else(|| {
             let kept = self.selection.wants_component(component);
@@ -397,12 +376,9 @@ impl<'a> StateReader<'a> {
             self.scalars.len() - 1
         });
         if self.scalars[index].pending.is_some() {
-            self.problems.add(
-                ProblemCode::RepeatedLabel,
-                Some(line.into()),
-                format!("{component} appears twice in one state; its first value is kept"),
-            );
-            return;
+            let message =
+                format!("{component} appears twice in one state; its first value is kept");
+            return self.note(ProblemCode::RepeatedLabel, line, &message);
         }
         let (value, problem) = read_field(line, columns);
         self.problems.extend(problem.map(|p| *p));

@@ -3,10 +3,9 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::Collected;
 use crate::history::{EntityId, History};
-use crate::solver::Selection;
 use crate::solver::problem::{Diagnostics, Problem, ProblemCode};
+use crate::solver::{Entity, Selection, SolverFile};
 
 #[derive(Default)]
 pub(crate) struct Table {
@@ -110,8 +109,8 @@ impl Table {
 
 /// Histories entity by entity, each with the components of all tables in order.
 /// Columns that an entity's rows never have make no history of it.
-pub(crate) fn collect_tables(tables: Vec<Table>, collected: &mut Collected) -> Diagnostics {
-    let states = collected.time.len();
+pub(crate) fn collect_tables(tables: Vec<Table>, file: &mut SolverFile) -> Diagnostics {
+    let states = file.time.len();
     let mut problems = Diagnostics::default();
     let mut of_entity: HashMap<EntityId, Vec<History>> = HashMap::new();
     for mut table in tables.into_iter().filter(|table| !table.rows.is_empty()) {
@@ -126,7 +125,7 @@ pub(crate) fn collect_tables(tables: Vec<Table>, collected: &mut Collected) -> D
                 continue;
             }
             let histories = of_entity.entry(entity).or_insert_with(|| {
-                collected.entities.push(entity);
+                file.entities.push(Entity { id: entity, title: None });
                 Vec::new()
             });
             if table.channel_of[row].is_none() {
@@ -147,16 +146,16 @@ pub(crate) fn collect_tables(tables: Vec<Table>, collected: &mut Collected) -> D
                 histories.push(History {
                     entity: Some(entity),
                     component: component.clone(),
-                    time: collected.time.clone(),
+                    time: file.time.clone(),
                     values: channel.values,
                 });
             }
         }
         let seen = table.components.into_iter().zip(table.seen_columns);
-        collected.components.extend(seen.filter(|(_, seen)| *seen).map(|(name, _)| name));
+        file.components.extend(seen.filter(|(_, seen)| *seen).map(|(name, _)| name));
     }
-    for entity in &collected.entities {
-        collected.histories.extend(of_entity.remove(entity).into_iter().flatten());
+    for entity in &file.entities {
+        file.histories.extend(of_entity.remove(&entity.id).into_iter().flatten());
     }
     problems
 }

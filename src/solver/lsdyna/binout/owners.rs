@@ -78,10 +78,10 @@ impl Entities {
             return Ok(OwnerSearch::Found(Self::Global, 1));
         }
         let message = format!(
-            "{}: {} has {width} values a state and no ids of that number; it is not read",
-            section.name, component.name
+            "{} has {width} values a state and no ids of that number; it is not read",
+            component.name
         );
-        Ok(OwnerSearch::NoIds(Problem::new(ProblemCode::UnreadRows, message)))
+        Ok(OwnerSearch::NoIds(section.problem(ProblemCode::UnreadRows, &message)))
     }
 
     pub(crate) fn entities(&self) -> &[EntityId] {
@@ -145,12 +145,11 @@ impl EntityList {
             let again = rows().filter(|(row, _)| **row == limit + 1).count();
             let first = rows().find(|(row, _)| **row == limit + 1).map(|(_, id)| id.to_string());
             let message = format!(
-                "{}: {again} ids, the first {}, are there more than {} in one state; rows beyond the first {MAX_ROWS} are left out",
-                section.name,
+                "{again} ids, the first {}, are there more than {} in one state; rows beyond the first {MAX_ROWS} are left out",
                 first.unwrap_or_default(),
                 if limit == 1 { "once".to_string() } else { format!("{limit} times") },
             );
-            Problem::new(ProblemCode::RepeatedLabel, message)
+            section.problem(ProblemCode::RepeatedLabel, &message)
         });
         (Self { entities, most_rows: most_rows.min(MAX_ROWS) }, problem)
     }

@@ -5,7 +5,7 @@ use std::io;
 use std::sync::Arc;
 
 use super::super::lsda::{self, Event, Header, Payload, change_directory};
-use crate::solver::problem::{Diagnostics, ProblemCode};
+use crate::solver::problem::{Diagnostics, Problem, ProblemCode};
 use crate::solver::source::Source;
 
 /// Metadata that tells whose values there are.
@@ -216,6 +216,15 @@ impl Section {
 
     pub(crate) fn component(&self, name: &str) -> Option<&Component> {
         self.component_index.get(name).map(|&index| &self.components[index])
+    }
+
+    /// The time of a state.
+    pub(crate) fn time_of(&self, state: usize) -> Option<&DataRecord> {
+        self.component("time")?.records.get(&state)
+    }
+
+    pub(crate) fn problem(&self, code: ProblemCode, message: &str) -> Problem {
+        Problem::new(code, format!("{}: {message}", self.name))
     }
 }
 

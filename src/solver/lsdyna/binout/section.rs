@@ -77,11 +77,11 @@ impl<'a> SectionReader<'a> {
     }
 
     fn beyond_bound(&self) -> Option<Problem> {
-        let Section { name, left_out, .. } = self.section;
+        let left_out = self.section.left_out;
         let message = format!(
-            "{name}: there are too many components; {left_out} records of further ones are left out"
+            "there are too many components; {left_out} records of further ones are left out"
         );
-        (*left_out > 0).then(|| Problem::new(ProblemCode::UnreadRows, message))
+        (left_out > 0).then(|| self.section.problem(ProblemCode::UnreadRows, &message))
     }
 
     fn lost_ids(&self) -> Option<Problem> {
@@ -90,10 +90,9 @@ impl<'a> SectionReader<'a> {
         let named = lists.into_iter().flatten().flatten().chain(of_states);
         let lost = named.filter(|id| self.section.is_lost(**id)).count();
         let message = format!(
-            "{}: {lost} ids are zero (was the file overwritten there?); what belongs to them is left out",
-            self.section.name
+            "{lost} ids are zero (was the file overwritten there?); what belongs to them is left out"
         );
-        (lost > 0).then(|| Problem::new(ProblemCode::BadRecord, message))
+        (lost > 0).then(|| self.section.problem(ProblemCode::BadRecord, &message))
     }
 
     fn contents(&mut self) -> io::Result<Contents<'a>> {

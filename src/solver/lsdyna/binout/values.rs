@@ -80,12 +80,11 @@ impl Series<'_> {
         let most = ABSENT_CELLS.saturating_add(present.saturating_mul(ABSENT_PER_PRESENT));
         (cells > most).then(|| {
             let message = format!(
-                "{}: {} is left out: its {present} values would be spread over {cells} of {kept} entities and {} states",
-                self.section.name,
+                "{} is left out: its {present} values would be spread over {cells} of {kept} entities and {} states",
                 self.name,
                 states.len()
             );
-            Problem::new(ProblemCode::UnreadRows, message)
+            self.section.problem(ProblemCode::UnreadRows, &message)
         })
     }
 
@@ -140,19 +139,18 @@ impl Series<'_> {
         let Self { section, name, .. } = self;
         if lacks.absent > 0 && !is_none_kept {
             let message = format!(
-                "{}: {name} is missing from {} of {} states, or has another number of values; its values there are NaN",
-                section.name,
+                "{name} is missing from {} of {} states, or has another number of values; its values there are NaN",
                 lacks.absent,
                 states.whole.len()
             );
-            problems.push(Problem::new(ProblemCode::AbsentComponent, message));
+            problems.push(section.problem(ProblemCode::AbsentComponent, &message));
         }
         if lacks.not_finite > 0 {
             let message = format!(
-                "{}: {name} has {} values that are not finite numbers; they are returned as such",
-                section.name, lacks.not_finite
+                "{name} has {} values that are not finite numbers; they are returned as such",
+                lacks.not_finite
             );
-            problems.push(Problem::new(ProblemCode::NotFinite, message));
+            problems.push(section.problem(ProblemCode::NotFinite, &message));
         }
         problems
     }

@@ -2,10 +2,7 @@
 //!
 //! A state is a translational block and, where nodes have rotations, a rotational block
 //! under a state line of its own with the same cycle and time. The column line tells
-//! which block it is.
-//!
-//! The column line tells translations from rotations. A block joins the pending state if it has the same cycle and
-//! time. Ends of fields are counted from the right, because l2a pushes rows with wide ids to the right. `nodout`
+//! which block it is. Ends of fields are counted from the right, because l2a pushes rows with wide ids to the right. `nodout`
 //! writes the cycle of a state, so states of one time are only repeated if the cycle does not rise.
 
 pub(crate) mod blocks;
@@ -73,18 +70,13 @@ struct Nodout {
     /// Cycle and time of the state line above, until its column line comes.
     announced: Option<(i64, f64, Place)>,
     cycle: Option<i64>,
-    block: Option<Block>,
+    /// The table that the rows belong to, inside a block.
+    block: Option<TableId>,
     /// Where the pending state and the announced one begin, if the latter is a new state.
     pending_start: Option<Place>,
     new_start: Option<Place>,
     /// How states are laid out, from the last one that was read line by line.
     stride: Option<Stride>,
-}
-
-#[derive(Clone, Copy)]
-struct Block {
-    table: TableId,
-    fields: usize,
 }
 
 impl Body for Nodout {
@@ -182,11 +174,9 @@ impl Nodout {
         if parsed.is_none() {
             // Without its time the block cannot be placed: what was pending ends here.
             states.begin(None, line.into());
-            states.damage(
-                line,
-                Some([STATE.len() + 1, line.text.len()]),
-                "expected a cycle number and \"( at time … )\"".into(),
-            );
+            let columns = [STATE.len() + 1, line.text.len()];
+            let message = "expected a cycle number and \"( at time … )\"";
+            states.damage(line, Some(columns), message.into());
         }
         parsed
     }
@@ -203,13 +193,13 @@ impl Nodout {
         true
     }
 
-    fn column_line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<Block> {
+    fn column_line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<TableId> {
         let heading = &line.text[COLUMN_LINE.len()..];
         let starts = |name: &[u8]| heading.trim_ascii_start().starts_with(name);
-        let block = if starts(b"x-disp") {
-            Block { table: TABLES[0], fields: TRANSLATIONS.len() }
+        let table = if starts(b"x-disp") {
+            TABLES[0]
         } else if starts(b"x-rot") {
-            Block { table: TABLES[1], fields: ROTATIONS.len() }
+            TABLES[1]
         } else {
             if self.continue_announced(states) {
                 states.mark_damaged();
@@ -219,12 +209,12 @@ impl Nodout {
         };
         let (cycle, time, place) = self.announced?;
         self.continue_announced(states);
-        if states.has_rows(block.table) {
+        if states.has_rows(table) {
             // A second block of the same kind: a state of its own, at the same time.
             states.begin(Some(time), place);
             states.set_cycle(cycle);
         }
-        Some(block)
+        Some(table)
     }
 }
 
@@ -241,26 +231,21 @@ fn cycle_and_time(line: &[u8]) -> Option<(i64, f64)> {
 
 /// One node. Ids of more than nine digits push l2a's rows to the right, so the first
 /// field begins where the id ends; a row of any other width is damaged or cut.
-fn row(block: Block, line: &Line<'_>, states: &mut StateReader<'_>) {
+fn row(table: TableId, line: &Line<'_>, states: &mut StateReader<'_>) {
     let text = line.text.trim_ascii_end();
     let id_end = id_end(text);
     let first = id_end.max(ID_WIDTH - 1) + 1;
-    let width = first + block.fields * FIELD_WIDTH;
-    let id = integer(&text[..id_end]);
-    let (Some(id), true) = (id, text.len() == width) else {
-        states.damage(
-            line,
-            Some([1, width]),
-            format!(
-                "expected a node id and {} numbers in {width} columns, found {} columns, \"{}\"",
-                block.fields,
-                text.len(),
-                shown(line.columns(1, 40)).trim_end()
-            ),
+    let fields = Nodout::TABLES[table.0].1.len();
+    let width = first + fields * FIELD_WIDTH;
+    let Some(id) = integer(&text[..id_end]).filter(|_| text.len() == width) else {
+        let message = format!(
+            "expected a node id and {fields} numbers in {width} columns, found {} columns, \"{}\"",
+            text.len(),
+            shown(line.columns(1, 40)).trim_end()
         );
-        return;
+        return states.damage(line, Some([1, width]), message);
     };
-    states.row(block.table, EntityId::new(id), line, |k| {
+    states.row(table, EntityId::new(id), line, |k| {
         let from = first + k * FIELD_WIDTH;
         Some((from + 1, from + FIELD_WIDTH))
     });

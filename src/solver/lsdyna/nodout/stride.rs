@@ -4,13 +4,9 @@
 //! Every state with the same nodes has the same number of bytes. What stands around its
 //! rows (blank lines, state line, column line) must equal the state above but for cycle and
 //! time, and the id columns of the first and last row of each block must equal theirs; where
-//! all rows are read, those of all rows. At the first surprise the line reader goes on.
-//!
-//! The layout is learned from a state that was read by lines. Of each further state this module verifies the state
-//! line, the column lines, the blank lines, and the ids of the first and last row (of all rows where all are read);
-//! then it takes the wanted rows. Batches of states are parsed in parallel and handed on in order. At the first
-//! surprise the line reader takes that state, and leaping goes on after it. `tests/stride.rs` holds both ways against
-//! each other, on whole and on damaged files.
+//! all rows are read, those of all rows. Batches of states are parsed in parallel and handed on in
+//! order. At the first surprise the line reader takes that state, and leaping goes on after it.
+//! `tests/stride.rs` holds both ways against each other, on whole and on damaged files.
 
 use std::io;
 
@@ -126,7 +122,7 @@ impl Stride {
         states: &mut StateReader<'_>,
     ) -> io::Result<Option<Place>> {
         let wanted = &self.wanted;
-        let audit = states.is_audit();
+        let audit = states.selection.audit;
         let values = wanted.iter().map(Wanted::values).sum::<usize>();
         let largest = (BATCH_VALUES / values.max(1)).clamp(2, MAX_BATCH);
         // Grows while states are read without surprise, so that little work is lost at one.
