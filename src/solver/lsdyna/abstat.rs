@@ -4,7 +4,7 @@ use super::ascii::{self, Body};
 use super::label_values::{Label, fields};
 use super::line::{Line, integer, real};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::{KeyedTables, StateReader, TableId};
 
 const COMPONENTS: [&str; 12] = [
@@ -44,7 +44,7 @@ pub(crate) const FORMAT: Format = Format::text(
         let text = line.trim_ascii_start();
         text.starts_with(COLUMN_LINE) || (text.starts_with(MATERIAL) && text.len() > 60)
     },
-    ascii::read_default::<Abstat>,
+    ascii::read::<Abstat>,
 );
 
 #[derive(Default)]

@@ -20,7 +20,7 @@ use std::io;
 
 use super::header;
 use super::line::{Line, Lines};
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::{Source, Stream};
 use crate::solver::states::StateReader;
@@ -93,7 +93,7 @@ const MAX_SKIPPED: usize = 3;
 ///
 /// The first whole state tells which entities a state has. If more states disagree with it
 /// than agree, it is the damaged one: the file is read again without it.
-pub(crate) fn read<B: Body>(
+pub(crate) fn read_with<B: Body>(
     format: &'static Format,
     source: &dyn Source,
     selection: &Selection,
@@ -113,12 +113,12 @@ pub(crate) fn read<B: Body>(
 }
 
 /// The same through a body that needs nothing to begin with.
-pub(crate) fn read_default<B: Body + Default>(
+pub(crate) fn read<B: Body + Default>(
     format: &'static Format,
     source: &dyn Source,
     selection: &Selection,
 ) -> io::Result<SolverFile> {
-    read(format, source, selection, B::default)
+    read_with(format, source, selection, B::default)
 }
 
 /// The file as it is behind the first `skipped` whole states, and whether more states disagree with the first

@@ -5,18 +5,14 @@
 use super::ascii::{self, Body};
 use super::line::{Line, integer, is_whole_real};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::{StateReader, TableId};
 
 const STATE: &[u8] = b" curve data for time step";
 const COLUMN_LINE: &[u8] = b" curve id";
 
-pub(crate) const FORMAT: Format = Format::text(
-    "curvout",
-    "curve",
-    |line| line.starts_with(STATE),
-    ascii::read_default::<Curvout>,
-);
+pub(crate) const FORMAT: Format =
+    Format::text("curvout", "curve", |line| line.starts_with(STATE), ascii::read::<Curvout>);
 
 #[derive(Default)]
 struct Curvout;

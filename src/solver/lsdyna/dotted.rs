@@ -7,7 +7,7 @@ use super::ascii::{self, Body};
 use super::label_values::is_number;
 use super::line::{Line, integer, real};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::{KeyedTables, StateReader};
 
 /// "label padded with dots to column 30, value in columns 31–44, id in columns 31–40".
@@ -24,14 +24,16 @@ pub(crate) const DEFORC: Format = Format::text(
     "deforc",
     "element",
     |line| label(line).is_some_and(|label| ELEMENTS.contains(&label)),
-    |format, source, selection| ascii::read(format, source, selection, || Dotted::new(ELEMENTS)),
+    |format, source, selection| {
+        ascii::read_with(format, source, selection, || Dotted::new(ELEMENTS))
+    },
 );
 
 pub(crate) const JNTFORC: Format = Format::text(
     "jntforc",
     "joint",
     |line| label(line).is_some_and(|label| JOINTS.contains(&label)),
-    |format, source, selection| ascii::read(format, source, selection, || Dotted::new(JOINTS)),
+    |format, source, selection| ascii::read_with(format, source, selection, || Dotted::new(JOINTS)),
 );
 
 /// Reader of either file; each label is a table of one column.

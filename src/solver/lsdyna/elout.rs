@@ -13,7 +13,7 @@
 use super::ascii::{self, Body};
 use super::line::{Line, integer};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::states::{KeyedTables, StateReader, TableId};
 
@@ -52,14 +52,14 @@ pub(crate) const FORMAT: Format = Format::text(
     "elout",
     "element",
     |line| heading(line).is_some_and(|quantity| !quantity.is_nodal()),
-    ascii::read_default::<Elout>,
+    ascii::read::<Elout>,
 );
 
 pub(crate) const DETAILS: Format = Format::text(
     "eloutdet",
     "node",
     |line| heading(line).is_some_and(Quantity::is_nodal),
-    ascii::read_default::<Elout>,
+    ascii::read::<Elout>,
 );
 
 #[derive(Clone, Copy, Debug, PartialEq)]

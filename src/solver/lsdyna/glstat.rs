@@ -6,7 +6,7 @@
 use super::ascii::{self, Body};
 use super::dotted::split;
 use super::line::{Line, integer, is_whole_real, real, shown};
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::StateReader;
 
 const STATE: &[u8] = b" dt of cycle";
@@ -22,7 +22,7 @@ const NAMES: [(&str, &str); 3] = [
 ];
 
 pub(crate) const FORMAT: Format =
-    Format::text("glstat", "entity", |line| line.starts_with(STATE), ascii::read_default::<Glstat>);
+    Format::text("glstat", "entity", |line| line.starts_with(STATE), ascii::read::<Glstat>);
 
 #[derive(Default)]
 struct Glstat {

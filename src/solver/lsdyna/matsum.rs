@@ -4,7 +4,7 @@ use super::ascii::{self, Body};
 use super::label_values::{Label, fields};
 use super::line::{Line, integer, shown};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::{StateReader, TableId};
 
 const STATE: &[u8] = b" time =";
@@ -46,7 +46,7 @@ const LINES: [(&str, &[Label]); 4] = [
 ];
 
 pub(crate) const FORMAT: Format =
-    Format::text("matsum", "part", |line| line.starts_with(PART), ascii::read_default::<Matsum>);
+    Format::text("matsum", "part", |line| line.starts_with(PART), ascii::read::<Matsum>);
 
 #[derive(Default)]
 struct Matsum {

@@ -10,7 +10,7 @@ use super::ascii::{self, Body};
 use super::label_values::{Label, fields};
 use super::line::{Line, integer};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::problem::ProblemCode;
 use crate::solver::states::{StateReader, TableId};
 
@@ -79,7 +79,7 @@ pub(crate) const BNDOUT: Format = Format::text(
     "node",
     |line| line.starts_with(PRESCRIBED.state),
     |format, source, selection| {
-        ascii::read(format, source, selection, || NodeForces::new(&PRESCRIBED))
+        ascii::read_with(format, source, selection, || NodeForces::new(&PRESCRIBED))
     },
 );
 
@@ -87,7 +87,9 @@ pub(crate) const NODFOR: Format = Format::text(
     "nodfor",
     "node",
     |line| line.starts_with(GROUPS.state),
-    |format, source, selection| ascii::read(format, source, selection, || NodeForces::new(&GROUPS)),
+    |format, source, selection| {
+        ascii::read_with(format, source, selection, || NodeForces::new(&GROUPS))
+    },
 );
 
 /// Reader of either file. Components of all blocks but the first of the file have the

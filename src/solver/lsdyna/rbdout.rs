@@ -6,7 +6,7 @@ use super::ascii::{self, Body};
 use super::label_values::numbers;
 use super::line::{Line, integer};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::{StateReader, TableId};
 
 const STATE: &[u8] = b"  r i g i d   b o d y   m o t i o n";
@@ -43,12 +43,8 @@ const LINES: [(&[u8], &[&str], &[&str]); 7] = [
     (b"row 3", &["dircos_31", "dircos_32", "dircos_33"], &[]),
 ];
 
-pub(crate) const FORMAT: Format = Format::text(
-    "rbdout",
-    "rigid body",
-    |line| line.starts_with(STATE),
-    ascii::read_default::<Rbdout>,
-);
+pub(crate) const FORMAT: Format =
+    Format::text("rbdout", "rigid body", |line| line.starts_with(STATE), ascii::read::<Rbdout>);
 
 #[derive(Default)]
 struct Rbdout {

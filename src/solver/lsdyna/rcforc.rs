@@ -3,7 +3,7 @@
 use super::ascii::{self, Body};
 use super::line::{Line, integer, is_whole_real, real, shown};
 use crate::history::{EntityId, Side};
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::{StateReader, TableId};
 
 /// Printed twice per state, without a time, for single-surface contacts.
@@ -36,7 +36,7 @@ pub(crate) const FORMAT: Format = Format::text(
     "rcforc",
     "interface",
     |line| undefined_interface(line).is_some() || (side(line).is_some() && time_at(line).is_some()),
-    ascii::read_default::<Rcforc>,
+    ascii::read::<Rcforc>,
 );
 
 #[derive(Default)]

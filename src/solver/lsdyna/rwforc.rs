@@ -3,7 +3,7 @@
 use super::ascii::{self, Body};
 use super::line::{Line, integer, real};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::states::{StateReader, TableId};
 
@@ -17,7 +17,7 @@ pub(crate) const FORMAT: Format = Format::text(
     "rwforc",
     "rigid wall",
     |line| is_column_line(line) || is_node_set_heading(line),
-    ascii::read_default::<Rwforc>,
+    ascii::read::<Rwforc>,
 );
 
 #[derive(Default)]

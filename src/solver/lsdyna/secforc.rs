@@ -6,7 +6,7 @@
 use super::ascii::{self, Body};
 use super::line::{Line, integer, real};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::{StateReader, TableId};
 
 /// "(1) id I12, time E15.5, then fields of 15, 12, 12, 12; (2), (3) 27 columns of system or
@@ -20,7 +20,7 @@ pub(crate) const FORMAT: Format = Format::text(
     "secforc",
     "section",
     |line| line.trim_ascii_start().starts_with(b"line#1  section#"),
-    ascii::read_default::<Secforc>,
+    ascii::read::<Secforc>,
 );
 
 #[derive(Default)]

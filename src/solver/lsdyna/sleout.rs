@@ -4,7 +4,7 @@ use super::ascii::{self, Body};
 use super::label_values::numbers;
 use super::line::{Line, integer};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::{StateReader, TableId};
 
 const STATE: &[u8] = b" contact interface energy file, time=";
@@ -24,12 +24,8 @@ const SUMS: [(&[u8], &str); 6] = [
 ];
 const SUM_WIDTH: usize = 14;
 
-pub(crate) const FORMAT: Format = Format::text(
-    "sleout",
-    "interface",
-    |line| line.starts_with(STATE),
-    ascii::read_default::<Sleout>,
-);
+pub(crate) const FORMAT: Format =
+    Format::text("sleout", "interface", |line| line.starts_with(STATE), ascii::read::<Sleout>);
 
 #[derive(Default)]
 struct Sleout {

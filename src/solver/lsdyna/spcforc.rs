@@ -6,7 +6,7 @@ use super::ascii::{self, Body};
 use super::label_values::numbers;
 use super::line::{Line, integer};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::{StateReader, TableId};
 use std::collections::HashMap;
 
@@ -27,7 +27,7 @@ pub(crate) const FORMAT: Format = Format::text(
     "spcforc",
     "node",
     |line| line.trim_ascii() == HEADING || line.starts_with(STATE),
-    ascii::read_default::<Spcforc>,
+    ascii::read::<Spcforc>,
 );
 
 /// Forces and moments.

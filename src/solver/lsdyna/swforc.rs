@@ -4,7 +4,7 @@ use super::ascii::{self, Body};
 use super::label_values::{is_number, numbers};
 use super::line::{Line, integer, real};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::{KeyedTables, StateReader};
 
 const COLUMN_LINE: &[u8] = b" constraint #";
@@ -23,12 +23,8 @@ const FAILURE_TIME_WIDTH: usize = 12;
 /// Kinds of connection, each with ids of its own.
 const MAX_KINDS: usize = 20;
 
-pub(crate) const FORMAT: Format = Format::text(
-    "swforc",
-    "weld",
-    |line| line.starts_with(COLUMN_LINE),
-    ascii::read_default::<Swforc>,
-);
+pub(crate) const FORMAT: Format =
+    Format::text("swforc", "weld", |line| line.starts_with(COLUMN_LINE), ascii::read::<Swforc>);
 
 #[derive(Default)]
 struct Swforc {

@@ -17,7 +17,7 @@ mod variables;
 use std::io;
 use std::sync::Arc;
 
-use super::format::Format;
+use super::Format;
 use super::problem::{Problem, ProblemCode};
 use super::source::{Source, Stream};
 use super::{Selection, SolverFile};

@@ -5,7 +5,6 @@
 //! entities of each table, unless its rows may come and go (eroded elements). Invariant:
 //! every kept history has one value per kept state.
 
-mod close;
 mod finish;
 mod table;
 

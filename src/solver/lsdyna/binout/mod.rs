@@ -19,7 +19,6 @@
 //! value cannot be seen.
 
 mod bytes;
-mod columns;
 mod metadata;
 mod owners;
 mod records;
@@ -31,7 +30,7 @@ use std::io;
 
 use super::lsda::Header;
 use crate::plural::counted;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::problem::{Problem, ProblemCode};
 use crate::solver::source::Source;
 use crate::solver::{Selection, SolverFile};

@@ -20,12 +20,12 @@ impl Context {
         self.keep(|deck| &mut deck.outputs, output, "output files");
     }
 
-    pub(super) fn history(&mut self, kind: Kind, card: &Card<'_>, k: usize) {
+    pub(super) fn history(&mut self, sets: bool, card: &Card<'_>, k: usize) {
         let Ok(Some(id)) = self.integer(card.field(k)) else { return };
         if id == 0 {
             return;
         }
-        if matches!(kind, Kind::HistoryNodeSets | Kind::HistoryNodeSetsLocal) {
+        if sets {
             self.keep(|deck| &mut deck.history_node_sets, id, "history node sets");
         } else {
             let node = TitledEntity { id, title: None, at: self.at(card.place) };

@@ -101,11 +101,12 @@ pub(super) enum Kind {
         velocity: usize,
     },
     Output(&'static str),
-    HistoryNodes,
-    HistoryNodesWithHeadings,
-    HistoryNodesLocal,
-    HistoryNodeSets,
-    HistoryNodeSetsLocal,
+    /// Nodes, or sets of them, so many on a card.
+    History {
+        sets: bool,
+        on_card: usize,
+    },
+    HistoryWithHeadings,
     Contact,
     Wall,
     /// Cards of one part, those of `_INERTIA` aside.
@@ -139,11 +140,11 @@ pub(super) fn kind(keyword: &Keyword) -> Kind {
             let velocity = part + usize::from(options.contains(&"SPC")) + 3;
             Kind::InertiaBody { part, velocity }
         }
-        ["DATABASE", "HISTORY", "NODE"] => Kind::HistoryNodes,
-        ["DATABASE", "HISTORY", "NODE", "ID"] => Kind::HistoryNodesWithHeadings,
-        ["DATABASE", "HISTORY", "NODE", "LOCAL"] => Kind::HistoryNodesLocal,
-        ["DATABASE", "HISTORY", "NODE", "SET"] => Kind::HistoryNodeSets,
-        ["DATABASE", "HISTORY", "NODE", "SET", "LOCAL"] => Kind::HistoryNodeSetsLocal,
+        ["DATABASE", "HISTORY", "NODE"] => Kind::History { sets: false, on_card: 8 },
+        ["DATABASE", "HISTORY", "NODE", "ID"] => Kind::HistoryWithHeadings,
+        ["DATABASE", "HISTORY", "NODE", "LOCAL"] => Kind::History { sets: false, on_card: 1 },
+        ["DATABASE", "HISTORY", "NODE", "SET"] => Kind::History { sets: true, on_card: 8 },
+        ["DATABASE", "HISTORY", "NODE", "SET", "LOCAL"] => Kind::History { sets: true, on_card: 1 },
         ["DATABASE", "HISTORY", "NODE", ..] => Kind::Unread("history nodes of this keyword"),
         ["DATABASE", name, ..] => ASCII_FILES
             .iter()

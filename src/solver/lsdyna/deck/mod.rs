@@ -8,7 +8,6 @@ mod card;
 mod cards;
 pub(crate) mod contents;
 mod context;
-mod includes;
 mod keyword;
 pub(crate) mod parameters;
 mod reader;

@@ -14,7 +14,7 @@ use std::io;
 use super::ascii::{self, Body};
 use super::line::{Line, integer, real, shown};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
 use crate::solver::states::{StateReader, TableId};
@@ -60,7 +60,7 @@ const FIELD_WIDTH: usize = 12;
 const TIME: usize = 13;
 
 pub(crate) const FORMAT: Format =
-    Format::text("nodout", "node", |line| line.starts_with(STATE), ascii::read_default::<Nodout>);
+    Format::text("nodout", "node", |line| line.starts_with(STATE), ascii::read::<Nodout>);
 
 /// Tables of both blocks.
 const TABLES: [TableId; 2] = [TableId(0), TableId(1)];
