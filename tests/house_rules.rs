@@ -318,7 +318,7 @@ fn no_unwrap_outside_tests() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 75939), ("files", 360), ("public types", 240), ("error types", 11)];
+    [("lines", 74673), ("files", 347), ("public types", 241), ("error types", 11)];
 
 #[test]
 fn the_source_keeps_its_budget() {

@@ -64,7 +64,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let output = args.output.as_deref().filter(|path| !is_stdout(path));
     let target = checked_target(args, output)?;
     let deck = match target {
-        Some(Target::Hdf5) => decks::beside(&args.file).map(|(_, deck)| deck),
+        Some(Target::Hdf5) => decks::deck_next_to(&args.file).map(|(_, deck)| deck),
         _ => None,
     };
     let beside = Beside { units: args.units, deck: deck.as_ref() };

@@ -41,7 +41,7 @@ pub enum NoDataReason {
 }
 
 /// What a solver file holds: its own description, the selected histories, its damage.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct SolverFile {
     /// Name of the format, one of [`FORMATS`](super::FORMATS).
     pub format: &'static str,
