@@ -56,7 +56,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     };
     let output = args.output.as_deref().filter(|path| !is_stdout(path));
     let is_hdf5 = is_hdf5(args, output)?;
-    let deck = is_hdf5.then(|| decks::beside(&args.file)).flatten().map(|(_, deck)| deck);
+    let deck = is_hdf5.then(|| decks::deck_next_to(&args.file)).flatten().map(|(_, deck)| deck);
     let beside = Beside { units: args.units, deck: deck.as_ref() };
     // JSON on standard output next to a file needs the values themselves.
     let straight = output.filter(|_| is_hdf5 && !options.json);

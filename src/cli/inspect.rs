@@ -141,7 +141,7 @@ fn deck_for(path: &Path, sections: &[SolverFile]) -> Option<(PathBuf, Deck)> {
     if !sections.iter().any(lacks) {
         return None;
     }
-    decks::beside(path)
+    decks::deck_next_to(path)
 }
 
 impl Section {

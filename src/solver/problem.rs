@@ -92,6 +92,11 @@ impl Problem {
         Self::at(code, None, message)
     }
 
+    pub(in crate::solver) fn at_place(self, place: Option<Place>) -> Self {
+        let columns = self.columns;
+        Self { columns, ..Self::at(self.code, place, self.message) }
+    }
+
     /// A problem at a place.
     pub(in crate::solver) fn at(code: ProblemCode, place: Option<Place>, message: String) -> Self {
         let line = place.map(|p| p.line).filter(|&line| line > 0);
@@ -139,7 +144,11 @@ pub(crate) struct Diagnostics {
 }
 
 impl Diagnostics {
-    pub(crate) fn add(
+    pub(crate) fn add(&mut self, code: ProblemCode, place: Option<Place>, message: String) {
+        self.push(Problem::at(code, place, message));
+    }
+
+    pub(crate) fn add_in_columns(
         &mut self,
         code: ProblemCode,
         place: Option<Place>,
@@ -159,7 +168,7 @@ impl Diagnostics {
 
     /// A problem of a binary file, which has no lines.
     pub(crate) fn add_at_byte(&mut self, code: ProblemCode, byte: u64, message: String) {
-        self.add(code, Some(Place::at_byte(byte)), None, message);
+        self.add(code, Some(Place::at_byte(byte)), message);
     }
 
     /// Adds the problems of another list after these.

@@ -39,22 +39,14 @@ pub(crate) fn resolve(
             let from = kept.iter().rposition(|&k| stays(k)).map_or(0, |k| k + 1);
             let left_out = kept.split_off(from);
             if let (Some(&first), Some(&last)) = (left_out.first(), left_out.last()) {
-                let twice = || {
+                let (at, from, to, count) = (time[i], time[first], time[last], left_out.len());
+                let message = if again && first == last {
+                    format!("{of}the state at time {at:?} is written twice: the last one counts")
+                } else {
                     format!(
-                        "{of}the state at time {:?} is written twice: the last one counts",
-                        time[i]
+                        "{of}a restart writes again from time {at:?} on: {count} states above, from time {from:?} to {to:?}, are left out"
                     )
                 };
-                let of_many = || {
-                    format!(
-                        "{of}a restart writes again from time {:?} on: {} states above, from time {:?} to {:?}, are left out",
-                        time[i],
-                        left_out.len(),
-                        time[first],
-                        time[last]
-                    )
-                };
-                let message = if again && first == last { twice() } else { of_many() };
                 problems.push(Problem::at(ProblemCode::RepeatedState, place(i), message));
             }
         }
@@ -75,4 +67,11 @@ pub(crate) fn is_known_apart(time: &[f64], above: usize, below: usize, digits: i
     let nearest = before.into_iter().chain(behind).map(|t| (t - at).abs()).reduce(f64::min);
     let exponent = if at == 0.0 { f64::NEG_INFINITY } else { at.abs().log10().floor() };
     nearest.is_some_and(|gap| gap >= STEPS * 10f64.powf(exponent - f64::from(digits - 1)))
+}
+
+/// Keeps the values of some states; none where no history is kept.
+pub(crate) fn take<T: Copy>(values: &mut Vec<T>, kept: &[usize]) {
+    if !values.is_empty() {
+        *values = kept.iter().map(|&i| values[i]).collect();
+    }
 }

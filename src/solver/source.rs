@@ -47,7 +47,7 @@ pub(crate) fn open(path: &Path, access: Access) -> io::Result<Box<dyn Source>> {
     }
     Ok(match access {
         Access::Plain => Box::new(Opened::new(file)?),
-        Access::Map => Box::new(Mapped::new(&file)?),
+        Access::Map => Box::new(map(&file)?),
     })
 }
 
@@ -87,38 +87,20 @@ fn read_file_at(file: &File, buffer: &mut [u8], offset: u64) -> io::Result<usize
     std::os::windows::fs::FileExt::seek_read(file, buffer, offset)
 }
 
-/// A file mapped into memory.
-struct Mapped(memmap2::Mmap);
-
-impl Mapped {
-    #[allow(unsafe_code, reason = "a map is only as safe as its file; see Access::Map")]
-    fn new(file: &File) -> io::Result<Self> {
-        // SAFETY: the user requested a map and so promised that nothing writes to the file.
-        unsafe { memmap2::Mmap::map(file) }.map(Self)
-    }
+#[allow(unsafe_code, reason = "a map is only as safe as its file; see Access::Map")]
+fn map(file: &File) -> io::Result<memmap2::Mmap> {
+    // SAFETY: the user requested a map and so promised that nothing writes to the file.
+    unsafe { memmap2::Mmap::map(file) }
 }
 
-impl Source for Mapped {
+/// Bytes in memory, a map of a file among them.
+impl<T: AsRef<[u8]> + Send + Sync> Source for T {
     fn size(&self) -> io::Result<u64> {
-        Ok(self.0.len() as u64)
+        Ok(self.as_ref().len() as u64)
     }
 
     fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
-        self.0.as_ref().read_at(offset, buffer)
-    }
-
-    fn bytes(&self) -> Option<&[u8]> {
-        Some(&self.0)
-    }
-}
-
-impl Source for &[u8] {
-    fn size(&self) -> io::Result<u64> {
-        Ok(self.len() as u64)
-    }
-
-    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
-        let rest = usize::try_from(offset).ok().and_then(|from| self.get(from..));
+        let rest = usize::try_from(offset).ok().and_then(|from| self.as_ref().get(from..));
         let rest = rest.unwrap_or_default();
         let count = rest.len().min(buffer.len());
         buffer[..count].copy_from_slice(&rest[..count]);
@@ -126,21 +108,7 @@ impl Source for &[u8] {
     }
 
     fn bytes(&self) -> Option<&[u8]> {
-        Some(self)
-    }
-}
-
-impl Source for Vec<u8> {
-    fn size(&self) -> io::Result<u64> {
-        self.as_slice().size()
-    }
-
-    fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
-        self.as_slice().read_at(offset, buffer)
-    }
-
-    fn bytes(&self) -> Option<&[u8]> {
-        Some(self)
+        Some(self.as_ref())
     }
 }
 
@@ -167,6 +135,13 @@ pub(crate) fn encoded(head: &[u8]) -> Option<&'static str> {
 
 const UTF_16: &str = "this is UTF-16 text (convert it with iconv -f UTF-16 -t UTF-8)";
 
+/// The text of a field of a binary file without its padding; `None` if there is nothing else.
+pub(super) fn unpadded(bytes: &[u8]) -> Option<String> {
+    let text = String::from_utf8_lossy(bytes);
+    let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0');
+    (!text.is_empty()).then(|| text.to_string())
+}
+
 /// Fills as much of `buffer` as the source has from `offset` on; returns how much.
 pub(crate) fn fill_at(source: &dyn Source, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
     let mut filled = 0;
@@ -190,7 +165,6 @@ pub(super) fn read_buffered(input: &mut impl BufRead, out: &mut [u8]) -> io::Res
     Ok(count)
 }
 
-/// Bytes per read of a [`Stream`].
 const STREAM_BUFFER: usize = 1 << 16;
 
 /// A source read from front to back, with jumps.
@@ -203,12 +177,10 @@ pub(crate) struct Stream<'a> {
 }
 
 impl<'a> Stream<'a> {
-    /// From the first byte on.
     pub(crate) fn new(source: &'a dyn Source) -> Self {
         Self { source, at: 0, buffer: Vec::new(), used: 0 }
     }
 
-    /// Position of the next byte.
     pub(crate) fn position(&self) -> u64 {
         self.at - (self.buffer.len() - self.used) as u64
     }
@@ -258,7 +230,6 @@ pub struct Window<'a> {
 }
 
 impl<'a> Window<'a> {
-    /// A window that holds nothing yet.
     pub(crate) fn new(source: &'a dyn Source) -> Self {
         Self { source, buffer: Vec::new(), start: 0 }
     }

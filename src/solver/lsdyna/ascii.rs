@@ -18,24 +18,38 @@
 use std::collections::{HashMap, HashSet};
 use std::io;
 
-use super::header::{self, LegendFence};
-use super::line::{Line, Lines, shown};
-use crate::plural::counted;
-use crate::solver::format::Format;
+use super::header;
+use super::line::{Line, Lines};
+use crate::solver::Format;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::{Source, Stream};
 use crate::solver::states::StateReader;
-use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
+use crate::solver::{NoDataReason, Selection, SolverFile, WithoutData};
+
+/// Names of tables, for messages, each with its components.
+pub(crate) type Tables = &'static [(&'static str, &'static [&'static str])];
 
 /// What one kind of file adds to the frame: the meaning of its lines.
 pub(crate) trait Body {
+    /// Tables of every file of the kind, known by their order.
+    const TABLES: Tables = &[];
+
+    const EMPTY_STATES: bool = false;
+
+    /// What a line holds, for the message about one that holds something else.
+    const EXPECTED: &'static str = "";
+
     /// Whether a line that is not the format's signature can only be below the header.
     fn is_signature(&self, _line: &[u8]) -> bool {
         false
     }
 
-    /// One line below the header, outside a legend, with its line end.
-    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>);
+    /// One line below the header that is not blank, outside a legend, with its line end; `None` if it is
+    /// not what is expected.
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()>;
+
+    /// A blank line below the header.
+    fn blank(&mut self, _states: &mut StateReader<'_>) {}
 
     /// A damaged line was left out: what was begun before it cannot continue after it.
     fn interrupt(&mut self) {}
@@ -43,8 +57,8 @@ pub(crate) trait Body {
     /// The file ends within `line`: ends the pending state if the line cannot belong to it.
     fn unfinished(&mut self, _line: &Line<'_>, _states: &mut StateReader<'_>) {}
 
-    /// The end of the file, at `place`.
-    fn end(&mut self, _place: Place, _states: &mut StateReader<'_>) {}
+    /// The end of the file.
+    fn end(&mut self, _states: &mut StateReader<'_>) {}
 
     /// Offered after every line: reads the states from there on at once, if they are laid
     /// out like the ones above, and says at which line to continue.
@@ -55,35 +69,6 @@ pub(crate) trait Body {
     ) -> io::Result<Option<Place>> {
         Ok(None)
     }
-
-    /// Contacts that the file declares to have no resultants.
-    fn single_surfaces(&self) -> &[i64] {
-        &[]
-    }
-}
-
-/// Lines between those that are read, of unknown meaning: counted, and reported at the end.
-#[derive(Default)]
-pub(crate) struct Skipped {
-    count: usize,
-    first: Option<(Place, String)>,
-}
-
-impl Skipped {
-    pub(crate) fn add(&mut self, line: &Line<'_>) {
-        self.count += 1;
-        let text = || shown(line.columns(1, 60)).trim().to_string();
-        self.first.get_or_insert_with(|| (line.into(), text()));
-    }
-
-    pub(crate) fn tell(&self, states: &mut StateReader<'_>) {
-        let Some((place, text)) = &self.first else { return };
-        let message = format!(
-            "{} between those of this file not read, the first \"{text}\": of another file?",
-            counted(self.count, "line")
-        );
-        states.problems.add(ProblemCode::UnreadRows, Some(*place), None, message);
-    }
 }
 
 /// Header, legend and states of a file, while it is read.
@@ -91,7 +76,7 @@ pub(crate) struct AsciiReader<'a> {
     format: &'static Format,
     lines: Lines<Stream<'a>>,
     pub states: StateReader<'a>,
-    fence: LegendFence,
+    in_legend: bool,
     legend: Vec<(i64, Option<String>)>,
     title: Option<String>,
     version: Option<String>,
@@ -108,84 +93,84 @@ const MAX_SKIPPED: usize = 3;
 ///
 /// The first complete state determines which entities a state has. If more states disagree with it
 /// than agree, it is the damaged one: the file is read again without it.
-pub(crate) fn read<B: Body>(
+pub(crate) fn read_with<B: Body>(
     format: &'static Format,
     source: &dyn Source,
     selection: &Selection,
     body: impl Fn() -> B,
 ) -> io::Result<SolverFile> {
-    let mut best = read_from_state(0, format, source, selection, body())?;
+    let (mut best, mut is_disputed) = read_from_state(0, format, source, selection, body())?;
     for skipped in 1..=MAX_SKIPPED {
-        if !best.disputed {
+        if !is_disputed {
             break;
         }
-        let next = read_from_state(skipped, format, source, selection, body())?;
-        if next.file.time.len() > best.file.time.len() {
-            best = next;
+        let (next, disputed) = read_from_state(skipped, format, source, selection, body())?;
+        if next.time.len() > best.time.len() {
+            (best, is_disputed) = (next, disputed);
         }
     }
-    Ok(best.file)
+    Ok(best)
 }
 
 /// The same through a body that needs nothing to begin with.
-pub(crate) fn read_default<B: Body + Default>(
+pub(crate) fn read<B: Body + Default>(
     format: &'static Format,
     source: &dyn Source,
     selection: &Selection,
 ) -> io::Result<SolverFile> {
-    read(format, source, selection, B::default)
+    read_with(format, source, selection, B::default)
 }
 
-struct Attempt {
-    file: SolverFile,
-    /// Whether more states disagree with the first complete state than agree.
-    disputed: bool,
-}
-
-fn read_from_state(
+/// The file after the first `skipped` complete states, and whether more states disagree with the first
+/// complete one than agree.
+fn read_from_state<B: Body>(
     skipped: usize,
     format: &'static Format,
     source: &dyn Source,
     selection: &Selection,
-    mut body: impl Body,
-) -> io::Result<Attempt> {
-    let mut frame = AsciiReader::new(format, source, selection);
-    frame.states.skip(skipped);
+    mut body: B,
+) -> io::Result<(SolverFile, bool)> {
+    let mut frame = AsciiReader::new::<B>(format, source, selection);
+    frame.states.skip = skipped;
     while frame.step(&mut body)? {
         if let Some(place) = body.leap(source, &mut frame.states)? {
             frame.lines.go_to(place);
         }
     }
-    let disputed = frame.states.is_disputed();
-    Ok(Attempt { file: frame.finish(&mut body), disputed })
+    let is_disputed = frame.states.is_disputed();
+    Ok((frame.finish(&mut body), is_disputed))
 }
 
 impl<'a> AsciiReader<'a> {
-    pub(crate) fn new(
+    pub(crate) fn new<B: Body>(
         format: &'static Format,
         source: &'a dyn Source,
         selection: &'a Selection,
     ) -> Self {
+        let mut states = StateReader::new(selection);
+        states.allow_empty_states = B::EMPTY_STATES;
+        for (name, components) in B::TABLES {
+            states.table(name, *components);
+        }
         Self {
             format,
             lines: Lines::new(Stream::new(source)),
-            states: StateReader::new(selection),
-            fence: LegendFence::default(),
+            states,
+            in_legend: false,
             legend: Vec::new(),
             title: None,
             version: None,
         }
     }
 
-    /// Takes one line; false at the end of the file.
-    pub(crate) fn step(&mut self, body: &mut impl Body) -> io::Result<bool> {
+    pub(crate) fn step<B: Body>(&mut self, body: &mut B) -> io::Result<bool> {
         let Some(line) = self.lines.next_line()? else { return Ok(false) };
         let states = &mut self.states;
-        let in_header = line.number <= 2 || self.fence.is_open();
+        let in_header = line.number <= 2 || self.in_legend;
         if in_header && (line.text.len() > MAX_HEADER_LINE || line.is_binary()) {
             let message =
                 "the line is not a title, version or legend entry: was the file overwritten?";
-            states.problems.add(ProblemCode::BadLine, Some((&line).into()), None, message.into());
+            states.note(ProblemCode::BadLine, &line, message);
         }
         if line.number == 1 {
             let text = String::from_utf8_lossy(line.text).trim().to_string();
@@ -194,101 +179,84 @@ impl<'a> AsciiReader<'a> {
             self.version = header::version(line.text);
             if self.version.is_none() {
                 let message = "expected LS-DYNA's version line (\"ls-dyna … date …\")";
-                let place = Some((&line).into());
-                states.problems.add(ProblemCode::NoVersionLine, place, None, message.into());
+                states.note(ProblemCode::NoVersionLine, &line, message);
             }
         } else if !line.ended && !line.is_blank() {
             // What is missing from it is not known, not even where all its numbers seem whole.
-            if !self.fence.is_open() {
+            if !self.in_legend {
                 body.unfinished(&line, states);
                 if !states.is_pending() {
                     states.begin(None, (&line).into());
                 }
                 states.damage(&line, None, "the file ends within this line".into());
+                states.entity = None;
                 body.interrupt();
             }
         } else if is_text(&line, states) {
-            if self.fence.is_open()
+            if self.in_legend
                 && (self.format.is_signature(line.text) || body.is_signature(line.text))
             {
-                self.fence.close();
+                self.in_legend = false;
                 let message = "expected {END LEGEND} before the first state";
-                let place = Some((&line).into());
-                states.problems.add(ProblemCode::BadLine, place, None, message.into());
+                states.note(ProblemCode::BadLine, &line, message);
             }
-            if !self.fence.covers(line.text) {
-                body.line(&line, states);
-            } else if self.legend.len() < MAX_LEGEND {
-                self.legend.extend(header::legend_entry(line.text));
+            // One l2a release wrote the opening line without its closing brace.
+            let text = line.text.trim_ascii_start();
+            let (opens, closes) =
+                (text.starts_with(b"{BEGIN LEGEND"), text.starts_with(b"{END LEGEND"));
+            if self.in_legend || opens || closes {
+                self.in_legend = !closes;
+                if self.legend.len() < MAX_LEGEND {
+                    self.legend.extend(header::legend_entry(line.text));
+                }
+            } else if text.is_empty() {
+                body.blank(states);
+            } else if body.line(&line, states).is_none() {
+                states.unexpected(&line, None, B::EXPECTED, 40);
             }
         } else {
+            states.entity = None;
             body.interrupt();
         }
         Ok(true)
     }
 
-    /// Ends the file.
     pub(crate) fn finish(mut self, body: &mut impl Body) -> SolverFile {
-        let end = self.lines.place();
-        if end.line < 2 {
-            self.states.problems.add(
-                ProblemCode::NoVersionLine,
-                None,
-                None,
-                "the file ends before its header (title and version line) is complete".into(),
-            );
+        if self.lines.place().line < 2 {
+            let message = "the file ends before its header (title and version line) is complete";
+            self.states.problems.add(ProblemCode::NoVersionLine, None, message.into());
         }
-        if self.fence.is_open() {
-            self.states.problems.add(
-                ProblemCode::BadLine,
-                None,
-                None,
-                "the file ends within its legend: expected {END LEGEND}".into(),
-            );
+        if self.in_legend {
+            let message = "the file ends within its legend: expected {END LEGEND}";
+            self.states.problems.add(ProblemCode::BadLine, None, message.into());
         }
-        body.end(end, &mut self.states);
-        self.assemble(body)
-    }
-
-    fn assemble(self, body: &impl Body) -> SolverFile {
+        body.end(&mut self.states);
+        self.states.end_skipped_lines();
+        let singles = std::mem::take(&mut self.states.single_surfaces);
         let titles: HashMap<i64, &Option<String>> =
             self.legend.iter().map(|(id, t)| (*id, t)).collect();
         let title_of = |id: i64| titles.get(&id).and_then(|t| (*t).clone());
-        let collected = self.states.finish();
-        let entities: Vec<Entity> =
-            collected.entities.iter().map(|&id| Entity { id, title: title_of(id.id) }).collect();
-        let with_data: HashSet<i64> = entities.iter().map(|e| e.id.id).collect();
-        let mut without_data: Vec<WithoutData> = body
-            .single_surfaces()
-            .iter()
-            .filter(|id| !with_data.contains(id))
-            .map(|&id| WithoutData {
-                id,
-                title: title_of(id),
-                reason: NoDataReason::SingleSurfaceContact,
-            })
+        let mut file = self.states.finish();
+        file.entities.iter_mut().for_each(|entity| entity.title = title_of(entity.id.id));
+        let with_data: HashSet<i64> = file.entities.iter().map(|e| e.id.id).collect();
+        let single = singles.iter().map(|&id| (id, title_of(id)));
+        let single = single.map(|of| (of, NoDataReason::SingleSurfaceContact));
+        let known: HashSet<i64> = singles.iter().copied().collect();
+        let legend = self.legend.iter().filter(|(id, _)| !known.contains(id)).cloned();
+        let legend = legend.map(|of| (of, NoDataReason::LegendOnly));
+        let without_data = single
+            .chain(legend)
+            .filter(|((id, _), _)| !with_data.contains(id))
+            .map(|((id, title), reason)| WithoutData { id, title, reason })
             .collect();
-        let single: HashSet<i64> = without_data.iter().map(|w| w.id).collect();
-        let unused =
-            self.legend.iter().filter(|(id, _)| !with_data.contains(id) && !single.contains(id));
-        without_data.extend(unused.map(|(id, title)| WithoutData {
-            id: *id,
-            title: title.clone(),
-            reason: NoDataReason::LegendOnly,
-        }));
         SolverFile {
             format: self.format.name,
             section: self.format.name.to_string(),
             solver: self.version.is_some().then(|| "LS-DYNA".to_string()),
             version: self.version,
             title: self.title,
-            entities,
             without_data,
-            components: collected.components,
-            time: collected.time,
-            histories: collected.histories,
-            problems: collected.problems,
-            notes: Vec::new(),
+            ..file
         }
     }
 }
@@ -297,7 +265,7 @@ impl<'a> AsciiReader<'a> {
 fn is_text(line: &Line<'_>, states: &mut StateReader<'_>) -> bool {
     if line.overlong {
         let message = "the line is longer than any line of this file can be; its end is left out";
-        states.problems.add(ProblemCode::BadLine, Some(line.into()), None, message.into());
+        states.note(ProblemCode::BadLine, line, message);
     }
     let is_binary = line.is_binary();
     if is_binary {

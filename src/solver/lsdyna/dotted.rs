@@ -1,12 +1,14 @@
-//! One value per line after a label with dots, as `deforc` and `jntforc` print them.
+//! `deforc` and `jntforc`: forces of discrete elements (springs and dampers) and of joints, one value per
+//! line after a label with dots.
 //!
 //! Never tested with real data; read as the source of LSTC's converter `l2a` writes them.
 
-use super::ascii::Body;
-use super::label_values::{Widths, is_number};
-use super::line::{Field, Line, integer, real, shown};
+use super::ascii::{self, Body};
+use super::label_values::is_number;
+use super::line::{Line, integer, real};
 use crate::history::EntityId;
-use crate::solver::states::{StateReader, TableId};
+use crate::solver::Format;
+use crate::solver::states::{KeyedTables, StateReader};
 
 /// "label padded with dots to column 30, value in columns 31–44, id in columns 31–40".
 const LABEL: usize = 30;
@@ -14,23 +16,78 @@ const VALUE_WIDTH: usize = 14;
 /// Labels of one file; more are damage.
 const MAX_TABLES: usize = 100;
 
+/// Labels that begin an entity.
+const ELEMENTS: &[&str] = &["spring/damper number"];
+const JOINTS: &[&str] = &["joint number", "joint ID", "joint stiffness id number"];
+
+pub(crate) const DEFORC: Format = Format::text(
+    "deforc",
+    "element",
+    |line| label(line).is_some_and(|label| ELEMENTS.contains(&label)),
+    |format, source, selection| {
+        ascii::read_with(format, source, selection, || Dotted::new(ELEMENTS))
+    },
+);
+
+pub(crate) const JNTFORC: Format = Format::text(
+    "jntforc",
+    "joint",
+    |line| label(line).is_some_and(|label| JOINTS.contains(&label)),
+    |format, source, selection| ascii::read_with(format, source, selection, || Dotted::new(JOINTS)),
+);
+
 /// Reader of either file; each label is a table of one column.
-pub(crate) struct Dotted {
+struct Dotted {
     /// Labels that begin an entity.
     entities: &'static [&'static str],
-    tables: Vec<(String, TableId)>,
-    entity: Option<EntityId>,
-    widths: Widths,
+    tables: KeyedTables<String>,
 }
 
 impl Dotted {
-    pub(crate) fn new(entities: &'static [&'static str]) -> Self {
-        Self { entities, tables: Vec::new(), entity: None, widths: Widths::default() }
+    fn new(entities: &'static [&'static str]) -> Self {
+        Self { entities, tables: KeyedTables::default() }
+    }
+
+    fn value(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
+        let text = line.text.trim_ascii_end();
+        let (label, from) = split(text, LABEL)?;
+        let value = &text[from..];
+        if self.entities.contains(&label) {
+            states.entity = integer(value).map(EntityId::new);
+            return states.entity.map(drop);
+        }
+        if !(is_number(value, VALUE_WIDTH)
+            && states.allows_width(label, value.len(), VALUE_WIDTH, line))
+        {
+            return None;
+        }
+        if label == "time" {
+            states.entity = None;
+            let time = real(value).number();
+            states.begin(time, line.into());
+            return time.map(drop);
+        }
+        let name = component(label);
+        let table = self
+            .tables
+            .get(name, MAX_TABLES, |name| states.table("values of one label", [name.as_str()]))?;
+        states.row(table, states.entity?, line, |_| Some((from + 1, text.len())));
+        Some(())
+    }
+}
+
+impl Body for Dotted {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
+        if self.value(line, states).is_none() {
+            const END: usize = LABEL + VALUE_WIDTH;
+            states.unexpected(line, Some([LABEL + 1, END]), "a label and its value", END);
+        }
+        Some(())
     }
 }
 
 /// The label of a line, without its dots.
-pub(crate) fn label(line: &[u8]) -> Option<&str> {
+fn label(line: &[u8]) -> Option<&str> {
     split(line, LABEL).map(|(label, _)| label)
 }
 
@@ -58,62 +115,6 @@ fn component(label: &str) -> String {
     }
     let words = label.split(|c: char| !c.is_ascii_alphanumeric()).filter(|w| !w.is_empty());
     words.collect::<Vec<_>>().join("_")
-}
-
-impl Body for Dotted {
-    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
-        if line.is_blank() {
-            return;
-        }
-        if self.value(line, states).is_none() {
-            let found = shown(line.columns(1, LABEL + VALUE_WIDTH));
-            let message = format!("expected a label and its value, found \"{}\"", found.trim_end());
-            states.damage(line, Some([LABEL + 1, LABEL + VALUE_WIDTH]), message);
-        }
-    }
-
-    fn interrupt(&mut self) {
-        self.entity = None;
-    }
-}
-
-impl Dotted {
-    fn value(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
-        let text = line.text.trim_ascii_end();
-        let (label, from) = split(text, LABEL)?;
-        let value = &text[from..];
-        if self.entities.contains(&label) {
-            self.entity = None;
-            self.entity = Some(EntityId::new(integer(value)?));
-            return Some(());
-        }
-        let excess = value.len() as isize - VALUE_WIDTH as isize;
-        if !(is_number(value, VALUE_WIDTH) && self.widths.allow(label, excess, line, states)) {
-            return None;
-        }
-        if label == "time" {
-            self.entity = None;
-            let time = match real(value) {
-                Field::Real(time) => Some(time),
-                _ => None,
-            };
-            states.begin(time, line.into());
-            return time.map(drop);
-        }
-        let name = component(label);
-        let known = self.tables.iter().find(|(n, _)| *n == name).map(|(_, table)| *table);
-        let table = match known {
-            Some(table) => table,
-            None if self.tables.len() < MAX_TABLES => {
-                let table = states.table("values of one label", &[&name]);
-                self.tables.push((name, table));
-                table
-            }
-            None => return None,
-        };
-        states.row(table, self.entity?, line, |_| Some((from + 1, text.len())));
-        Some(())
-    }
 }
 
 #[cfg(test)]

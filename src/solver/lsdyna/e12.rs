@@ -1,7 +1,5 @@
-//! The number that fills most files: twelve columns, `[ -]d.dddddE±dd`, read exactly.
-//!
-//! Reads the one form that fills these files (`[ -]d.dddddE±dd`), eight digits at a time and exactly. Every other form
-//! goes to the general parser.
+//! The number that fills most files: twelve columns, `[ -]d.dddddE±dd`, read eight digits at a time and
+//! exactly. Every other form goes to the general parser.
 
 /// A power of ten as a factor and a divisor, one of which is 1. Both are exact for the
 /// powers from −22 to 22, so that one rounding gives the nearest double (Clinger 1990,

@@ -4,25 +4,27 @@
 //! Seen with data: solids, beams, averages at nodes. Shells, thick shells and the details of
 //! elements (at integration points, at nodes) are read as the source of LSTC's converter `l2a`
 //! writes them. Components are named as in a binout; those of a second integration point end with
-//! `_ip2`, and so on, those of details with `_point1` or `_node7`. Elements may erode: their values
-//! are then NaN. Each kind of element has a block of its own in a state.
+//! `_ip2`, and so on, those of details with `_point1` or `_node7`. Each kind of element has
+//! a block of its own in a state.
 //!
 //! Rows may come and go, because elements erode; missing values are NaN. Their number is limited, so that damage
 //! that looks like erosion cannot fill the memory.
 
 use super::ascii::{self, Body};
-use super::label_values::Widths;
-use super::line::{Line, integer, shown};
+use super::line::{Line, integer};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::problem::{Place, ProblemCode};
-use crate::solver::states::{StateReader, TableId};
+use crate::solver::states::{KeyedTables, StateReader, TableId};
 
-const STRESS: &[u8] = b" e l e m e n t   s t r e s s   c a l c u l a t i o n s";
-const STRAIN: &[u8] = b" e l e m e n t   s t r a i n   c a l c u l a t i o n s";
-const BEAM: &[u8] = b" r e s u l t a n t s   a n d   s t r e s s e s";
-const NODAL_STRESS: &[u8] = b" n o d a l  s t r e s s";
-const NODAL_STRAIN: &[u8] = b" n o d a l  s t r a i n";
+/// Headings of blocks; the last two are in an `eloutdet` only.
+const HEADINGS: [(&[u8], Quantity); 5] = [
+    (b" e l e m e n t   s t r e s s   c a l c u l a t i o n s", Quantity::Stress),
+    (b" e l e m e n t   s t r a i n   c a l c u l a t i o n s", Quantity::Strain),
+    (b" r e s u l t a n t s   a n d   s t r e s s e s", Quantity::Beam),
+    (b" n o d a l  s t r e s s", Quantity::NodalStress),
+    (b" n o d a l  s t r a i n", Quantity::NodalStrain),
+];
 const TENSOR: [&str; 6] = ["xx", "yy", "zz", "xy", "yz", "zx"];
 /// After 17 columns with integration point, surface and state: six numbers of 12, then
 /// further ones of 14, at nodes of 12.
@@ -41,20 +43,24 @@ const BEAM_STRESS_WIDTH: usize = 15;
 /// Combinations of quantity, point and surface in one file; more are damage.
 const MAX_TABLES: usize = 1_000;
 
-fn signature(line: &[u8]) -> bool {
-    [STRESS, STRAIN, BEAM].iter().any(|heading| line.starts_with(heading))
+/// The quantity whose block a line begins.
+fn heading(line: &[u8]) -> Option<Quantity> {
+    HEADINGS.iter().find(|(heading, _)| line.starts_with(heading)).map(|(_, quantity)| *quantity)
 }
 
-/// Whether a line can only be in an `eloutdet`.
-fn signature_of_details(line: &[u8]) -> bool {
-    line.starts_with(NODAL_STRESS) || line.starts_with(NODAL_STRAIN)
-}
+pub(crate) const FORMAT: Format = Format::text(
+    "elout",
+    "element",
+    |line| heading(line).is_some_and(|quantity| !quantity.is_nodal()),
+    ascii::read::<Elout>,
+);
 
-pub(crate) const FORMAT: Format =
-    Format::text("elout", "element", signature, ascii::read_default::<Elout>);
-
-pub(crate) const DETAILS: Format =
-    Format::text("eloutdet", "node", signature_of_details, ascii::read_default::<Elout>);
+pub(crate) const DETAILS: Format = Format::text(
+    "eloutdet",
+    "node",
+    |line| heading(line).is_some_and(Quantity::is_nodal),
+    ascii::read::<Elout>,
+);
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Quantity {
@@ -63,6 +69,12 @@ enum Quantity {
     Beam,
     NodalStress,
     NodalStrain,
+}
+
+impl Quantity {
+    fn is_nodal(self) -> bool {
+        matches!(self, Self::NodalStress | Self::NodalStrain)
+    }
 }
 
 /// What distinguishes the kinds of rows.
@@ -79,79 +91,56 @@ struct Key {
 
 #[derive(Default)]
 struct Elout {
-    tables: Vec<(Key, TableId)>,
+    tables: KeyedTables<Key>,
     quantity: Option<Quantity>,
     cycle: Option<Vec<u8>>,
     /// Names of the numbers after the tensor, by the column lines.
     further: &'static [&'static str],
-    entity: Option<EntityId>,
     /// Inside a beam's stresses at its integration points.
     at_points: bool,
     /// After a heading: a row that the state already has is the first of the next one.
     begins: bool,
     unread: Option<Place>,
-    widths: Widths,
 }
 
 impl Body for Elout {
+    const EMPTY_STATES: bool = true;
+    const EXPECTED: &'static str = "an element or its values";
+
     fn is_signature(&self, line: &[u8]) -> bool {
-        signature(line) || signature_of_details(line)
+        heading(line).is_some()
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
-        states.allow_empty_states();
-        if line.is_blank() {
-            return;
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
+        if let Some(quantity) = heading(line.text) {
+            self.block(quantity, line, states);
+        } else if !self.column_line(line) {
+            match self.quantity? {
+                Quantity::Beam => self.beam(line, states)?,
+                quantity => self.tensor(quantity, line, states)?,
+            }
         }
-        if self.heading(line, states) || self.column_line(line) {
-            return;
-        }
-        let read = match self.quantity {
-            Some(Quantity::Beam) => self.beam(line, states),
-            Some(_) => self.tensor(line, states),
-            None => None,
-        };
-        if read.is_none() {
-            let found = shown(line.columns(1, 40));
-            let message =
-                format!("expected an element or its values, found \"{}\"", found.trim_end());
-            states.damage(line, None, message);
-        }
+        Some(())
     }
 
-    fn interrupt(&mut self) {
-        self.entity = None;
-    }
-
-    fn end(&mut self, _: Place, states: &mut StateReader<'_>) {
+    fn end(&mut self, states: &mut StateReader<'_>) {
         if self.unread.is_some() {
             let message = "rows of muscle data are not read".into();
-            states.problems.add(ProblemCode::UnreadRows, self.unread, None, message);
+            states.problems.add(ProblemCode::UnreadRows, self.unread, message);
         }
     }
 }
 
 impl Elout {
-    /// Whether the line begins a block; begins its state if it is a new one.
-    fn heading(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> bool {
-        let quantities = [
-            (STRESS, Quantity::Stress),
-            (STRAIN, Quantity::Strain),
-            (BEAM, Quantity::Beam),
-            (NODAL_STRESS, Quantity::NodalStress),
-            (NODAL_STRAIN, Quantity::NodalStrain),
-        ];
-        let found = quantities.iter().find(|(heading, _)| line.text.starts_with(heading));
-        let Some(&(_, quantity)) = found else { return false };
+    /// Begins a block, and its state if that is a new one.
+    fn block(&mut self, quantity: Quantity, line: &Line<'_>, states: &mut StateReader<'_>) {
         self.further = &[];
-        self.entity = None;
+        states.entity = None;
         let step = memchr::memmem::find(line.text, b"s t e p").map(|at| at + 7);
         let to = memchr::memmem::find(line.text, b"( at time");
         let cycle = step.zip(to).and_then(|(from, to)| line.text.get(from..to));
         let text = super::at_time(line.text).filter(|_| line.is_heading());
-        let time = text.and_then(|text| {
-            super::printed_time(text, super::TIME, &mut self.widths, line, states)
-        });
+        let time = super::heading_time(text, super::TIME, line, states);
         self.quantity = Some(quantity);
         self.begins = true;
         let is_same = states.is_pending()
@@ -166,7 +155,6 @@ impl Elout {
             self.quantity = None;
             states.damage(line, None, "expected a cycle number and \"( at time … )\"".into());
         }
-        true
     }
 
     fn begin(&self, time: Option<f64>, line: &Line<'_>, states: &mut StateReader<'_>) {
@@ -239,23 +227,13 @@ impl Elout {
     }
 
     /// The table of a kind of row; `names` gives its components when it is a new one.
-    fn table(
+    fn table<N: Iterator<Item = String>>(
         &mut self,
         key: Key,
         states: &mut StateReader<'_>,
-        names: impl FnOnce() -> Vec<String>,
+        names: impl FnOnce() -> N,
     ) -> Option<TableId> {
-        if let Some((_, table)) = self.tables.iter().find(|(known, _)| *known == key) {
-            return Some(*table);
-        }
-        if self.tables.len() >= MAX_TABLES {
-            return None;
-        }
-        let names = names();
-        let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        let table = states.varying_table("elements", &names);
-        self.tables.push((key, table));
-        Some(table)
+        self.tables.get(key, MAX_TABLES, |_| states.varying_table("elements", names()))
     }
 
     fn beam(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
@@ -266,11 +244,11 @@ impl Elout {
             if !line.is_heading() {
                 return None;
             }
-            self.entity = Some(EntityId::new(integer(&digits[..end])?));
+            states.entity = Some(EntityId::new(integer(&digits[..end])?));
             self.at_points = false;
             return Some(());
         }
-        let (entity, quantity) = (self.entity?, Quantity::Beam);
+        let (entity, quantity) = (states.entity?, Quantity::Beam);
         if !self.at_points {
             let numbers = text.len().checked_sub(RESULTANT_AT)? / RESULTANT_WIDTH;
             let whole = text.len() == RESULTANT_AT + numbers * RESULTANT_WIDTH;
@@ -279,13 +257,8 @@ impl Elout {
             }
             let names = &RESULTANTS[..numbers];
             let key = Key { quantity, point: 0, surface: "", location: None, names };
-            let table = self.table(key, states, || {
-                names.iter().map(std::string::ToString::to_string).collect()
-            })?;
-            self.row(table, entity, line, states, |k| {
-                let from = RESULTANT_AT + k * RESULTANT_WIDTH;
-                (from + 1, from + RESULTANT_WIDTH)
-            });
+            let table = self.table(key, states, || names.iter().map(ToString::to_string))?;
+            self.row(table, entity, line, states, |k| column(RESULTANT_AT, k, RESULTANT_WIDTH));
             return Some(());
         }
         let point = integer(text.get(..BEAM_STRESS_AT)?)?;
@@ -294,18 +267,19 @@ impl Elout {
             return None;
         }
         let key = Key { quantity, point, surface: "", location: None, names: &BEAM_STRESSES };
-        let table = self.table(key, states, || {
-            BEAM_STRESSES.iter().map(|n| format!("{n}{}", suffix(point))).collect()
-        })?;
-        self.row(table, entity, line, states, |k| {
-            let from = BEAM_STRESS_AT + k * BEAM_STRESS_WIDTH;
-            (from + 1, from + BEAM_STRESS_WIDTH)
-        });
+        let table = self
+            .table(key, states, || BEAM_STRESSES.iter().map(|n| format!("{n}{}", suffix(point))))?;
+        self.row(table, entity, line, states, |k| column(BEAM_STRESS_AT, k, BEAM_STRESS_WIDTH));
         Some(())
     }
 
     /// An element's or node's line, or one of its tensors.
-    fn tensor(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
+    fn tensor(
+        &mut self,
+        quantity: Quantity,
+        line: &Line<'_>,
+        states: &mut StateReader<'_>,
+    ) -> Option<()> {
         let text = line.text.trim_ascii_end();
         if text.len() < LABEL + WIDTH {
             // "id-part" of an element, "id-" of a node.
@@ -314,12 +288,10 @@ impl Elout {
             if !(part.is_empty() || integer(part).is_some()) {
                 return None;
             }
-            self.entity = Some(EntityId::new(integer(&text[..dash])?));
+            states.entity = Some(EntityId::new(integer(&text[..dash])?));
             return Some(());
         }
-        let entity = self.entity?;
-        let quantity = self.quantity?;
-        let nodal = matches!(quantity, Quantity::NodalStress | Quantity::NodalStrain);
+        let entity = states.entity?;
         let label = text.get(..LABEL)?;
         let (numbers, location) = location(text)?;
         // Details of solids, and those at nodes, have no integration point but their location.
@@ -331,7 +303,7 @@ impl Elout {
             Quantity::NodalStress => &["yield"],
             _ => &[],
         };
-        let wide = if nodal { WIDTH } else { WIDE };
+        let wide = if quantity.is_nodal() { WIDTH } else { WIDE };
         let tensor_end = LABEL + TENSOR.len() * WIDTH;
         let more = numbers.len().checked_sub(tensor_end)? / wide;
         // Thick shells have no effective stress.
@@ -351,18 +323,21 @@ impl Elout {
             };
             let place = location.map_or(String::new(), |(what, number)| format!("_{what}{number}"));
             let tail = format!("{}{place}", suffix(point));
-            let tensor = TENSOR.iter().map(|axes| format!("{surface}{kind}_{axes}{tail}"));
-            tensor.chain(further.iter().map(|name| format!("{surface}{name}{tail}"))).collect()
+            let axes = TENSOR.iter().map(move |axes| format!("{kind}_{axes}"));
+            let names = axes.chain(further.iter().map(ToString::to_string));
+            names.map(move |name| format!("{surface}{name}{tail}"))
         })?;
-        self.row(table, entity, line, states, |k| {
-            let (from, width) = match k.checked_sub(TENSOR.len()) {
-                None => (LABEL + k * WIDTH, WIDTH),
-                Some(k) => (tensor_end + k * wide, wide),
-            };
-            (from + 1, from + width)
+        self.row(table, entity, line, states, |k| match k.checked_sub(TENSOR.len()) {
+            None => column(LABEL, k, WIDTH),
+            Some(k) => column(tensor_end, k, wide),
         });
         Some(())
     }
+}
+
+/// First and last column of the `k`-th number of a width behind the column `from`.
+fn column(from: usize, k: usize, width: usize) -> (usize, usize) {
+    (from + k * width + 1, from + (k + 1) * width)
 }
 
 /// Which point or node of its element a row is of, in files of details.

@@ -3,12 +3,10 @@
 //! A state is label → value, and labels may be absent. Truncation removes them from the end, so a last state that ends
 //! early is incomplete. Unexpected text between the labels is counted.
 
-use super::ascii::{self, Body, Skipped};
+use super::ascii::{self, Body};
 use super::dotted::split;
-use super::label_values::Widths;
-use super::line::{Field, Line, integer, is_whole_real, real, shown};
-use crate::solver::format::Format;
-use crate::solver::problem::Place;
+use super::line::{Line, integer, is_whole_real, real, shown};
+use crate::solver::Format;
 use crate::solver::states::StateReader;
 
 const STATE: &[u8] = b" dt of cycle";
@@ -23,19 +21,13 @@ const NAMES: [(&str, &str); 3] = [
     ("time per zone cycle.(nanosec)", "nzc"),
 ];
 
-fn signature(line: &[u8]) -> bool {
-    line.starts_with(STATE)
-}
-
 pub(crate) const FORMAT: Format =
-    Format::text("glstat", "entity", signature, ascii::read_default::<Glstat>);
+    Format::text("glstat", "entity", |line| line.starts_with(STATE), ascii::read::<Glstat>);
 
 #[derive(Default)]
 struct Glstat {
     /// Inside a block of mass properties, which ends with a row of stars.
     in_properties: bool,
-    widths: Widths,
-    skipped: Skipped,
 }
 
 const PROPERTIES: &[u8] = b"m a s s   p r o p e r t i e s";
@@ -43,32 +35,31 @@ const PROPERTIES: &[u8] = b"m a s s   p r o p e r t i e s";
 const TEXTS: [&[u8]; 4] = [b"number of ", b"reached the ", b"added mass", b"percentage increase"];
 
 impl Body for Glstat {
-    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         if line.text.starts_with(STATE) {
             states.begin(None, line.into());
             if !line.is_heading() {
                 states.mark_damaged();
             }
-            return;
+            return Some(());
         }
         let Some((mut component, from)) = component(line.text) else {
             let text = line.text.trim_ascii();
-            let is_stars = !text.is_empty() && text.iter().all(|&b| b == b'*');
-            let is_ruler = self.in_properties && is_stars;
+            let is_ruler = self.in_properties && text.iter().all(|&b| b == b'*');
             self.in_properties = (self.in_properties && !is_ruler) || text.starts_with(PROPERTIES);
             if !is_ruler && !line.is_heading() {
                 states.damage(line, None, "expected a label and its value, found stars".into());
-            } else if !(is_ruler || self.in_properties || text.is_empty() || is_text(text)) {
-                self.skipped.add(line);
+            } else if !(is_ruler || self.in_properties || is_text(text)) {
+                states.skip_line(line);
             }
-            return;
+            return Some(());
         };
         let columns = [from + 1, value_end(line.text, from)];
-        if !self.is_value(&component, from, line, states) {
+        if !is_value(&component, from, line, states) {
             let found = shown(line.columns(columns[0], columns[1]));
             let message = format!("expected a number of {VALUE_WIDTH} columns, found \"{found}\"");
             states.damage(line, Some(columns), message);
-            return;
+            return Some(());
         }
         // Only a wall's number may be after the value.
         let rest = line.text.get(columns[1]..).unwrap_or_default().trim_ascii();
@@ -76,48 +67,36 @@ impl Body for Glstat {
         if !rest.is_empty() && wall.is_none() {
             let message = "expected the line to end behind its value";
             states.damage(line, Some([columns[1] + 1, line.text.len()]), message.into());
-            return;
+            return Some(());
         }
         // With several walls the label repeats, and the wall follows the value.
         if let Some(wall) = wall {
             component = format!("{component}_wall_{wall}");
         }
-        let value = line.columns(columns[0], columns[1]);
         if component != "time" {
-            states.scalar(&component, value, line, columns);
-            return;
+            states.scalar(&component, line, columns);
+            return Some(());
         }
-        match real(value) {
-            Field::Real(time) if states.is_pending() && states.pending_time().is_none() => {
+        match real(line.columns(columns[0], columns[1])).number() {
+            Some(time) if states.is_pending() && states.pending_time().is_none() => {
                 states.set_time(time);
             }
             // The line that opens a state is missing: its time opens it.
-            Field::Real(time) => states.begin(Some(time), line.into()),
-            _ => states.damage(line, Some(columns), "expected a time".into()),
+            Some(time) => states.begin(Some(time), line.into()),
+            None => states.damage(line, Some(columns), "expected a time".into()),
         }
-    }
-
-    fn end(&mut self, _: Place, states: &mut StateReader<'_>) {
-        self.skipped.tell(states);
+        Some(())
     }
 }
 
-impl Glstat {
-    /// Whether what is after a label is a number with nothing cut from it.
-    fn is_value(
-        &mut self,
-        label: &str,
-        from: usize,
-        line: &Line<'_>,
-        states: &mut StateReader<'_>,
-    ) -> bool {
-        let value = line.columns(from + 1, value_end(line.text, from));
-        // The number of elements at the smallest step has fewer columns.
-        let is_count = integer(value).is_some() && is_text(line.text.trim_ascii());
-        let excess = (from + value.len()) as isize - (LABEL + VALUE_WIDTH) as isize;
-        let is_number = excess == 0 || is_whole_real(value.trim_ascii());
-        is_count || is_number && self.widths.allow(label, excess, line, states)
-    }
+/// Whether what is after a label is a number with nothing cut from it.
+fn is_value(label: &str, from: usize, line: &Line<'_>, states: &mut StateReader<'_>) -> bool {
+    let value = line.columns(from + 1, value_end(line.text, from));
+    // The number of elements at the smallest step has fewer columns.
+    let is_count = integer(value).is_some() && is_text(line.text.trim_ascii());
+    let (end, usual) = (from + value.len(), LABEL + VALUE_WIDTH);
+    let is_number = end == usual || is_whole_real(value.trim_ascii());
+    is_count || is_number && states.allows_width(label, end, usual, line)
 }
 
 fn is_text(text: &[u8]) -> bool {

@@ -1,73 +1,31 @@
 //! The header of every LS-DYNA ASCII file: title, version line, legend.
 
-use nom::IResult;
-use nom::Parser;
-use nom::bytes::complete::{tag, tag_no_case, take_until};
-use nom::character::complete::{i64 as integer, space0, space1};
-use nom::combinator::{opt, rest};
-use nom::sequence::{preceded, terminated};
+use super::line::integer;
 
 /// The text between `ls-dyna` and `date` on the second line, blanks folded:
 /// `smp d R13 R13.1.1_27_8731a0`, `smp.123264 s`, `(version 970)`.
 pub(crate) fn version(line: &[u8]) -> Option<String> {
-    fn parse(line: &[u8]) -> IResult<&[u8], &[u8]> {
-        let (line, _) = preceded(space0, tag_no_case("ls-dyna")).parse(line)?;
-        let (line, version) = opt(terminated(take_until("date "), rest)).parse(line)?;
-        Ok((line, version.unwrap_or(line)))
-    }
-    let (_, version) = parse(line).ok()?;
-    let text = String::from_utf8_lossy(version);
-    Some(text.split_whitespace().collect::<Vec<_>>().join(" "))
-}
-
-/// Follows the fence around a legend, line by line.
-#[derive(Debug, Default)]
-pub(crate) struct LegendFence {
-    inside: bool,
-}
-
-impl LegendFence {
-    /// Whether a legend was opened and not closed.
-    pub(crate) fn is_open(&self) -> bool {
-        self.inside
-    }
-
-    /// Ends the legend without its closing line.
-    pub(crate) fn close(&mut self) {
-        self.inside = false;
-    }
-
-    /// Whether this line belongs to a legend (its two fence lines included).
-    pub(crate) fn covers(&mut self, line: &[u8]) -> bool {
-        let text = line.trim_ascii();
-        // One l2a release wrote the opening line without its closing brace.
-        if text.starts_with(b"{BEGIN LEGEND") {
-            self.inside = true;
-            true
-        } else if text.starts_with(b"{END LEGEND") {
-            self.inside = false;
-            true
-        } else {
-            self.inside
-        }
-    }
+    const NAME: usize = b"ls-dyna".len();
+    let text = &line[blanks(line)..];
+    let name = text.get(..NAME)?;
+    let end = memchr::memmem::find(&text[NAME..], b"date ").map_or(text.len(), |at| NAME + at);
+    let version = String::from_utf8_lossy(&text[NAME..end]);
+    let version = version.split_whitespace().collect::<Vec<_>>().join(" ");
+    name.eq_ignore_ascii_case(b"ls-dyna").then_some(version)
 }
 
 /// One entry of a legend: id in columns 1-9, five blanks, title from column 15.
 /// The width of the title differs by file and writer, so it runs to the line's end.
 pub(crate) fn legend_entry(line: &[u8]) -> Option<(i64, Option<String>)> {
-    fn parse(line: &[u8]) -> IResult<&[u8], i64> {
-        let (line, id) = preceded(space0, integer).parse(line)?;
-        // A title that touches its id would make it ambiguous.
-        let (line, _) = opt(space1).parse(line)?;
-        Ok((line, id))
-    }
-    if tag::<_, _, nom::error::Error<&[u8]>>(" Entity #").parse(line).is_ok() {
-        return None;
-    }
-    let (title, id) = parse(line).ok()?;
-    let title = String::from_utf8_lossy(title).trim().to_string();
-    Some((id, (!title.is_empty()).then_some(title)))
+    let text = &line[blanks(line)..];
+    let is_of_id = |k: usize, b: u8| b.is_ascii_digit() || k == 0 && matches!(b, b'+' | b'-');
+    let end = (0..text.len()).find(|&k| !is_of_id(k, text[k])).unwrap_or(text.len());
+    let title = String::from_utf8_lossy(&text[end..]).trim().to_string();
+    Some((integer(&text[..end])?, (!title.is_empty()).then_some(title)))
+}
+
+fn blanks(line: &[u8]) -> usize {
+    line.iter().take_while(|b| matches!(b, b' ' | b'\t')).count()
 }
 
 #[cfg(test)]

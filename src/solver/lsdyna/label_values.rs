@@ -5,15 +5,11 @@
 //! once numbers fill their usual columns, one that does not has lost some of its digits.
 
 use super::line::{Line, is_whole_real};
-use crate::solver::problem::{Place, ProblemCode};
+use crate::solver::problem::{Diagnostics, Place, ProblemCode};
 use crate::solver::states::StateReader;
 
-/// A component, its label, and the usual width of the number right after the label.
-pub(crate) struct Labelled {
-    pub component: &'static str,
-    pub label: &'static str,
-    pub width: usize,
-}
+/// A component and its label.
+pub(crate) type Label = (&'static str, &'static str);
 
 /// How wide the numbers after each label of a file are, and where that was first seen.
 #[derive(Default)]
@@ -41,15 +37,14 @@ impl Widths {
         &mut self,
         label: &str,
         excess: isize,
-        line: &Line<'_>,
-        states: &mut StateReader<'_>,
+        place: Place,
+        problems: &mut Diagnostics,
     ) -> bool {
         let is_it = |at: &usize| self.of.get(*at).is_some_and(|of| of.label == label);
         let hint = Some(self.next).filter(is_it);
         let Some(at) = hint.or_else(|| self.of.iter().position(|of| of.label == label)) else {
             if self.of.len() < MAX_LABELS {
-                let (label, place) = (label.to_string(), line.into());
-                self.of.push(Width { label, excess, place, is_confirmed: false });
+                self.of.push(Width { label: label.into(), excess, place, is_confirmed: false });
             }
             return true;
         };
@@ -63,32 +58,33 @@ impl Widths {
         if is_first_odd {
             let message =
                 format!("the number of \"{label}\" is not as wide as those below: was it cut?");
-            states.problems.add(ProblemCode::BadLine, Some(known.place), None, message);
-            (known.excess, known.place, known.is_confirmed) = (excess, line.into(), false);
+            problems.add(ProblemCode::BadLine, Some(known.place), message);
+            (known.excess, known.place, known.is_confirmed) = (excess, place, false);
         }
         is_first_odd
     }
 }
 
-/// First and last column of every component's number; `None` for labels that the line does
-/// not have. `None` for the row if something else than one number is after a label.
+/// First and last column of every component's number, which usually has `width` columns; `None` for
+/// labels that the line does not have. `None` for the row if something else than one number is
+/// after a label.
 pub(crate) fn fields(
     line: &Line<'_>,
-    labels: &[Labelled],
-    widths: &mut Widths,
+    labels: &[Label],
+    width: usize,
     states: &mut StateReader<'_>,
 ) -> Option<Vec<Option<(usize, usize)>>> {
     let text = line.text.trim_ascii_end();
     // Beginning and end of each label, and which of the components it names.
     let mut marks: Vec<(usize, usize, Option<usize>)> = Vec::new();
-    for (k, labelled) in labels.iter().enumerate() {
-        let mut found = memchr::memmem::find_iter(text, labelled.label);
+    for (k, (_, label)) in labels.iter().enumerate() {
+        let mut found = memchr::memmem::find_iter(text, label);
         let Some(at) = found.next() else { continue };
         // A label that is there twice: two rows were joined.
         if found.next().is_some() {
             return None;
         }
-        marks.push((at, at + labelled.label.len(), Some(k)));
+        marks.push((at, at + label.len(), Some(k)));
     }
     if marks.is_empty() {
         return None;
@@ -106,15 +102,12 @@ pub(crate) fn fields(
     for (&(_, from, known), to) in marks.iter().zip(ends) {
         let value = text.get(from..to)?.trim_ascii_end();
         if let Some(k) = known {
-            let to = from + value.len();
-            if !is_number(value, labels[k].width) {
+            if !(is_number(value, width)
+                && states.allows_width(labels[k].1, value.len(), width, line))
+            {
                 return None;
             }
-            let excess = value.len() as isize - labels[k].width as isize;
-            if !widths.allow(labels[k].label, excess, line, states) {
-                return None;
-            }
-            fields[k] = Some((from + 1, to));
+            fields[k] = Some((from + 1, from + value.len()));
         } else if value.is_empty() {
             return None;
         }
@@ -162,31 +155,16 @@ pub(crate) fn numbers(
     is_apart.then(|| (0..count).map(|k| (first + k * width + 1, first + (k + 1) * width)).collect())
 }
 
-/// The components' names.
-pub(crate) fn components<const N: usize>(labels: &[Labelled; N]) -> [&'static str; N] {
-    labels.each_ref().map(|l| l.component)
-}
-
-/// Short for a table of labels.
-pub(crate) const fn labelled(
-    component: &'static str,
-    label: &'static str,
-    width: usize,
-) -> Labelled {
-    Labelled { component, label, width }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::solver::Selection;
 
     fn values(text: &str) -> Option<Vec<Option<String>>> {
-        let labels = [labelled("a", "x=", 10), labelled("b", "y=", 10)];
         let line = Line { text: text.as_bytes(), number: 1, byte: 0, ended: true, overlong: false };
         let selection = Selection::all();
         let mut states = StateReader::new(&selection);
-        let fields = fields(&line, &labels, &mut Widths::default(), &mut states)?;
+        let fields = fields(&line, &[("a", "x="), ("b", "y=")], 10, &mut states)?;
         let of = |field: &Option<(usize, usize)>| {
             field.map(|(from, to)| text[from - 1..to].trim().to_string())
         };
@@ -206,13 +184,12 @@ mod tests {
 
     #[test]
     fn a_number_that_lost_digits_among_whole_ones_is_cut() {
-        let (mut widths, selection) = (Widths::default(), Selection::all());
+        let selection = Selection::all();
         let mut states = StateReader::new(&selection);
         let mut read = |text: &str| {
             let line =
                 Line { text: text.as_bytes(), number: 1, byte: 0, ended: true, overlong: false };
-            let labels = [labelled("a", "x=", 10)];
-            fields(&line, &labels, &mut widths, &mut states).is_some()
+            fields(&line, &[("a", "x=")], 10, &mut states).is_some()
         };
         assert!(read(" x= 1.50E+00"), "another release's width");
         assert!(read(" x= 2.50E+00"));

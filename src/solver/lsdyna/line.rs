@@ -130,6 +130,17 @@ pub(crate) enum Field {
     Bad,
 }
 
+impl Field {
+    /// The number, if it is a finite one.
+    #[inline]
+    pub(crate) fn number(self) -> Option<f64> {
+        match self {
+            Self::Real(value) => Some(value),
+            _ => None,
+        }
+    }
+}
+
 /// Reads one Fortran real: the whole field, blanks around it allowed, nothing else.
 ///
 /// Accepts what solvers write beyond C's syntax: `1.5D+00`, and exponents whose `E`

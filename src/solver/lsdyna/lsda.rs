@@ -129,7 +129,6 @@ const MAX_PATH: usize = 1024;
 const NEAR: usize = 64;
 const MANY: usize = 1 << 14;
 
-/// Reads the header; `None` if this is not a container.
 pub(crate) fn header(source: &dyn Source) -> io::Result<Option<Header>> {
     let mut window = Window::new(source);
     Ok(window.get(0, 8, 0)?.and_then(Header::parse))
@@ -258,7 +257,6 @@ fn record<'a>(
     }
 }
 
-/// Printable text.
 fn text(bytes: &[u8]) -> Option<&str> {
     let is_printable = bytes.iter().all(|b| (b' '..=b'~').contains(b));
     std::str::from_utf8(bytes).ok().filter(|_| is_printable)

@@ -1,12 +1,10 @@
 //! `matsum`: energies, momenta and velocities of parts, labelled, several lines per part.
 
-use super::ascii::Skipped;
 use super::ascii::{self, Body};
-use super::label_values::{Labelled, Widths, fields, labelled};
+use super::label_values::{Label, fields};
 use super::line::{Line, integer, shown};
 use crate::history::EntityId;
-use crate::solver::format::Format;
-use crate::solver::problem::Place;
+use crate::solver::Format;
 use crate::solver::states::{StateReader, TableId};
 
 const STATE: &[u8] = b" time =";
@@ -19,55 +17,40 @@ const BELOW: &[u8] = b"Maximum mass increase";
 const WIDTH: usize = 13;
 
 /// The lines of a part; the last one is there only if hourglass energy is computed.
-const LINES: [(&str, &[Labelled]); 4] = [
+const LINES: [(&str, &[Label]); 4] = [
     (
         "parts' energies",
         &[
-            labelled("internal_energy", "inten=", WIDTH),
-            labelled("kinetic_energy", "kinen=", WIDTH),
-            labelled("eroded_internal_energy", "eroded_ie=", WIDTH),
-            labelled("eroded_kinetic_energy", "eroded_ke=", WIDTH),
+            ("internal_energy", "inten="),
+            ("kinetic_energy", "kinen="),
+            ("eroded_internal_energy", "eroded_ie="),
+            ("eroded_kinetic_energy", "eroded_ke="),
         ],
     ),
     (
         "parts' momenta",
-        &[
-            labelled("x_momentum", "x-mom=", WIDTH),
-            labelled("y_momentum", "y-mom=", WIDTH),
-            labelled("z_momentum", "z-mom=", WIDTH),
-        ],
+        &[("x_momentum", "x-mom="), ("y_momentum", "y-mom="), ("z_momentum", "z-mom=")],
     ),
     (
         "parts' velocities",
-        &[
-            labelled("x_rbvelocity", "x-rbv=", WIDTH),
-            labelled("y_rbvelocity", "y-rbv=", WIDTH),
-            labelled("z_rbvelocity", "z-rbv=", WIDTH),
-        ],
+        &[("x_rbvelocity", "x-rbv="), ("y_rbvelocity", "y-rbv="), ("z_rbvelocity", "z-rbv=")],
     ),
     (
         "parts' hourglass energies",
         &[
-            labelled("hourglass_energy", "hgeng=", WIDTH),
-            labelled("added_mass", "+mass=", WIDTH),
-            labelled("eroded_hourglass_energy", "eroded_he=", WIDTH),
+            ("hourglass_energy", "hgeng="),
+            ("added_mass", "+mass="),
+            ("eroded_hourglass_energy", "eroded_he="),
         ],
     ),
 ];
 
-fn signature(line: &[u8]) -> bool {
-    line.starts_with(PART)
-}
-
 pub(crate) const FORMAT: Format =
-    Format::text("matsum", "part", signature, ascii::read_default::<Matsum>);
+    Format::text("matsum", "part", |line| line.starts_with(PART), ascii::read::<Matsum>);
 
 #[derive(Default)]
 struct Matsum {
     tables: Option<[TableId; 4]>,
-    part: Option<i64>,
-    widths: Widths,
-    skipped: Skipped,
 }
 
 impl Body for Matsum {
@@ -75,68 +58,57 @@ impl Body for Matsum {
         line.starts_with(STATE)
     }
 
-    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text;
-        if line.is_blank() {
-            return;
-        }
         if let Some(rest) = text.strip_prefix(STATE) {
-            self.part = None;
-            states.set_time_digits(5);
+            states.entity = None;
+            states.time_digits = 5;
             // Five digits: two states may print one time, so the line begins a state.
-            let time = super::printed_time(rest, TIME, &mut self.widths, line, states);
-            match time.filter(|_| rest.len() >= WIDTH) {
-                Some(time) => states.begin(Some(time), line.into()),
-                None => {
-                    states.begin(None, line.into());
-                    states.damage(line, None, "expected a time".into());
-                }
+            let time = super::heading_time(Some(rest), TIME, line, states);
+            let time = time.filter(|_| rest.len() >= WIDTH);
+            states.begin(time, line.into());
+            if time.is_none() {
+                states.damage(line, None, "expected a time".into());
             }
-            return;
+            return Some(());
         }
-        let is_first =
-            |labels: &[Labelled]| memchr::memmem::find(text, labels[0].label.as_bytes()).is_some();
-        let found = LINES.iter().position(|(_, labels)| is_first(labels));
+        let is_first = |labels: &[Label]| memchr::memmem::find(text, labels[0].1.as_bytes());
+        let found = LINES.iter().position(|(_, labels)| is_first(labels).is_some());
         if text.starts_with(PART) {
-            self.part = memchr::memmem::find(text, b"inten=")
-                .and_then(|end| integer(&text[PART.len()..end]));
+            let end = memchr::memmem::find(text, b"inten=");
+            let id = end.and_then(|end| integer(&text[PART.len()..end]));
+            states.entity = id.map(EntityId::new);
         }
-        match (found, self.part) {
+        match (found, states.entity) {
             (Some(index), Some(part)) => self.values(index, part, line, states),
             (None, _) if line.is_heading() && !text.starts_with(PART) => {
                 if !text.trim_ascii_start().starts_with(BELOW) {
-                    self.skipped.add(line);
+                    states.skip_line(line);
                 }
             }
-            _ => states.damage(
-                line,
-                None,
-                format!("expected a part's values, found \"{}\"", shown(line.columns(1, 40))),
-            ),
+            _ => {
+                let found = shown(line.columns(1, 40));
+                states.damage(line, None, format!("expected a part's values, found \"{found}\""));
+            }
         }
-    }
-
-    fn interrupt(&mut self) {
-        self.part = None;
-    }
-
-    fn end(&mut self, _: Place, states: &mut StateReader<'_>) {
-        self.skipped.tell(states);
+        Some(())
     }
 }
 
 impl Matsum {
-    fn values(&mut self, index: usize, part: i64, line: &Line<'_>, states: &mut StateReader<'_>) {
+    fn values(
+        &mut self,
+        index: usize,
+        part: EntityId,
+        line: &Line<'_>,
+        states: &mut StateReader<'_>,
+    ) {
         let tables = *self.tables.get_or_insert_with(|| {
-            LINES.map(|(name, labels)| {
-                let components: Vec<&str> = labels.iter().map(|l| l.component).collect();
-                states.table(name, &components)
-            })
+            LINES.map(|(what, labels)| states.table(what, labels.iter().map(|(name, _)| name)))
         });
-        let Some(fields) = fields(line, LINES[index].1, &mut self.widths, states) else {
-            states.damage(line, None, "expected labels and their numbers".into());
-            return;
-        };
-        states.row(tables[index], EntityId::new(part), line, |k| fields[k]);
+        match fields(line, LINES[index].1, WIDTH, states) {
+            Some(fields) => states.row(tables[index], part, line, |k| fields[k]),
+            None => states.damage(line, None, "expected labels and their numbers".into()),
+        }
     }
 }

@@ -3,22 +3,18 @@
 pub(super) mod abstat;
 mod ascii;
 pub(super) mod binout;
-pub(super) mod bndout;
 pub(super) mod curvout;
 pub(crate) mod deck;
-pub(super) mod deforc;
-mod dotted;
+pub(super) mod dotted;
 mod e12;
 pub(super) mod elout;
 pub(super) mod glstat;
 pub(super) mod header;
-pub(super) mod jntforc;
-mod label_values;
+pub(super) mod label_values;
 pub(super) mod line;
 mod lsda;
 pub(super) mod matsum;
-mod node_forces;
-pub(super) mod nodfor;
+pub(super) mod node_forces;
 pub(super) mod nodout;
 pub(super) mod rbdout;
 pub(super) mod rcforc;
@@ -29,7 +25,7 @@ pub(super) mod spcforc;
 pub(super) mod swforc;
 
 use super::states::StateReader;
-use label_values::Widths;
+use line::{Line, real};
 
 /// What is in `( at time … )` of a state's heading.
 fn at_time(line: &[u8]) -> Option<&[u8]> {
@@ -43,31 +39,26 @@ fn at_time(line: &[u8]) -> Option<&[u8]> {
 const TIME: usize = 11;
 
 /// The time that a heading holds; `None` if it has lost some of its `usual` columns, or of those that others have.
-fn printed_time(
-    text: &[u8],
+fn heading_time(
+    text: Option<&[u8]>,
     usual: usize,
-    widths: &mut Widths,
-    line: &line::Line<'_>,
+    line: &Line<'_>,
     states: &mut StateReader<'_>,
 ) -> Option<f64> {
-    let text = text.trim_ascii();
-    let line::Field::Real(time) = line::real(text) else { return None };
+    let text = text?.trim_ascii();
+    let time = real(text).number()?;
     if !line::is_whole_real(text) {
         return text.iter().all(|b| !b.is_ascii_alphabetic()).then_some(time);
     }
     let width = text.strip_prefix(b"-").unwrap_or(text).len();
-    widths.allow("time", width as isize - usual as isize, line, states).then_some(time)
+    states.allows_width("time", width, usual, line).then_some(time)
 }
 
 /// Begins the state whose line ends with its time, `rest`, in `width` columns.
-fn begin_at(rest: &[u8], width: usize, line: &line::Line<'_>, states: &mut StateReader<'_>) {
-    match line::real(rest) {
-        line::Field::Real(time) if rest.trim_ascii_end().len() == width => {
-            states.begin(Some(time), line.into());
-        }
-        _ => {
-            states.begin(None, line.into());
-            states.damage(line, None, format!("expected a time of {width} columns"));
-        }
+fn begin_at(rest: &[u8], width: usize, line: &Line<'_>, states: &mut StateReader<'_>) {
+    let time = real(rest).number().filter(|_| rest.trim_ascii_end().len() == width);
+    states.begin(time, line.into());
+    if time.is_none() {
+        states.damage(line, None, format!("expected a time of {width} columns"));
     }
 }

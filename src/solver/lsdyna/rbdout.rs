@@ -3,10 +3,10 @@
 //! Never tested with real data; read as the source of LSTC's converter `l2a` writes it.
 
 use super::ascii::{self, Body};
-use super::label_values::{Widths, numbers};
-use super::line::{Line, integer, shown};
+use super::label_values::numbers;
+use super::line::{Line, integer};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::{StateReader, TableId};
 
 const STATE: &[u8] = b"  r i g i d   b o d y   m o t i o n";
@@ -43,52 +43,32 @@ const LINES: [(&[u8], &[&str], &[&str]); 7] = [
     (b"row 3", &["dircos_31", "dircos_32", "dircos_33"], &[]),
 ];
 
-fn signature(line: &[u8]) -> bool {
-    line.starts_with(STATE)
-}
-
 pub(crate) const FORMAT: Format =
-    Format::text("rbdout", "rigid body", signature, ascii::read_default::<Rbdout>);
+    Format::text("rbdout", "rigid body", |line| line.starts_with(STATE), ascii::read::<Rbdout>);
 
 #[derive(Default)]
 struct Rbdout {
-    tables: Option<Vec<[TableId; 2]>>,
-    body: Option<EntityId>,
+    /// Of global and of local directions, by line.
+    tables: Option<[[TableId; 2]; LINES.len()]>,
     is_local: bool,
-    widths: Widths,
 }
 
 impl Body for Rbdout {
-    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
-        if line.is_blank() || self.value(line, states).is_some() {
-            return;
-        }
-        let found = shown(line.columns(1, 40));
-        let message = format!("expected a rigid body's motion, found \"{}\"", found.trim_end());
-        states.damage(line, None, message);
-    }
+    const EXPECTED: &'static str = "a rigid body's motion";
 
-    fn interrupt(&mut self) {
-        self.body = None;
-    }
-}
-
-impl Rbdout {
-    fn value(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         if text.starts_with(STATE) {
-            self.body = None;
-            let at = memchr::memmem::find(text, b"time=").map(|at| at + 5);
-            let time = at.and_then(|at| {
-                super::printed_time(&text[at..], TIME, &mut self.widths, line, states)
-            });
+            states.entity = None;
+            let at = memchr::memmem::find(text, b"time=").map(|at| &text[at + 5..]);
+            let time = super::heading_time(at, TIME, line, states);
             states.begin(time, line.into());
             return time.map(drop);
         }
         if let Some(rest) = BODIES.iter().find_map(|label| text.strip_prefix(*label)) {
             self.is_local = false;
-            self.body = integer(rest).map(EntityId::new);
-            return self.body.map(drop);
+            states.entity = integer(rest).map(EntityId::new);
+            return states.entity.map(drop);
         }
         let start = text.trim_ascii_start();
         if text.starts_with(LOCAL) {
@@ -98,12 +78,10 @@ impl Rbdout {
             return Some(());
         }
         let index = LINES.iter().position(|(label, ..)| start.starts_with(label))?;
-        let tables = self.tables.get_or_insert_with(|| {
-            let table = |states: &mut StateReader<'_>, names| states.table("rigid bodies", names);
-            LINES
-                .iter()
-                .map(|(_, global, local)| [table(states, global), table(states, local)])
-                .collect()
+        let tables = *self.tables.get_or_insert_with(|| {
+            LINES.map(|(_, global, local)| {
+                [global, local].map(|names| states.table("rigid bodies", names))
+            })
         });
         let (label, global, local) = LINES[index];
         let components = if self.is_local { local } else { global };
@@ -114,12 +92,11 @@ impl Rbdout {
         let from = text.len() - start.len() + label.len();
         let fields = numbers(line, from, text.len(), components.len(), width)?;
         let usual = components.len() * width;
-        let excess = (text.len() - from) as isize - usual as isize;
-        if !self.widths.allow(components[0], excess, line, states) {
+        if !states.allows_width(components[0], text.len() - from, usual, line) {
             return None;
         }
         let table = tables[index][usize::from(self.is_local)];
-        states.row(table, self.body?, line, |k| fields.get(k).copied());
+        states.row(table, states.entity?, line, |k| fields.get(k).copied());
         Some(())
     }
 }

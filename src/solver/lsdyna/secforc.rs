@@ -4,92 +4,73 @@
 //! ones that end after the header.
 
 use super::ascii::{self, Body};
-use super::line::{Field, Line, integer, real, shown};
+use super::line::{Line, integer, real};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::{StateReader, TableId};
 
 /// "(1) id I12, time E15.5, then fields of 15, 12, 12, 12; (2), (3) 27 columns of system or
 /// blanks, then the same fields".
-const ID: (usize, usize) = (1, 12);
-const TIME: (usize, usize) = (13, 27);
+const ID_END: usize = 12;
+const TIME_END: usize = 27;
 const FIELDS: [(usize, usize); 4] = [(28, 42), (43, 54), (55, 66), (67, 78)];
+const WIDTH: usize = FIELDS[3].1;
 
-/// What the three lines of a section hold.
-const LINES: [(&str, [&str; 4]); 3] = [
-    ("sections' forces", ["x_force", "y_force", "z_force", "total_force"]),
-    ("sections' moments", ["x_moment", "y_moment", "z_moment", "total_moment"]),
-    ("sections' centroids", ["x_centroid", "y_centroid", "z_centroid", "area"]),
-];
-
-fn signature(line: &[u8]) -> bool {
-    line.trim_ascii_start().starts_with(b"line#1  section#")
-}
-
-pub(crate) const FORMAT: Format =
-    Format::text("secforc", "section", signature, ascii::read_default::<Secforc>);
+pub(crate) const FORMAT: Format = Format::text(
+    "secforc",
+    "section",
+    |line| line.trim_ascii_start().starts_with(b"line#1  section#"),
+    ascii::read::<Secforc>,
+);
 
 #[derive(Default)]
 struct Secforc {
-    tables: Option<[TableId; 3]>,
-    /// The section whose lines are being read, and how many of them were.
-    section: Option<(i64, usize)>,
+    /// Lines read of the section that the states are at.
+    seen: usize,
 }
 
 impl Body for Secforc {
-    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
-        if line.is_blank() {
-            self.section = None;
-        } else if !(line.text.trim_ascii_start().starts_with(b"line#") && line.is_heading()) {
-            self.values(line, states);
+    /// One for each line of a section.
+    const TABLES: ascii::Tables = &[
+        ("sections' forces", &["x_force", "y_force", "z_force", "total_force"]),
+        ("sections' moments", &["x_moment", "y_moment", "z_moment", "total_moment"]),
+        ("sections' centroids", &["x_centroid", "y_centroid", "z_centroid", "area"]),
+    ];
+
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
+        if line.text.trim_ascii_start().starts_with(b"line#") && line.is_heading() {
+            return Some(());
         }
-    }
-
-    fn interrupt(&mut self) {
-        self.section = None;
-    }
-}
-
-impl Secforc {
-    fn values(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
-        let tables = *self.tables.get_or_insert_with(|| {
-            LINES.each_ref().map(|(name, components)| states.table(name, components))
-        });
-        let width = FIELDS[FIELDS.len() - 1].1;
         // The second line names a system there, the third has blanks.
-        let label = line.columns(ID.0, TIME.1).trim_ascii();
-        let found = match label.first() {
+        let number = match line.columns(1, TIME_END).trim_ascii().first() {
             None => 2,
             Some(first) if first.is_ascii_alphabetic() => 1,
             Some(_) => 0,
         };
-        let head = match (self.section, real(line.columns(TIME.0, TIME.1))) {
-            (Some((id, seen)), _) if seen == found => Some((id, seen, None)),
-            (_, Field::Real(time)) if found == 0 => {
-                integer(line.columns(ID.0, ID.1)).map(|id| (id, 0, Some(time)))
-            }
+        let id = || integer(line.columns(1, ID_END)).map(EntityId::new);
+        let time = || real(line.columns(ID_END + 1, TIME_END)).number();
+        let head = match states.entity.take() {
+            Some(section) if self.seen == number => Some((section, None)),
+            _ if number == 0 => time().and_then(|time| Some((id()?, Some(time)))),
             _ => None,
         };
-        let (Some((id, seen, time)), true) = (head, line.text.trim_ascii_end().len() == width)
-        else {
-            self.section = None;
-            states.damage(
-                line,
-                Some([1, width]),
-                format!(
-                    "expected a section's forces, moments or centroid in {width} columns, found \"{}\"",
-                    shown(line.columns(1, 40)).trim_end()
-                ),
-            );
-            return;
+        let whole = head.filter(|_| line.text.trim_ascii_end().len() == WIDTH);
+        let Some((section, time)) = whole else {
+            let expected = format!("a section's forces, moments or centroid in {WIDTH} columns");
+            states.unexpected(line, Some([1, WIDTH]), &expected, 40);
+            return Some(());
         };
-        let entity = EntityId::new(id);
-        if let Some(time) = time
-            && (states.pending_time() != Some(time) || states.has_row(tables[0], entity))
-        {
-            states.begin(Some(time), line.into());
+        let field = |k: usize| Some(FIELDS[k]);
+        match time {
+            Some(time) => states.timed_row(TableId(0), section, time, line, field),
+            None => states.row(TableId(number), section, line, field),
         }
-        states.row(tables[seen], entity, line, |k| Some(FIELDS[k]));
-        self.section = Some((id, seen + 1));
+        states.entity = Some(section);
+        self.seen = number + 1;
+        Some(())
+    }
+
+    fn blank(&mut self, states: &mut StateReader<'_>) {
+        states.entity = None;
     }
 }

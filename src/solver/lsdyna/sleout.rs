@@ -1,16 +1,15 @@
 //! `sleout`: energies of contact interfaces, one row each, and their sums.
 
 use super::ascii::{self, Body};
-use super::label_values::{Widths, numbers};
-use super::line::{Line, integer, shown};
+use super::label_values::numbers;
+use super::line::{Line, integer};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::{StateReader, TableId};
 
 const STATE: &[u8] = b" contact interface energy file, time=";
 const TIME_WIDTH: usize = 14;
-const COMPONENTS: [&str; 3] = ["slave", "master", "friction_energy"];
-const ID: (usize, usize) = (1, 10);
+const ID_END: usize = 10;
 /// Energies of both sides and of friction. Old files have no third column, and for
 /// single-surface contacts no second one.
 const FIELDS: [(usize, usize); 3] = [(11, 23), (24, 36), (65, 77)];
@@ -25,37 +24,26 @@ const SUMS: [(&[u8], &str); 6] = [
 ];
 const SUM_WIDTH: usize = 14;
 
-fn signature(line: &[u8]) -> bool {
-    line.starts_with(STATE)
-}
-
 pub(crate) const FORMAT: Format =
-    Format::text("sleout", "interface", signature, ascii::read_default::<Sleout>);
+    Format::text("sleout", "interface", |line| line.starts_with(STATE), ascii::read::<Sleout>);
 
 #[derive(Default)]
 struct Sleout {
-    table: Option<TableId>,
     /// Width of the widest row: with friction all rows have it.
     width: usize,
-    widths: Widths,
 }
 
 impl Body for Sleout {
-    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
-        let text = line.text;
-        if line.is_blank() || (text.trim_ascii_start().starts_with(b"#") && line.is_heading()) {
-            return;
-        }
-        if let Some(rest) = text.strip_prefix(STATE) {
+    const TABLES: ascii::Tables = &[("interfaces", &["slave", "master", "friction_energy"])];
+    const EXPECTED: &'static str = "an interface's energies or a sum";
+
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
+        if let Some(rest) = line.text.strip_prefix(STATE) {
             super::begin_at(rest, TIME_WIDTH, line, states);
-        } else if self.values(line, states).is_none() {
-            let found = shown(line.columns(1, 40));
-            let message = format!(
-                "expected an interface's energies or a sum, found \"{}\"",
-                found.trim_end()
-            );
-            states.damage(line, None, message);
+        } else if !(line.text.trim_ascii_start().starts_with(b"#") && line.is_heading()) {
+            self.values(line, states)?;
         }
+        Some(())
     }
 }
 
@@ -70,14 +58,13 @@ impl Sleout {
                 return None;
             }
             let (first, last) = numbers(line, from, text.len(), 1, SUM_WIDTH)?[0];
-            let excess = (text.len() - from) as isize - SUM_WIDTH as isize;
-            if !self.widths.allow(name, excess, line, states) {
+            if !states.allows_width(name, text.len() - from, SUM_WIDTH, line) {
                 return None;
             }
-            states.scalar(name, line.columns(first, last), line, [first, last]);
+            states.scalar(name, line, [first, last]);
             return Some(());
         }
-        let id = integer(line.columns(ID.0, ID.1))?;
+        let id = integer(line.columns(1, ID_END))?;
         // Further columns, such as one of transducers, stand apart after the third.
         let last = FIELDS[2].1;
         let is_wider = text.get(last).is_some_and(u8::is_ascii_whitespace);
@@ -89,8 +76,7 @@ impl Sleout {
             return None;
         }
         self.width = self.width.max(width);
-        let table = *self.table.get_or_insert_with(|| states.table("interfaces", &COMPONENTS));
-        states.row(table, EntityId::new(id), line, |k| (k < columns).then_some(FIELDS[k]));
+        states.row(TableId(0), EntityId::new(id), line, |k| (k < columns).then_some(FIELDS[k]));
         Some(())
     }
 }

@@ -3,10 +3,10 @@
 //! A node in several sets of constraints has a row for each. The components of the second are `x_force_2` and so on.
 
 use super::ascii::{self, Body};
-use super::label_values::{Widths, numbers};
-use super::line::{Line, integer, shown};
+use super::label_values::numbers;
+use super::line::{Line, integer};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::states::{StateReader, TableId};
 use std::collections::HashMap;
 
@@ -23,12 +23,12 @@ const SET_ID: &[u8] = b"setid=";
 /// Sets of constraints that a node may be in.
 const MAX_SETS: usize = 20;
 
-fn signature(line: &[u8]) -> bool {
-    line.trim_ascii() == HEADING || line.starts_with(STATE)
-}
-
-pub(crate) const FORMAT: Format =
-    Format::text("spcforc", "node", signature, ascii::read_default::<Spcforc>);
+pub(crate) const FORMAT: Format = Format::text(
+    "spcforc",
+    "node",
+    |line| line.trim_ascii() == HEADING || line.starts_with(STATE),
+    ascii::read::<Spcforc>,
+);
 
 /// Forces and moments.
 const COMPONENTS: [[&str; 3]; 2] =
@@ -40,25 +40,19 @@ struct Spcforc {
     tables: Vec<[TableId; 2]>,
     /// Rows of each node in the pending state: one for each set of constraints it is in.
     rows: HashMap<i64, [usize; 2]>,
-    widths: Widths,
 }
 
 impl Body for Spcforc {
-    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
-        if line.is_blank() || line.text.trim_ascii() == HEADING {
-            return;
-        }
+    const EXPECTED: &'static str = "a node's forces or moments, or the resultant";
+
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         if let Some(rest) = line.text.strip_prefix(STATE) {
             self.rows.clear();
             super::begin_at(rest, TIME_WIDTH, line, states);
-        } else if self.values(line, states).is_none() {
-            let found = shown(line.columns(1, 40));
-            let message = format!(
-                "expected a node's forces or moments, or the resultant, found \"{}\"",
-                found.trim_end()
-            );
-            states.damage(line, None, message);
+        } else if line.text.trim_ascii() != HEADING {
+            self.values(line, states)?;
         }
+        Some(())
     }
 }
 
@@ -74,8 +68,7 @@ impl Spcforc {
         let end = text[..set_id.unwrap_or(text.len())].trim_ascii_end().len();
         let fields = numbers(line, from, end, 3, WIDTH)?;
         let what = if kind.is_some() { "forces or moments" } else { "force resultants" };
-        let excess = end as isize - (from + 3 * WIDTH) as isize;
-        if !self.widths.allow(what, excess, line, states) {
+        if !states.allows_width(what, end - from, 3 * WIDTH, line) {
             return None;
         }
         let Some(kind) = kind else {
@@ -83,8 +76,8 @@ impl Spcforc {
                 return None;
             }
             let names = ["x_resultant", "y_resultant", "z_resultant"];
-            for (name, &(first, last)) in names.iter().zip(&fields) {
-                states.scalar(name, line.columns(first, last), line, [first, last]);
+            for (name, (first, last)) in names.iter().zip(fields) {
+                states.scalar(name, line, [first, last]);
             }
             return Some(());
         };
@@ -112,11 +105,10 @@ impl Spcforc {
                 0 => String::new(),
                 others => format!("_{}", others + 1),
             };
-            let [forces, moments] = COMPONENTS.map(|names| names.map(|n| format!("{n}{suffix}")));
-            self.tables.push([
-                states.table("nodes' forces", &forces.each_ref().map(String::as_str)),
-                states.table("nodes' moments", &moments.each_ref().map(String::as_str)),
-            ]);
+            let mut table = |what, kind: usize| {
+                states.table(what, COMPONENTS[kind].iter().map(|name| format!("{name}{suffix}")))
+            };
+            self.tables.push([table("nodes' forces", 0), table("nodes' moments", 1)]);
         }
         Some(self.tables[row - 1][kind])
     }

@@ -1,11 +1,11 @@
 //! `swforc`: forces of spot welds and other connections, one row each.
 
 use super::ascii::{self, Body};
-use super::label_values::{Widths, is_number, numbers};
-use super::line::{Field, Line, integer, real, shown};
+use super::label_values::{is_number, numbers};
+use super::line::{Line, integer, real};
 use crate::history::EntityId;
-use crate::solver::format::Format;
-use crate::solver::states::{StateReader, TableId};
+use crate::solver::Format;
+use crate::solver::states::{KeyedTables, StateReader};
 
 const COLUMN_LINE: &[u8] = b" constraint #";
 const COMPONENTS: [&str; 7] =
@@ -23,32 +23,22 @@ const FAILURE_TIME_WIDTH: usize = 12;
 /// Kinds of connection, each with ids of its own.
 const MAX_KINDS: usize = 20;
 
-fn signature(line: &[u8]) -> bool {
-    line.starts_with(COLUMN_LINE)
-}
-
 pub(crate) const FORMAT: Format =
-    Format::text("swforc", "weld", signature, ascii::read_default::<Swforc>);
+    Format::text("swforc", "weld", |line| line.starts_with(COLUMN_LINE), ascii::read::<Swforc>);
 
 #[derive(Default)]
 struct Swforc {
-    kinds: Vec<(Vec<u8>, TableId)>,
-    widths: Widths,
+    kinds: KeyedTables<Vec<u8>>,
 }
 
 impl Body for Swforc {
-    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
-        if line.is_blank() || (line.text.starts_with(COLUMN_LINE) && line.is_heading()) {
-            return;
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
+        let is_column_line = line.text.starts_with(COLUMN_LINE) && line.is_heading();
+        if !is_column_line && self.row(line, states).is_none() {
+            let expected = "axial and shear force, time, kind and id of a weld";
+            states.unexpected(line, Some([1, line.text.len()]), expected, 60);
         }
-        if self.row(line, states).is_none() {
-            let found = shown(line.columns(1, 60));
-            let message = format!(
-                "expected axial and shear force, time, kind and id of a weld, found \"{}\"",
-                found.trim_end()
-            );
-            states.damage(line, Some([1, line.text.len().max(1)]), message);
-        }
+        Some(())
     }
 }
 
@@ -56,17 +46,17 @@ impl Swforc {
     fn row(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         integer(text.get(..AXIAL.0 - 1)?)?;
-        let Field::Real(time) = real(line.columns(TIME.0, TIME.1)) else { return None };
+        let time = real(line.columns(TIME.0, TIME.1)).number()?;
         let at = FAILURE.1 + memchr::memmem::find(text.get(FAILURE.1..)?, ID)?;
         let kind = text[FAILURE.1..at].trim_ascii().to_vec();
-        if !(!kind.is_empty() && !kind.contains(&b'*')) {
+        if kind.is_empty() || kind.contains(&b'*') {
             return None;
         }
         let id_from = at + ID.len();
         let blanks = text[id_from..].iter().take_while(|b| b.is_ascii_whitespace()).count();
         let digits = text[id_from + blanks..].iter().take_while(|b| b.is_ascii_digit()).count();
         let rest = id_from + blanks + digits;
-        let id = integer(&text[id_from..rest])?;
+        let entity = EntityId::new(integer(&text[id_from..rest])?);
         let failed = memchr::memmem::find(&text[rest..], FAILED).map(|at| rest + at + FAILED.len());
         let fields = match failed {
             Some(from) => {
@@ -82,37 +72,21 @@ impl Swforc {
             None => {
                 let length = text.len() - rest;
                 let words = text[rest..].split(u8::is_ascii_whitespace).filter(|w| !w.is_empty());
-                let columns = (text.len() - rest).is_multiple_of(WIDTH);
-                let count = if columns { (text.len() - rest) / WIDTH } else { words.count() };
-                if count > 3 {
-                    return None;
-                }
-                let excess = length as isize - (count * WIDTH) as isize;
-                if count > 0 && !self.widths.allow("weld", excess, line, states) {
+                let in_columns = length.is_multiple_of(WIDTH);
+                let count = if in_columns { length / WIDTH } else { words.count() };
+                if count > 3
+                    || count > 0 && !states.allows_width("weld", length, count * WIDTH, line)
+                {
                     return None;
                 }
                 numbers(line, rest, text.len(), count, WIDTH)?
             }
         };
-        let known = self.kinds.iter().find(|(k, _)| *k == kind).map(|(_, table)| *table);
-        let table = match known {
-            Some(table) => table,
-            None if self.kinds.len() < MAX_KINDS => {
-                let table = states.table("welds", &COMPONENTS);
-                self.kinds.push((kind, table));
-                table
-            }
-            None => return None,
-        };
-        let entity = EntityId::new(id);
-        // Times have six digits: a repeated weld begins a state as well.
-        if states.pending_time() != Some(time) || states.has_row(table, entity) {
-            states.begin(Some(time), line.into());
-        }
+        let table = self.kinds.get(kind, MAX_KINDS, |_| states.table("welds", COMPONENTS))?;
         // Words and blanks are there as well.
         let failure = line.columns(FAILURE.0, FAILURE.1).trim_ascii();
         let failure = failure.first().is_some_and(u8::is_ascii_digit);
-        states.row(table, entity, line, |k| match k {
+        states.timed_row(table, entity, time, line, |k| match k {
             0 => Some(AXIAL),
             1 => Some(SHEAR),
             2 => failure.then_some(FAILURE),

@@ -3,7 +3,7 @@
 use std::io::{self, BufRead, Read};
 
 use super::variables::{PART, SUBSET};
-use crate::solver::source::Stream;
+use crate::solver::source::{Stream, unpadded};
 
 /// A record of the header is at most this long; a state's may be as long as the file.
 const MAX_HEADER_RECORD: usize = 1 << 20;
@@ -20,7 +20,6 @@ impl<'a> Records<'a> {
         Self { input }
     }
 
-    /// Position of the next byte.
     pub(crate) fn position(&self) -> u64 {
         self.input.position()
     }
@@ -51,8 +50,26 @@ impl<'a> Records<'a> {
         Ok(Some(bytes))
     }
 
-    fn header(&mut self) -> io::Result<Option<Vec<u8>>> {
-        Ok(self.next()?.filter(|r| r.len() <= MAX_HEADER_RECORD))
+    fn header(&mut self) -> Result<Vec<u8>, Stop> {
+        self.next()?.filter(|r| r.len() <= MAX_HEADER_RECORD).ok_or(Stop::Damaged)
+    }
+
+    /// Passes over records of the header.
+    fn skip(&mut self, count: usize) -> Result<(), Stop> {
+        (0..count).try_for_each(|_| self.header().map(drop))
+    }
+}
+
+/// Why a header ends before its end.
+enum Stop {
+    Io(io::Error),
+    /// It is cut or makes no sense.
+    Damaged,
+}
+
+impl From<io::Error> for Stop {
+    fn from(error: io::Error) -> Self {
+        Self::Io(error)
     }
 }
 
@@ -84,55 +101,44 @@ fn integers(record: &[u8]) -> Vec<i32> {
     record.chunks_exact(4).map(|w| i32::from_be_bytes([w[0], w[1], w[2], w[3]])).collect()
 }
 
-fn text(bytes: &[u8]) -> Option<String> {
-    let text = String::from_utf8_lossy(bytes);
-    let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0');
-    (!text.is_empty()).then(|| text.to_string())
-}
-
 /// A count that a sane file can have.
-fn count(value: Option<&i32>) -> Option<usize> {
-    value.filter(|v| (0..=MAX_COUNT).contains(*v)).map(|&v| v as usize)
+fn count(value: Option<&i32>) -> Result<usize, Stop> {
+    value.filter(|v| (0..=MAX_COUNT).contains(*v)).map(|&v| v as usize).ok_or(Stop::Damaged)
 }
 
 impl Header {
     /// `None` if the header is cut or makes no sense.
     pub(crate) fn read(records: &mut Records<'_>) -> io::Result<Option<Self>> {
-        let Some(first) = records.header()? else { return Ok(None) };
-        let Some(&code) = integers(first.get(..4).unwrap_or_default()).first() else {
-            return Ok(None);
-        };
-        let title_length = match code {
+        match Self::read_all(records) {
+            Ok(header) => Ok(Some(header)),
+            Err(Stop::Damaged) => Ok(None),
+            Err(Stop::Io(error)) => Err(error),
+        }
+    }
+
+    fn read_all(records: &mut Records<'_>) -> Result<Self, Stop> {
+        let first = records.header()?;
+        let title_length = match first_integer(&first)? {
             ..3041 => 40,
             3041..4021 => 80,
             _ => 100,
         };
-        let Some(solver) = records.header()? else { return Ok(None) };
-        if code > 3050 {
-            let Some(extra) = records.header()? else { return Ok(None) };
-            if !skip(records, count(integers(&extra).first()).unwrap_or(0))? {
-                return Ok(None);
-            }
+        let solver = records.header()?;
+        if first_integer(&first)? > 3050 {
+            let extra = records.header()?;
+            records.skip(count(integers(&extra).first()).unwrap_or(0))?;
         }
-        let Some(counts) = records.header()? else { return Ok(None) };
-        let counts = integers(&counts);
-        let sizes: Option<Vec<usize>> = (0..6).map(|i| count(counts.get(i))).collect();
-        let Some([parts, materials, properties, subsets, groups, globals]) =
-            sizes.and_then(|s| <[usize; 6]>::try_from(s).ok())
-        else {
-            return Ok(None);
-        };
-        if globals > 0 && !skip(records, 1)? {
-            return Ok(None);
-        }
-        let Some(of_parts) = parts_of(records, parts, title_length)? else { return Ok(None) };
-        if !skip(records, materials + properties)? {
-            return Ok(None);
-        }
-        let Some(of_subsets) = subsets_of(records, subsets)? else { return Ok(None) };
+        let counts = integers(&records.header()?);
+        let size = |k: usize| count(counts.get(k));
+        let (parts, materials, properties) = (size(0)?, size(1)?, size(2)?);
+        let (subsets, groups, globals) = (size(3)?, size(4)?, size(5)?);
+        records.skip(usize::from(globals > 0))?;
+        let of_parts = parts_of(records, parts, title_length)?;
+        records.skip(materials + properties)?;
+        let of_subsets = subsets_of(records, subsets)?;
         let mut header = Self {
-            title: text(first.get(4..).unwrap_or_default()),
-            solver: text(&solver),
+            title: unpadded(first.get(4..).unwrap_or_default()),
+            solver: unpadded(&solver),
             globals,
             groups: Vec::new(),
             lengths: vec![4],
@@ -153,13 +159,13 @@ impl Header {
             }
         }
         for _ in 0..groups {
-            let Some(group) = Group::read(records)? else { return Ok(None) };
+            let group = Group::read(records)?;
             let record = header.lengths.len();
             header.lengths.push(4 * group.objects.len() * group.codes.len());
             header.groups.push(Group { record, ..group });
         }
         header.groups.extend(of_model);
-        Ok(Some(header))
+        Ok(header)
     }
 
     /// Whether a state has the same values of the same objects as one below the other header.
@@ -172,14 +178,9 @@ impl Header {
     }
 }
 
-/// Passes over records of the header; false if it ends before.
-fn skip(records: &mut Records<'_>, count: usize) -> io::Result<bool> {
-    for _ in 0..count {
-        if records.header()?.is_none() {
-            return Ok(false);
-        }
-    }
-    Ok(true)
+/// The integer that a record begins with.
+fn first_integer(record: &[u8]) -> Result<i32, Stop> {
+    integers(record.get(..4).unwrap_or_default()).first().copied().ok_or(Stop::Damaged)
 }
 
 /// The parts that have values.
@@ -187,51 +188,55 @@ fn parts_of(
     records: &mut Records<'_>,
     parts: usize,
     title_length: usize,
-) -> io::Result<Option<Vec<Group>>> {
+) -> Result<Vec<Group>, Stop> {
     let mut found = Vec::new();
     for _ in 0..parts {
         // Id, title, four integers: the last is the number of history variables.
-        let Some(part) = records.header()? else { return Ok(None) };
+        let part = records.header()?;
         let tail = integers(part.get(4 + title_length..).unwrap_or_default());
-        let Some(variables) = count(tail.get(3)) else { return Ok(None) };
+        let variables = count(tail.get(3))?;
         let title = part.get(4..4 + title_length).unwrap_or_default();
         if variables > 0 {
-            let Some(codes) = records.header()? else { return Ok(None) };
-            let Some(group) = Group::of_one(PART, &part, title, &codes, variables) else {
-                return Ok(None);
-            };
-            found.push(group);
+            let codes = records.header()?;
+            found.push(Group::of_one(PART, &part, title, &codes, variables)?);
         }
     }
-    Ok(Some(found))
+    Ok(found)
 }
 
 /// The subsets that have values.
-fn subsets_of(records: &mut Records<'_>, subsets: usize) -> io::Result<Option<Vec<Group>>> {
+fn subsets_of(records: &mut Records<'_>, subsets: usize) -> Result<Vec<Group>, Stop> {
     let mut found = Vec::new();
     for _ in 0..subsets {
         // Id, parent, number of child subsets, of parts, of variables, title.
-        let Some(subset) = records.header()? else { return Ok(None) };
+        let subset = records.header()?;
         let head = integers(subset.get(..20).unwrap_or_default());
         for k in 2..5 {
-            let Some(number) = count(head.get(k)) else { return Ok(None) };
+            let number = count(head.get(k))?;
             if number == 0 {
                 continue;
             }
-            let Some(codes) = records.next()? else { return Ok(None) };
+            let codes = records.next()?.ok_or(Stop::Damaged)?;
             if k == 4 {
                 let title = subset.get(20..).unwrap_or_default();
-                let Some(group) = Group::of_one(SUBSET, &subset, title, &codes, number) else {
-                    return Ok(None);
-                };
-                found.push(group);
+                found.push(Group::of_one(SUBSET, &subset, title, &codes, number)?);
             }
         }
     }
-    Ok(Some(found))
+    Ok(found)
 }
 
 impl Group {
+    fn new(
+        kind: i32,
+        objects: Vec<(i64, Option<String>)>,
+        codes: &[u8],
+        variables: usize,
+    ) -> Result<Self, Stop> {
+        let group = Self { kind, objects, codes: integers(codes), record: 0, start: 0 };
+        if group.codes.len() == variables { Ok(group) } else { Err(Stop::Damaged) }
+    }
+
     /// A part or a subset, whose record begins with its id.
     fn of_one(
         kind: i32,
@@ -239,42 +244,27 @@ impl Group {
         title: &[u8],
         codes: &[u8],
         variables: usize,
-    ) -> Option<Self> {
-        let id = i64::from(*integers(record.get(..4)?).first()?);
-        let codes = integers(codes);
-        let objects = vec![(id, text(title))];
-        (codes.len() == variables).then_some(Self { kind, objects, codes, record: 0, start: 0 })
+    ) -> Result<Self, Stop> {
+        let id = i64::from(first_integer(record)?);
+        Self::new(kind, vec![(id, unpadded(title))], codes, variables)
     }
 
-    pub(crate) fn read(records: &mut Records<'_>) -> io::Result<Option<Self>> {
+    fn read(records: &mut Records<'_>) -> Result<Self, Stop> {
         // Id, type, one integer, number of objects, number of variables, title.
-        let Some(head) = records.header()? else { return Ok(None) };
+        let head = records.header()?;
         let head = integers(head.get(..20).unwrap_or_default());
-        let (Some(&kind), Some(objects), Some(variables)) =
-            (head.get(1), count(head.get(3)), count(head.get(4)))
-        else {
-            return Ok(None);
-        };
+        let kind = *head.get(1).ok_or(Stop::Damaged)?;
+        let (objects, variables) = (count(head.get(3))?, count(head.get(4))?);
         let mut named = Vec::new();
         for _ in 0..objects {
-            let Some(object) = records.header()? else { return Ok(None) };
-            let Some(&id) = integers(object.get(..4).unwrap_or_default()).first() else {
-                return Ok(None);
-            };
-            named.push((i64::from(id), text(&object[4..])));
+            let object = records.header()?;
+            named.push((i64::from(first_integer(&object)?), unpadded(&object[4..])));
         }
         let codes = match variables {
             0 => Vec::new(),
-            _ => match records.next()? {
-                Some(codes) => integers(&codes),
-                None => return Ok(None),
-            },
+            _ => records.next()?.ok_or(Stop::Damaged)?,
         };
-        if codes.len() == variables {
-            Ok(Some(Self { kind, objects: named, codes, record: 0, start: 0 }))
-        } else {
-            Ok(None)
-        }
+        Self::new(kind, named, &codes, variables)
     }
 
     /// Where the value of a variable of its `object`-th object is in a state: the record, and the place in it.

@@ -17,7 +17,7 @@ mod variables;
 use std::io;
 use std::sync::Arc;
 
-use super::format::Format;
+use super::Format;
 use super::problem::{Problem, ProblemCode};
 use super::source::{Source, Stream};
 use super::{Selection, SolverFile};
@@ -97,20 +97,7 @@ fn history(
 }
 
 fn empty(section: &str) -> SolverFile {
-    SolverFile {
-        format: "t01",
-        section: section.into(),
-        solver: None,
-        version: None,
-        title: None,
-        entities: Vec::new(),
-        without_data: Vec::new(),
-        components: Vec::new(),
-        time: Arc::new([]),
-        histories: Vec::new(),
-        problems: Vec::new(),
-        notes: Vec::new(),
-    }
+    SolverFile { format: "t01", section: section.into(), ..SolverFile::default() }
 }
 
 const DIFFERENTIATED: &str = "forces are the central difference of T01's impulses, a mean over two output intervals; at both ends over one, so the last force changes when the record continues";

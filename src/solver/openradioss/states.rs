@@ -45,17 +45,12 @@ pub(crate) struct StateReader {
     objects: Vec<Object>,
     /// Lengths of a state's records in bytes.
     lengths: Vec<usize>,
-    /// Where each kept state begins.
     starts: Vec<u64>,
-    /// Kept values that are not finite numbers.
     not_finite: usize,
-    /// Whether the end of the file cuts a state.
     is_cut: bool,
-    /// What was found to be wrong on the way.
     problems: Diagnostics,
 }
 
-/// The objects of all groups, each once, with what they have.
 fn objects_of(header: &Header) -> Vec<Object> {
     let mut objects: Vec<Object> = Vec::new();
     let mut index: HashMap<(i32, i64), usize> = HashMap::new();
@@ -96,7 +91,6 @@ impl Object {
         is_here && entities(self.kind, self.id).iter().any(|entity| selection.wants(*entity))
     }
 
-    /// A component's values.
     fn values(&self, made: &Made, channels: &[Channel], time: &[f64], sign: f64) -> Vec<f64> {
         let of = |code: &i32| &channels[self.channels[code]].values;
         let rate = |codes: &Vec<i32>| {
@@ -157,10 +151,9 @@ impl StateReader {
     pub(crate) fn end_before(&mut self, number: usize, what: &str) {
         let message =
             format!("T{number:02}, the continuation, {what}: it and what follows are not read");
-        self.problems.add(ProblemCode::UnreadRows, None, None, message);
+        self.problems.add(ProblemCode::UnreadRows, None, message);
     }
 
-    /// Bytes of one state.
     fn stride(&self) -> u64 {
         self.lengths.iter().map(|&n| n as u64 + 2 * FRAME).sum()
     }
@@ -203,7 +196,7 @@ impl StateReader {
                 "{} values are not finite numbers; they are returned as such",
                 self.not_finite
             );
-            self.problems.add(ProblemCode::NotFinite, None, None, message);
+            self.problems.add(ProblemCode::NotFinite, None, message);
         }
         Ok(())
     }
@@ -252,7 +245,7 @@ impl StateReader {
                     self.name(header, k, i - 1),
                 );
                 let place = self.starts.last().copied().map(Place::at_byte);
-                self.problems.add(ProblemCode::SuspectZeros, place, None, message);
+                self.problems.add(ProblemCode::SuspectZeros, place, message);
             }
         }
     }
@@ -308,11 +301,7 @@ impl StateReader {
         if kept.len() == self.time.len() {
             return;
         }
-        let take = |values: &mut Vec<f64>| {
-            if !values.is_empty() {
-                *values = kept.iter().map(|&i| values[i]).collect();
-            }
-        };
+        let take = |values: &mut Vec<f64>| restart::take(values, &kept);
         take(&mut self.time);
         self.channels.iter_mut().for_each(|channel| take(&mut channel.values));
     }
@@ -323,7 +312,7 @@ impl StateReader {
             self.objects.iter().flat_map(|o| &*o.components).any(|c| c.made.is_rate());
         if self.time.len() == 1 && has_impulses {
             let message = "one state gives no rate of impulses: there are no forces";
-            self.problems.add(ProblemCode::AbsentComponent, None, None, message.into());
+            self.problems.add(ProblemCode::AbsentComponent, None, message.into());
         }
         let time: Arc<[f64]> = std::mem::take(&mut self.time).into();
         let mut files = self.sections(header, selection, &time);

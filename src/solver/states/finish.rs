@@ -1,54 +1,156 @@
-//! Ends a file: the histories of its complete states.
+//! Ends states and files: a complete state is kept, an incomplete one is left out and reported; complete states
+//! become histories.
 
 use std::sync::Arc;
 
-use super::StateReader;
 use super::table::collect_tables;
-use crate::history::{EntityId, History};
-use crate::solver::problem::{Problem, ProblemCode};
-
-/// What a file's body hands over at its end.
-pub(crate) struct Collected {
-    pub entities: Vec<EntityId>,
-    pub components: Vec<Arc<str>>,
-    pub time: Arc<[f64]>,
-    pub histories: Vec<History>,
-    pub problems: Vec<Problem>,
-}
+use super::{ABSENT_CELLS, ABSENT_PER_PRESENT, Pending, StateReader};
+use crate::history::History;
+use crate::solver::problem::ProblemCode;
+use crate::solver::{SolverFile, restart};
 
 impl StateReader<'_> {
-    /// Ends the file.
-    pub(crate) fn finish(mut self) -> Collected {
+    /// Ends the pending state; keeps it if it is whole.
+    pub(crate) fn close(&mut self, at_end: bool) {
+        let Some(pending) = self.pending.take() else { return };
+        match (pending.time, self.missing(&pending, at_end)) {
+            (Some(time), None) if self.skip > 0 => {
+                self.skip -= 1;
+                let message = format!(
+                    "the state at time {time:?} has other entities than the states below it; it is left out"
+                );
+                self.problems.add(ProblemCode::IncompleteState, Some(pending.place), message);
+                for table in &mut self.tables {
+                    table.forget_rows();
+                }
+                self.scalars.clear();
+            }
+            (Some(time), None) => self.keep(time, &pending),
+            (time, missing) => {
+                self.disagreeing += usize::from(pending.disagrees);
+                let missing = missing.unwrap_or_else(|| "its time is missing".into());
+                let at = time.map_or(String::new(), |t| format!(" at time {t:?}"));
+                let states = self.time.len();
+                let message =
+                    format!("state {}{at} is not complete and is left out: {missing}", states + 1);
+                self.problems.add(ProblemCode::IncompleteState, Some(pending.place), message);
+                // Labels that only dropped states had must not become components.
+                self.scalars.retain(|s| s.absent < states);
+            }
+        }
+        for table in &mut self.tables {
+            table.next_row = 0;
+            let width = table.wanted_columns.len();
+            for row in table.filled_rows.drain(..) {
+                table.filled[row] = false;
+                // What a state that was left out had must not be in the next one.
+                if let Some(first) = table.channel_of[row] {
+                    for channel in &mut table.channels[first..first + width] {
+                        (channel.pending, channel.pending_seen) = (f64::NAN, false);
+                    }
+                }
+            }
+        }
+        for scalar in &mut self.scalars {
+            scalar.pending = None;
+        }
+    }
+
+    /// What a pending state lacks to be whole.
+    pub(super) fn missing(&self, pending: &Pending, at_end: bool) -> Option<String> {
+        for table in &self.tables {
+            let (have, want) = (table.filled_rows.len(), table.rows.len());
+            if table.varies {
+                // Rows come in order, so that a cut takes the last ones.
+                let cut = table.last_row.filter(|&last| at_end && !table.filled[last]);
+                if let Some(last) = cut {
+                    return Some(format!("its {} end before {}", table.name, table.rows[last]));
+                }
+            } else if have < want {
+                let first = table.filled.iter().position(|f| !f)?;
+                return Some(format!(
+                    "{} of {want} {} are missing, the first of {}",
+                    want - have,
+                    table.name,
+                    table.rows[first]
+                ));
+            }
+        }
+        if pending.damaged {
+            return Some("a row of it is damaged".into());
+        }
+        // A cut takes labels from the end; labels missing elsewhere are a choice of the solver.
+        let last = self.scalars.iter().rev().find(|s| s.absent == 0);
+        match last {
+            Some(last) if at_end && self.sealed && last.pending.is_none() => {
+                Some(format!("its labels end before \"{}\"", last.component))
+            }
+            _ if !self.allow_empty_states
+                && self.tables.iter().all(|t| t.filled_rows.is_empty())
+                && pending.labels == 0 =>
+            {
+                Some("it has no rows".into())
+            }
+            _ if self.absent_cells > ABSENT_CELLS + ABSENT_PER_PRESENT * self.present_cells => {
+                Some("the states above already lack most of their entities".into())
+            }
+            _ => None,
+        }
+    }
+
+    fn keep(&mut self, time: f64, pending: &Pending) {
+        self.sealed = true;
+        self.time.push(time);
+        self.places.push(pending.place);
+        self.cycles.push(pending.cycle);
+        for table in &mut self.tables {
+            if table.varies {
+                table.last_row = table.filled_rows.iter().max().copied();
+                for &row in &table.filled_rows {
+                    table.states_with[row] += 1;
+                }
+                let (rows, filled) = (table.rows.len(), table.filled_rows.len());
+                self.absent_cells += (rows - filled) * table.components.len();
+                self.present_cells += filled * table.components.len();
+            }
+            for channel in &mut table.channels {
+                channel.values.push(channel.pending);
+                channel.seen += usize::from(channel.pending_seen);
+            }
+        }
+        for scalar in &mut self.scalars {
+            let absent = usize::from(scalar.pending.is_none());
+            scalar.absent += absent;
+            self.absent_cells += absent;
+            self.present_cells += 1 - absent;
+            if scalar.kept {
+                scalar.values.push(scalar.pending.unwrap_or(f64::NAN));
+            }
+        }
+    }
+
+    /// The file without what its header says.
+    pub(crate) fn finish(mut self) -> SolverFile {
         self.close(true);
         self.resolve_restarts();
         let time: Arc<[f64]> = self.time.into();
-        let mut collected = Collected {
-            entities: Vec::new(),
-            components: Vec::new(),
-            time: time.clone(),
-            histories: Vec::new(),
-            problems: Vec::new(),
-        };
+        let mut file = SolverFile { time: time.clone(), ..SolverFile::default() };
         if self.sealed {
-            let found = collect_tables(self.tables, &mut collected);
+            let found = collect_tables(self.tables, &mut file);
             self.problems.append(found);
             for scalar in self.scalars {
                 if scalar.absent > 0 {
-                    self.problems.add(
-                        ProblemCode::AbsentComponent,
-                        None,
-                        None,
-                        format!(
-                            "{} is missing from {} of {} states; its values there are NaN",
-                            scalar.component,
-                            scalar.absent,
-                            time.len()
-                        ),
+                    let message = format!(
+                        "{} is missing from {} of {} states; its values there are NaN",
+                        scalar.component,
+                        scalar.absent,
+                        time.len()
                     );
+                    self.problems.add(ProblemCode::AbsentComponent, None, message);
                 }
-                collected.components.push(scalar.component.clone());
+                file.components.push(scalar.component.clone());
                 if scalar.kept {
-                    collected.histories.push(History {
+                    file.histories.push(History {
                         entity: None,
                         component: scalar.component,
                         time: time.clone(),
@@ -57,7 +159,33 @@ impl StateReader<'_> {
                 }
             }
         }
-        collected.problems = self.problems.into_list();
-        collected
+        file.problems = self.problems.into_list();
+        file
+    }
+
+    /// Leaves out the states that a restart wrote again.
+    fn resolve_restarts(&mut self) {
+        let cycles = &self.cycles;
+        // Times have few digits: a cycle that does not increase means the same state, or a time that is
+        // known far better than states lie apart.
+        let is_same = |above: usize, below: usize| match (cycles[above], cycles[below]) {
+            (Some(above), Some(below)) => Some(below <= above),
+            _ => Some(restart::is_known_apart(&self.time, above, below, self.time_digits)),
+        };
+        let places = &self.places;
+        let place = |i: usize| places.get(i).copied();
+        let (kept, found) = restart::resolve(&self.time, is_same, place, "");
+        self.problems.append(found);
+        if kept.len() == self.time.len() {
+            return;
+        }
+        let take = |values: &mut Vec<f64>| restart::take(values, &kept);
+        take(&mut self.time);
+        for channel in self.tables.iter_mut().flat_map(|t| &mut t.channels) {
+            take(&mut channel.values);
+        }
+        for scalar in &mut self.scalars {
+            take(&mut scalar.values);
+        }
     }
 }

@@ -5,18 +5,17 @@
 //! entities of each table, unless its rows may come and go (eroded elements). Invariant:
 //! every kept history has one value per kept state.
 
-mod close;
 mod finish;
-mod restart;
 mod table;
 
 use std::sync::Arc;
 
 use super::Selection;
+use super::lsdyna::label_values::Widths;
 use super::lsdyna::line::{Field, Line, real, shown};
 use super::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::history::EntityId;
-pub(crate) use finish::Collected;
+use crate::plural::counted;
 use table::Table;
 
 /// Values that states may lack, beyond a multiple of the values they have: more are no
@@ -46,13 +45,12 @@ struct Pending {
     damaged: bool,
     /// Whether it has a row that the first complete state does not have.
     disagrees: bool,
-    /// Labels seen in this state, in order of the file.
     labels: usize,
 }
 
 /// The states of one file while it is read.
 pub(crate) struct StateReader<'a> {
-    selection: &'a Selection,
+    pub selection: &'a Selection,
     tables: Vec<Table>,
     scalars: Vec<Scalar>,
     time: Vec<f64>,
@@ -60,11 +58,11 @@ pub(crate) struct StateReader<'a> {
     /// Whether a complete state has fixed the entities.
     sealed: bool,
     /// Whole states to leave out before the first that is kept.
-    skip: usize,
+    pub skip: usize,
     /// States left out because their rows are not those of the first complete state.
     disagreeing: usize,
     /// Whether a state without rows is whole.
-    allow_empty_states: bool,
+    pub allow_empty_states: bool,
     /// Values that the kept states have and lack, selected or not.
     present_cells: usize,
     absent_cells: usize,
@@ -72,13 +70,50 @@ pub(crate) struct StateReader<'a> {
     places: Vec<Place>,
     cycles: Vec<Option<i64>>,
     /// Digits that the file prints of times.
-    time_digits: i32,
+    pub time_digits: i32,
+    widths: Widths,
+    /// Lines of unknown meaning between those that are read, and the first of them.
+    skipped_lines: usize,
+    first_skipped: Option<(Place, String)>,
+    /// The entity that the lines are of, where one has several; none behind a damaged line.
+    pub entity: Option<EntityId>,
+    /// Contacts that the file declares to have no resultants.
+    pub single_surfaces: Vec<i64>,
     pub problems: Diagnostics,
 }
 
 /// Index of a table, from [`StateReader::table`].
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct TableId(usize);
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct TableId(pub usize);
+
+/// Tables that are made when their first row comes, by what their rows are of.
+pub(crate) struct KeyedTables<K>(Vec<(K, TableId)>);
+
+impl<K> Default for KeyedTables<K> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl<K: PartialEq> KeyedTables<K> {
+    /// The table of a key; `None` if it is new and there are `most` already.
+    pub(crate) fn get(
+        &mut self,
+        key: K,
+        most: usize,
+        new: impl FnOnce(&K) -> TableId,
+    ) -> Option<TableId> {
+        if let Some((_, table)) = self.0.iter().find(|(known, _)| *known == key) {
+            return Some(*table);
+        }
+        if self.0.len() == most {
+            return None;
+        }
+        let table = new(&key);
+        self.0.push((key, table));
+        Some(table)
+    }
+}
 
 impl<'a> StateReader<'a> {
     pub(crate) fn new(selection: &'a Selection) -> Self {
@@ -97,23 +132,13 @@ impl<'a> StateReader<'a> {
             places: Vec::new(),
             cycles: Vec::new(),
             time_digits: TIME_DIGITS,
+            widths: Widths::default(),
+            skipped_lines: 0,
+            first_skipped: None,
+            entity: None,
+            single_surfaces: Vec::new(),
             problems: Diagnostics::default(),
         }
-    }
-
-    /// Leaves out the first `count` complete states.
-    pub(crate) fn skip(&mut self, count: usize) {
-        self.skip = count;
-    }
-
-    /// Says how many digits of times the file prints, if fewer than most.
-    pub(crate) fn set_time_digits(&mut self, digits: i32) {
-        self.time_digits = digits;
-    }
-
-    /// Says that a state without rows is whole.
-    pub(crate) fn allow_empty_states(&mut self) {
-        self.allow_empty_states = true;
     }
 
     /// Whether more states disagree with the first complete state than agree with it.
@@ -121,26 +146,28 @@ impl<'a> StateReader<'a> {
         self.disagreeing > self.time.len()
     }
 
-    /// Number of states kept so far.
     pub(crate) fn kept(&self) -> usize {
         self.time.len()
     }
 
-    /// Whether the whole file is to be looked through for problems.
-    pub(crate) fn is_audit(&self) -> bool {
-        self.selection.audit
-    }
-
     /// Adds a table whose rows may come and go.
-    pub(crate) fn varying_table(&mut self, name: &'static str, components: &[&str]) -> TableId {
+    pub(crate) fn varying_table<C: AsRef<str>>(
+        &mut self,
+        name: &'static str,
+        components: impl IntoIterator<Item = C>,
+    ) -> TableId {
         let id = self.table(name, components);
         self.tables[id.0].varies = true;
         id
     }
 
     /// Adds a table. `name` is for messages; `components` name its columns.
-    pub(crate) fn table(&mut self, name: &'static str, components: &[&str]) -> TableId {
-        let components: Vec<Arc<str>> = components.iter().map(|&c| c.into()).collect();
+    pub(crate) fn table<C: AsRef<str>>(
+        &mut self,
+        name: &'static str,
+        components: impl IntoIterator<Item = C>,
+    ) -> TableId {
+        let components: Vec<Arc<str>> = components.into_iter().map(|c| c.as_ref().into()).collect();
         let wanted_columns = (0..components.len())
             .filter(|&i| self.selection.wants_component(&components[i]))
             .collect();
@@ -155,7 +182,6 @@ impl<'a> StateReader<'a> {
             Some(Pending { time, cycle: None, place, damaged: false, disagrees: false, labels: 0 });
     }
 
-    /// Time of the pending state.
     pub(crate) fn pending_time(&self) -> Option<f64> {
         self.pending.as_ref().and_then(|p| p.time)
     }
@@ -164,35 +190,36 @@ impl<'a> StateReader<'a> {
         self.pending.is_some()
     }
 
-    /// Gives the pending state its cycle.
     pub(crate) fn set_cycle(&mut self, cycle: i64) {
         if let Some(pending) = &mut self.pending {
             pending.cycle = Some(cycle);
         }
     }
 
-    /// Gives the pending state its time.
     pub(crate) fn set_time(&mut self, time: f64) {
         if let Some(pending) = &mut self.pending {
             pending.time = Some(time);
         }
     }
 
-    /// Whether the pending state already has rows in this table.
     pub(crate) fn has_rows(&self, table: TableId) -> bool {
         !self.tables[table.0].filled_rows.is_empty()
     }
 
-    /// Whether the pending state already has this entity's row.
     pub(crate) fn has_row(&self, table: TableId, entity: EntityId) -> bool {
         let table = &self.tables[table.0];
         table.row_of.get(&entity).is_some_and(|&row| table.filled[row])
     }
 
+    /// Notes what is odd about a line.
+    pub(crate) fn note(&mut self, code: ProblemCode, line: &Line<'_>, message: &str) {
+        self.problems.add(code, Some(line.into()), message.into());
+    }
+
     /// Notes a line that cannot be read; the state it belongs to is not whole.
     /// After the last row of a complete state, that is the next state.
     pub(crate) fn damage(&mut self, line: &Line<'_>, columns: Option<[usize; 2]>, message: String) {
-        self.problems.add(ProblemCode::BadLine, Some(line.into()), columns, message);
+        self.problems.add_in_columns(ProblemCode::BadLine, Some(line.into()), columns, message);
         if let Some(pending) = &self.pending
             && self.sealed
             && !pending.damaged
@@ -204,7 +231,47 @@ impl<'a> StateReader<'a> {
         self.mark_damaged();
     }
 
-    /// Makes the pending state count as not whole.
+    /// Notes a line that holds something else than expected, of which it shows the first `width` columns.
+    pub(crate) fn unexpected(
+        &mut self,
+        line: &Line<'_>,
+        columns: Option<[usize; 2]>,
+        expected: &str,
+        width: usize,
+    ) {
+        let found = shown(line.columns(1, width));
+        self.damage(line, columns, format!("expected {expected}, found \"{}\"", found.trim_end()));
+    }
+
+    /// Notes a line of unknown meaning.
+    pub(crate) fn skip_line(&mut self, line: &Line<'_>) {
+        self.skipped_lines += 1;
+        let text = || shown(line.columns(1, 60)).trim().to_string();
+        self.first_skipped.get_or_insert_with(|| (line.into(), text()));
+    }
+
+    /// Reports at the end of a file which lines were skipped.
+    pub(crate) fn end_skipped_lines(&mut self) {
+        let Some((place, text)) = &self.first_skipped else { return };
+        let message = format!(
+            "{} between those of this file not read, the first \"{text}\": of another file?",
+            counted(self.skipped_lines, "line")
+        );
+        self.problems.add(ProblemCode::UnreadRows, Some(*place), message);
+    }
+
+    /// Whether the number behind a label may be that wide, where `usual` is what most files have.
+    pub(crate) fn allows_width(
+        &mut self,
+        label: &str,
+        width: usize,
+        usual: usize,
+        line: &Line<'_>,
+    ) -> bool {
+        let excess = width as isize - usual as isize;
+        self.widths.allow(label, excess, line.into(), &mut self.problems)
+    }
+
     pub(crate) fn mark_damaged(&mut self) {
         if let Some(pending) = &mut self.pending {
             pending.damaged = true;
@@ -234,19 +301,12 @@ impl<'a> StateReader<'a> {
                 if let Some(pending) = &mut self.pending {
                     pending.disagrees = true;
                 }
-                self.problems.add(
-                    ProblemCode::UnexpectedEntity,
-                    Some(line.into()),
-                    None,
-                    format!("{entity} is not among the entities of the first state"),
-                );
-                return;
+                let message = format!("{entity} is not among the entities of the first state");
+                return self.note(ProblemCode::UnexpectedEntity, line, &message);
             }
         };
         if std::mem::replace(&mut table.filled[row], true) {
-            let message = format!("{entity} appears twice in one state");
-            self.damage(line, None, message);
-            return;
+            return self.damage(line, None, format!("{entity} appears twice in one state"));
         }
         table.filled_rows.push(row);
         table.next_row = row + 1;
@@ -255,7 +315,7 @@ impl<'a> StateReader<'a> {
         }
         if self.selection.audit {
             for (from, to) in (0..table.components.len()).filter_map(&field) {
-                let (_, problem) = read_field(line.columns(from, to), line, [from, to]);
+                let (_, problem) = read_field(line, [from, to]);
                 self.problems.extend(problem.map(|p| *p));
             }
         }
@@ -265,21 +325,31 @@ impl<'a> StateReader<'a> {
             let place = field(column);
             channel.pending_seen = place.is_some();
             channel.pending = place.map_or(f64::NAN, |(from, to)| {
-                let (value, problem) = read_field(line.columns(from, to), line, [from, to]);
+                let (value, problem) = read_field(line, [from, to]);
                 self.problems.extend(problem.map(|p| *p));
                 value
             });
         }
     }
 
-    /// Stores one global quantity of the pending state.
-    pub(crate) fn scalar(
+    /// The same for a row with its time, which begins a state if it has another time than the pending one, or if
+    /// that has a row of the entity: times have few digits, so that two states can print the same one.
+    pub(crate) fn timed_row(
         &mut self,
-        component: &str,
-        bytes: &[u8],
+        table: TableId,
+        entity: EntityId,
+        time: f64,
         line: &Line<'_>,
-        columns: [usize; 2],
+        field: impl Fn(usize) -> Option<(usize, usize)>,
     ) {
+        if self.pending_time() != Some(time) || self.has_row(table, entity) {
+            self.begin(Some(time), line.into());
+        }
+        self.row(table, entity, line, field);
+    }
+
+    /// Stores one global quantity of the pending state.
+    pub(crate) fn scalar(&mut self, component: &str, line: &Line<'_>, columns: [usize; 2]) {
         let Some(pending) = &mut self.pending else { return };
         pending.labels += 1;
         // States repeat their labels in the same order: look where the last one was found.
@@ -289,13 +359,9 @@ impl<'a> StateReader<'a> {
             _ => self.scalars.iter().position(|s| &*s.component == component),
         };
         if found.is_none() && self.scalars.len() == MAX_LABELS {
-            self.problems.add(
-                ProblemCode::UnreadRows,
-                Some(line.into()),
-                None,
-                format!("{component} is left out: the file has more than {MAX_LABELS} labels"),
-            );
-            return;
+            let message =
+                format!("{component} is left out: the file has more than {MAX_LABELS} labels");
+            return self.note(ProblemCode::UnreadRows, line, &message);
         }
         let index = found.unwrap_or_else(|| {
             let kept = self.selection.wants_component(component);
@@ -309,31 +375,24 @@ impl<'a> StateReader<'a> {
             self.scalars.len() - 1
         });
         if self.scalars[index].pending.is_some() {
-            self.problems.add(
-                ProblemCode::RepeatedLabel,
-                Some(line.into()),
-                None,
-                format!("{component} appears twice in one state; its first value is kept"),
-            );
-            return;
+            let message =
+                format!("{component} appears twice in one state; its first value is kept");
+            return self.note(ProblemCode::RepeatedLabel, line, &message);
         }
-        let (value, problem) = read_field(bytes, line, columns);
+        let (value, problem) = read_field(line, columns);
         self.problems.extend(problem.map(|p| *p));
         self.scalars[index].pending = Some(value);
     }
 
-    /// The entities of a table, in order of its rows.
     pub(crate) fn rows(&self, table: TableId) -> &[EntityId] {
         &self.tables[table.0].rows
     }
 
-    /// Rows of a table of which values are kept.
     pub(crate) fn wanted_rows(&self, table: TableId) -> Vec<usize> {
         let of = &self.tables[table.0].channel_of;
         (0..of.len()).filter(|&row| of[row].is_some()).collect()
     }
 
-    /// Columns of a table of which values are kept.
     pub(crate) fn wanted_columns(&self, table: TableId) -> &[usize] {
         &self.tables[table.0].wanted_columns
     }
@@ -356,7 +415,8 @@ impl<'a> StateReader<'a> {
 
 /// The field's value; NaN and a problem where it holds no number. The problem is boxed, so that the
 /// usual result fits into registers.
-fn read_field(bytes: &[u8], line: &Line<'_>, columns: [usize; 2]) -> (f64, Option<Box<Problem>>) {
+fn read_field(line: &Line<'_>, columns: [usize; 2]) -> (f64, Option<Box<Problem>>) {
+    let bytes = line.columns(columns[0], columns[1]);
     let (code, message, value) = match real(bytes) {
         Field::Real(value) => return (value, None),
         Field::NotFinite(value) => (

@@ -3,12 +3,11 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::Collected;
 use crate::history::{EntityId, History};
-use crate::solver::Selection;
 use crate::solver::problem::{Diagnostics, Problem, ProblemCode};
+use crate::solver::{Entity, Selection, SolverFile};
 
-/// Rows of the same components.
+#[derive(Default)]
 pub(crate) struct Table {
     pub name: &'static str,
     pub components: Vec<Arc<str>>,
@@ -54,16 +53,7 @@ impl Table {
             seen_columns: vec![false; components.len()],
             components,
             wanted_columns,
-            rows: Vec::new(),
-            row_of: HashMap::new(),
-            varies: false,
-            last_row: None,
-            states_with: Vec::new(),
-            channel_of: Vec::new(),
-            channels: Vec::new(),
-            filled: Vec::new(),
-            filled_rows: Vec::new(),
-            next_row: 0,
+            ..Self::default()
         }
     }
 
@@ -75,14 +65,8 @@ impl Table {
     }
 
     pub(crate) fn forget_rows(&mut self) {
-        self.rows.clear();
-        self.row_of.clear();
-        self.channel_of.clear();
-        self.channels.clear();
-        self.states_with.clear();
-        self.filled.clear();
-        self.filled_rows.clear();
-        self.seen_columns.fill(false);
+        let (components, wanted) = (self.components.clone(), self.wanted_columns.clone());
+        *self = Self { varies: self.varies, ..Self::new(self.name, components, wanted) };
     }
 
     /// Adds a row that the first `states` kept states do not have.
@@ -125,8 +109,8 @@ impl Table {
 
 /// Histories entity by entity, each with the components of all tables in order.
 /// Columns that an entity's rows never have make no history of it.
-pub(crate) fn collect_tables(tables: Vec<Table>, collected: &mut Collected) -> Diagnostics {
-    let states = collected.time.len();
+pub(crate) fn collect_tables(tables: Vec<Table>, file: &mut SolverFile) -> Diagnostics {
+    let states = file.time.len();
     let mut problems = Diagnostics::default();
     let mut of_entity: HashMap<EntityId, Vec<History>> = HashMap::new();
     for mut table in tables.into_iter().filter(|table| !table.rows.is_empty()) {
@@ -141,7 +125,7 @@ pub(crate) fn collect_tables(tables: Vec<Table>, collected: &mut Collected) -> D
                 continue;
             }
             let histories = of_entity.entry(entity).or_insert_with(|| {
-                collected.entities.push(entity);
+                file.entities.push(Entity { id: entity, title: None });
                 Vec::new()
             });
             if table.channel_of[row].is_none() {
@@ -162,16 +146,16 @@ pub(crate) fn collect_tables(tables: Vec<Table>, collected: &mut Collected) -> D
                 histories.push(History {
                     entity: Some(entity),
                     component: component.clone(),
-                    time: collected.time.clone(),
+                    time: file.time.clone(),
                     values: channel.values,
                 });
             }
         }
         let seen = table.components.into_iter().zip(table.seen_columns);
-        collected.components.extend(seen.filter(|(_, seen)| *seen).map(|(name, _)| name));
+        file.components.extend(seen.filter(|(_, seen)| *seen).map(|(name, _)| name));
     }
-    for entity in &collected.entities {
-        collected.histories.extend(of_entity.remove(entity).into_iter().flatten());
+    for entity in &file.entities {
+        file.histories.extend(of_entity.remove(&entity.id).into_iter().flatten());
     }
     problems
 }

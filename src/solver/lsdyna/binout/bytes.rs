@@ -48,7 +48,6 @@ impl<'a> Bytes<'a> {
         Ok(kind.integers(header, &bytes))
     }
 
-    /// The first value of a record.
     pub(crate) fn first_real(&self, place: DataRecord) -> io::Result<Option<f64>> {
         let (kind, header, bytes) = self.whole(place)?;
         let mut values = Vec::new();

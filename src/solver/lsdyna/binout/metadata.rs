@@ -6,8 +6,8 @@ use std::io;
 use super::bytes::Bytes;
 use super::records::{LISTS, Section};
 use crate::history::{EntityId, Side};
+use crate::solver::source::unpadded;
 
-/// Metadata of a section.
 pub(crate) struct Metadata {
     pub title: Option<String>,
     pub version: Option<String>,
@@ -30,7 +30,7 @@ impl Metadata {
         let numbers = |key: &str| -> io::Result<Option<Vec<i64>>> {
             section.metadata.get(key).map(|&place| bytes.integers(place)).transpose()
         };
-        let plain = |bytes: Option<Vec<u8>>| bytes.and_then(|b| trimmed(&b));
+        let plain = |bytes: Option<Vec<u8>>| bytes.and_then(|b| unpadded(&b));
         let mut other_ids = Vec::new();
         if !LISTS.iter().any(|list| section.metadata.contains_key(*list)) {
             for (key, &place) in &section.metadata {
@@ -88,13 +88,6 @@ impl Metadata {
     }
 }
 
-/// A text without its padding.
-fn trimmed(bytes: &[u8]) -> Option<String> {
-    let text = String::from_utf8_lossy(bytes);
-    let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0');
-    (!text.is_empty()).then(|| text.to_string())
-}
-
 /// Titles by id: `legend` holds equally long texts, 70 or 80 bytes each.
 fn titles(ids: Option<Vec<i64>>, legend: Option<Vec<u8>>) -> HashMap<i64, String> {
     let (Some(ids), Some(legend)) = (ids, legend) else { return HashMap::new() };
@@ -103,5 +96,5 @@ fn titles(ids: Option<Vec<i64>>, legend: Option<Vec<u8>>) -> HashMap<i64, String
         return HashMap::new();
     }
     let titled = ids.iter().zip(legend.chunks(width));
-    titled.filter_map(|(&id, bytes)| Some((id, trimmed(bytes)?))).collect()
+    titled.filter_map(|(&id, bytes)| Some((id, unpadded(bytes)?))).collect()
 }

@@ -19,7 +19,6 @@
 //! value cannot be detected.
 
 mod bytes;
-mod columns;
 mod metadata;
 mod owners;
 mod records;
@@ -31,7 +30,7 @@ use std::io;
 
 use super::lsda::Header;
 use crate::plural::counted;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::problem::{Problem, ProblemCode};
 use crate::solver::source::Source;
 use crate::solver::{Selection, SolverFile};
@@ -82,15 +81,7 @@ fn unread(name: &str, records: usize) -> SolverFile {
     SolverFile {
         format: FORMAT.name,
         section: name.into(),
-        solver: None,
-        version: None,
-        title: None,
-        entities: Vec::new(),
-        without_data: Vec::new(),
-        components: Vec::new(),
-        time: [].into(),
-        histories: Vec::new(),
         problems: vec![Problem::new(ProblemCode::UnreadRows, message)],
-        notes: Vec::new(),
+        ..SolverFile::default()
     }
 }

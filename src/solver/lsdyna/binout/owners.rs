@@ -30,13 +30,13 @@ pub(super) enum Entities {
 }
 
 /// Result of the search for a component's owners.
-pub(super) enum Found {
+pub(super) enum OwnerSearch {
     /// Owners, and values of each of them: one, or one for each integration point.
-    Entities(Entities, usize),
+    Found(Entities, usize),
     /// The component has no values.
-    Nothing,
+    NoValues,
     /// Its values fit no ids.
-    Unfit(Problem),
+    NoIds(Problem),
 }
 
 impl Entities {
@@ -46,15 +46,19 @@ impl Entities {
         metadata: &Metadata,
         states: &StateReader,
         bytes: Bytes<'_>,
-    ) -> io::Result<Found> {
+    ) -> io::Result<OwnerSearch> {
         let first = states.whole.iter().find_map(|state| component.records.get(state));
         let any = first.or_else(|| component.records.values().next());
         let Some(width) = any.filter(|p| !p.payload.kind.is_text()).map(DataRecord::width) else {
-            return Ok(Found::Nothing);
+            return Ok(OwnerSearch::NoValues);
         };
         if width == 0 || is_total(&component.name) {
             let is_one = width == 1;
-            return Ok(if is_one { Found::Entities(Self::Global, 1) } else { Found::Nothing });
+            return Ok(if is_one {
+                OwnerSearch::Found(Self::Global, 1)
+            } else {
+                OwnerSearch::NoValues
+            });
         }
         if let Some(ids) = &states.ids {
             let with = (0..states.whole.len())
@@ -64,20 +68,20 @@ impl Entities {
                 let mut known = HashSet::new();
                 let each = ids.iter().flat_map(|ids| ids.iter());
                 let all = each.filter(|&&id| known.insert(id)).map(|id| EntityId::new(*id));
-                return Ok(Found::Entities(Self::OfState(all.collect()), points));
+                return Ok(OwnerSearch::Found(Self::OfState(all.collect()), points));
             }
         }
         if let Some(ids) = metadata.entities(&component.name, width) {
-            return Ok(Found::Entities(Self::Fixed(ids.into()), 1));
+            return Ok(OwnerSearch::Found(Self::Fixed(ids.into()), 1));
         }
         if width == 1 {
-            return Ok(Found::Entities(Self::Global, 1));
+            return Ok(OwnerSearch::Found(Self::Global, 1));
         }
         let message = format!(
-            "{}: {} has {width} values per state but a different number of ids; it is not read",
-            section.name, component.name
+            "{} has {width} values per state but a different number of ids; it is not read",
+            component.name
         );
-        Ok(Found::Unfit(Problem::new(ProblemCode::UnreadRows, message)))
+        Ok(OwnerSearch::NoIds(section.problem(ProblemCode::UnreadRows, &message)))
     }
 
     pub(crate) fn entities(&self) -> &[EntityId] {
@@ -141,12 +145,11 @@ impl EntityList {
             let again = rows().filter(|(row, _)| **row == limit + 1).count();
             let first = rows().find(|(row, _)| **row == limit + 1).map(|(_, id)| id.to_string());
             let message = format!(
-                "{}: {again} ids, the first {}, occur more than {} in one state; rows beyond the first {MAX_ROWS} are left out",
-                section.name,
+                "{again} ids, the first {}, occur more than {} in one state; rows beyond the first {MAX_ROWS} are left out",
                 first.unwrap_or_default(),
                 if limit == 1 { "once".to_string() } else { format!("{limit} times") },
             );
-            Problem::new(ProblemCode::RepeatedLabel, message)
+            section.problem(ProblemCode::RepeatedLabel, &message)
         });
         (Self { entities, most_rows: most_rows.min(MAX_ROWS) }, problem)
     }

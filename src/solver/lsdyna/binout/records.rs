@@ -5,7 +5,7 @@ use std::io;
 use std::sync::Arc;
 
 use super::super::lsda::{self, Event, Header, Payload, change_directory};
-use crate::solver::problem::{Diagnostics, ProblemCode};
+use crate::solver::problem::{Diagnostics, Problem, ProblemCode};
 use crate::solver::source::Source;
 
 /// Metadata that names the owners of values.
@@ -17,7 +17,6 @@ const MAX_COMPONENTS: usize = 2_000;
 const MAX_SECTIONS: usize = 1_000;
 const MAX_RECORDS: usize = 20_000_000;
 
-/// A data record of one of the containers.
 #[derive(Clone, Copy)]
 pub(super) struct DataRecord {
     pub part: usize,
@@ -34,13 +33,10 @@ pub(super) struct Tree {
     pub others: BTreeMap<String, usize>,
     index: HashMap<String, usize>,
     records: usize,
-    /// Whether sections were left out.
     is_full: bool,
-    /// Damage of the containers themselves.
     pub problems: Diagnostics,
 }
 
-/// The records of one section.
 #[derive(Default)]
 pub(super) struct Section {
     pub name: String,
@@ -57,26 +53,22 @@ pub(super) struct Section {
     pub first_repeated: Option<u64>,
     /// Records of components beyond those that are kept.
     pub left_out: usize,
-    /// Components in order of appearance.
     pub components: Vec<Component>,
     pub component_index: HashMap<String, usize>,
 }
 
-/// The records of one component.
 pub(super) struct Component {
     pub name: Arc<str>,
-    /// By state.
     pub records: HashMap<usize, DataRecord>,
 }
 
 impl Tree {
-    /// Notes all records of one container.
     pub(crate) fn walk(&mut self, part: usize, source: &dyn Source) -> io::Result<()> {
         let header = lsda::header(source)?;
         self.headers.push(header);
         let Some(header) = header else {
             let message = "this is not an LSDA container, or its header is cut";
-            self.problems.add(ProblemCode::CutRecord, None, None, message.into());
+            self.problems.add(ProblemCode::CutRecord, None, message.into());
             return Ok(());
         };
         let mut path: Vec<String> = Vec::new();
@@ -90,7 +82,7 @@ impl Tree {
                 self.records += 1;
                 if self.records == MAX_RECORDS {
                     let message = "there are too many records; those that follow are left out";
-                    self.problems.add(ProblemCode::UnreadRows, None, None, message.into());
+                    self.problems.add(ProblemCode::UnreadRows, None, message.into());
                 }
                 let is_within = self.records < MAX_RECORDS;
                 if let Some((section, state)) = here.filter(|_| is_within) {
@@ -116,7 +108,6 @@ impl Tree {
         })
     }
 
-    /// Notes damage where the walk is.
     fn damage(
         &mut self,
         here: Option<(usize, Option<usize>)>,
@@ -160,7 +151,7 @@ impl Tree {
                 if !self.is_full {
                     let message =
                         format!("{name} and what follows is left out: there are too many sections");
-                    self.problems.add(ProblemCode::UnreadRows, None, None, message);
+                    self.problems.add(ProblemCode::UnreadRows, None, message);
                 }
                 self.is_full = true;
                 return None;
@@ -182,7 +173,6 @@ fn state_number(name: &str) -> Option<u64> {
 }
 
 impl Section {
-    /// Index of the state of that directory number.
     fn state(&mut self, number: u64) -> usize {
         *self.state_index.entry(number).or_insert_with(|| {
             self.states.push(number);
@@ -227,6 +217,15 @@ impl Section {
     pub(crate) fn component(&self, name: &str) -> Option<&Component> {
         self.component_index.get(name).map(|&index| &self.components[index])
     }
+
+    /// The time of a state.
+    pub(crate) fn time_of(&self, state: usize) -> Option<&DataRecord> {
+        self.component("time")?.records.get(&state)
+    }
+
+    pub(crate) fn problem(&self, code: ProblemCode, message: &str) -> Problem {
+        Problem::new(code, format!("{}: {message}", self.name))
+    }
 }
 
 impl DataRecord {
@@ -235,7 +234,6 @@ impl DataRecord {
         (self.part, self.payload.at)
     }
 
-    /// Number of values.
     pub(crate) fn width(&self) -> usize {
         let size = self.payload.kind.size().unwrap_or(1) as u64;
         usize::try_from(self.payload.bytes / size).unwrap_or(usize::MAX)

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::bytes::Bytes;
 use super::metadata::Metadata;
-use super::owners::{Entities, EntityList, Found, row_name};
+use super::owners::{Entities, EntityList, OwnerSearch, row_name};
 use super::records::Section;
 use super::states::StateReader;
 use super::values::Series;
@@ -20,7 +20,6 @@ use crate::solver::{Entity, NoDataReason, Selection, SolverFile, WithoutData};
 /// Components of a state that are not results.
 const NOT_RESULTS: [&str; 4] = ["time", "cycle", "ids", "system"];
 
-/// Reads one section.
 pub(super) struct SectionReader<'a> {
     section: &'a Section,
     bytes: Bytes<'a>,
@@ -72,18 +71,17 @@ impl<'a> SectionReader<'a> {
             components: if self.states.whole.is_empty() { Vec::new() } else { components },
             time: self.states.time,
             histories,
-            problems: Vec::new(),
-            notes: Vec::new(),
+            ..SolverFile::default()
         };
         Ok((file, self.problems))
     }
 
     fn beyond_bound(&self) -> Option<Problem> {
-        let Section { name, left_out, .. } = self.section;
+        let left_out = self.section.left_out;
         let message = format!(
-            "{name}: there are too many components; {left_out} records of further ones are left out"
+            "there are too many components; {left_out} records of further ones are left out"
         );
-        (*left_out > 0).then(|| Problem::new(ProblemCode::UnreadRows, message))
+        (left_out > 0).then(|| self.section.problem(ProblemCode::UnreadRows, &message))
     }
 
     fn lost_ids(&self) -> Option<Problem> {
@@ -92,10 +90,9 @@ impl<'a> SectionReader<'a> {
         let named = lists.into_iter().flatten().flatten().chain(of_states);
         let lost = named.filter(|id| self.section.is_lost(**id)).count();
         let message = format!(
-            "{}: {lost} ids are zero (was the file overwritten there?); what belongs to them is left out",
-            self.section.name
+            "{lost} ids are zero (was the file overwritten there?); what belongs to them is left out"
         );
-        (lost > 0).then(|| Problem::new(ProblemCode::BadRecord, message))
+        (lost > 0).then(|| self.section.problem(ProblemCode::BadRecord, &message))
     }
 
     fn contents(&mut self) -> io::Result<Contents<'a>> {
@@ -107,9 +104,9 @@ impl<'a> SectionReader<'a> {
         for component in results {
             let found = Entities::of(section, component, &self.metadata, &self.states, self.bytes)?;
             let (owners, points) = match found {
-                Found::Entities(owners, points) => (owners, points),
-                Found::Nothing => continue,
-                Found::Unfit(problem) => {
+                OwnerSearch::Found(owners, points) => (owners, points),
+                OwnerSearch::NoValues => continue,
+                OwnerSearch::NoIds(problem) => {
                     self.problems.push(problem);
                     continue;
                 }

@@ -9,7 +9,6 @@ use super::records::{Component, DataRecord, LISTS, Section};
 use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::solver::restart;
 
-/// The complete states of a section.
 pub(super) struct StateReader {
     /// Indices of the states, in order of their numbers.
     pub whole: Vec<usize>,
@@ -55,11 +54,10 @@ impl StateReader {
         }
         let partly = states_with.values().filter(|&&n| n < ids.len()).count();
         let message = format!(
-            "{}: {partly} of {} entities are missing from some states (eroded or failed); their values there are NaN",
-            section.name,
+            "{partly} of {} entities are missing from some states (eroded or failed); their values there are NaN",
             states_with.len()
         );
-        (partly > 0).then(|| Problem::new(ProblemCode::AbsentEntity, message))
+        (partly > 0).then(|| section.problem(ProblemCode::AbsentEntity, &message))
     }
 }
 
@@ -67,23 +65,18 @@ impl StateReader {
 fn order_of(section: &Section) -> Option<Problem> {
     if section.repeated > 0 {
         let message = format!(
-            "{}: {} records occur again, the first of state d{} (a restart, or another file of the run with this section); the last ones are kept",
-            section.name,
+            "{} records occur again, the first of state d{} (a restart, or another file of the run with this section); the last ones are kept",
             section.repeated,
             section.first_repeated.unwrap_or_default()
         );
         let state = section.first_repeated.and_then(|n| section.state_index.get(&n));
         let place = state.and_then(|&state| place_of(section, state));
-        return Some(Problem::at(ProblemCode::RepeatedState, place, message));
+        return Some(section.problem(ProblemCode::RepeatedState, &message).at_place(place));
     }
-    let message = format!(
-        "{}: states are not in order of their numbers; they are returned in it",
-        section.name
-    );
-    (!section.states.is_sorted()).then(|| Problem::new(ProblemCode::TimeGoesBack, message))
+    let message = "states are not in order of their numbers; they are returned in it";
+    (!section.states.is_sorted()).then(|| section.problem(ProblemCode::TimeGoesBack, message))
 }
 
-/// States and their times.
 struct Timed {
     states: Vec<usize>,
     time: Vec<f64>,
@@ -94,13 +87,11 @@ impl Timed {
     fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<(Self, Diagnostics)> {
         let mut order: Vec<usize> = (0..section.states.len()).collect();
         order.sort_by_key(|&i| section.states[i]);
-        let times = section.component("time");
         let last = order.last().copied();
         let before = order.len().checked_sub(2).map(|k| order[k]);
         let (mut states, mut time, mut problems) = (Vec::new(), Vec::new(), Diagnostics::default());
         for state in order {
-            let record = times.and_then(|t| t.records.get(&state));
-            let value = match record {
+            let value = match section.time_of(state) {
                 Some(&place) => bytes.first_real(place)?.filter(|t| t.is_finite()),
                 None => None,
             };
@@ -123,14 +114,10 @@ impl Timed {
                     time.push(value);
                 }
                 (why, _) => {
-                    let message = format!(
-                        "{}: state d{} is left out: {}",
-                        section.name,
-                        section.states[state],
-                        why.unwrap_or_default()
-                    );
-                    let place = place_of(section, state);
-                    problems.push(Problem::at(ProblemCode::IncompleteState, place, message));
+                    let (number, why) = (section.states[state], why.unwrap_or_default());
+                    let message = format!("state d{number} is left out: {why}");
+                    let problem = section.problem(ProblemCode::IncompleteState, &message);
+                    problems.push(problem.at_place(place_of(section, state)));
                 }
             }
         }
@@ -138,27 +125,22 @@ impl Timed {
     }
 
     fn keep(&mut self, kept: &[usize]) {
-        self.time = kept.iter().map(|&i| self.time[i]).collect();
-        self.states = kept.iter().map(|&i| self.states[i]).collect();
+        restart::take(&mut self.time, kept);
+        restart::take(&mut self.states, kept);
     }
 
     /// Leaves out states that were written before a list of ids changed: their rows cannot be
     /// recognised by one id.
     fn leave_out_before(&mut self, change: (usize, u64), section: &Section) -> Option<Problem> {
-        let times = section.component("time");
-        let is_behind = |state: usize| {
-            times.and_then(|t| t.records.get(&state)).is_some_and(|t| t.order() > change)
-        };
-        let kept: Vec<usize> =
-            (0..self.states.len()).filter(|&k| is_behind(self.states[k])).collect();
+        let is_behind =
+            |k: &usize| section.time_of(self.states[*k]).is_some_and(|time| time.order() > change);
+        let kept: Vec<usize> = (0..self.states.len()).filter(is_behind).collect();
         let lost = self.states.len() - kept.len();
         self.keep(&kept);
-        let message = format!(
-            "{}: the ids change; {lost} states that were written before are left out",
-            section.name
-        );
-        let place = Some(Place::at_byte(change.1));
-        (lost > 0).then(|| Problem::at(ProblemCode::UnexpectedEntity, place, message))
+        let message =
+            format!("the ids change; {lost} states that were written before are left out");
+        let problem = section.problem(ProblemCode::UnexpectedEntity, &message);
+        (lost > 0).then(|| problem.at_place(Some(Place::at_byte(change.1))))
     }
 }
 
@@ -212,7 +194,7 @@ fn ids_by_order(
         return Ok(None);
     }
     let of = |state: &usize| {
-        let time = section.component("time").and_then(|t| t.records.get(state));
+        let time = section.time_of(*state);
         let before = |p: &DataRecord| time.is_some_and(|t| p.order() < t.order());
         let last = places.iter().rposition(before).unwrap_or(0);
         lists[last].clone()
@@ -220,7 +202,6 @@ fn ids_by_order(
     Ok(Some(whole.iter().map(of).collect()))
 }
 
-/// Ids that one state has twice.
 fn repeated_ids(section: &Section, ids: &[Ids]) -> Option<Problem> {
     let twice = |ids: &Ids| ids.len() - ids.iter().collect::<HashSet<_>>().len();
     let mut above: Option<&Ids> = None;
@@ -229,17 +210,13 @@ fn repeated_ids(section: &Section, ids: &[Ids]) -> Option<Problem> {
         !same
     });
     let twice = changed.map(twice).max().unwrap_or(0);
-    let message = format!(
-        "{}: {twice} ids occur twice in one state; the last value of each is returned",
-        section.name
-    );
-    (twice > 0).then(|| Problem::new(ProblemCode::RepeatedLabel, message))
+    let message =
+        format!("{twice} ids occur twice in one state; the last value of each is returned");
+    (twice > 0).then(|| section.problem(ProblemCode::RepeatedLabel, &message))
 }
 
-/// Where a state is in its file.
 fn place_of(section: &Section, state: usize) -> Option<Place> {
     let records = || section.components.iter().filter_map(|c| c.records.get(&state));
-    let time = section.component("time").and_then(|t| t.records.get(&state));
-    let place = time.or_else(|| records().min_by_key(|p| p.order()))?;
+    let place = section.time_of(state).or_else(|| records().min_by_key(|p| p.order()))?;
     Some(Place::at_byte(place.payload.at))
 }

@@ -1,10 +1,9 @@
 //! State of reading a deck: its contents so far, its parameters, the
 //! files that are open, and its problems.
 
-use super::card::{Card, Field};
+use super::card::Field;
 use super::contents::{Deck, DeckPlace};
-use super::keyword::{Format, Keyword};
-use super::kind::Kind;
+use super::keyword::{Keyword, Kind};
 use super::parameters::{NoNumber, Parameters};
 use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
 
@@ -13,12 +12,11 @@ pub(super) const MAX_ENTRIES: usize = 100_000;
 /// Includes read or tried; folders tried.
 pub(super) const MAX_INCLUDES: usize = 1000;
 
-/// A keyword and the content of its cards so far.
 pub(super) struct Block {
     pub kind: Kind,
     pub keyword: Keyword,
     pub place: Place,
-    pub format: Format,
+    pub width: usize,
     /// Cards read, or cards of the definition that is being read when a keyword has many.
     pub cards: usize,
     /// Numbers that a later card of the definition needs.
@@ -30,7 +28,6 @@ pub(super) struct Block {
 /// A field without a number, which a problem says.
 pub(super) struct Missing;
 
-/// The state of reading a deck.
 #[derive(Default)]
 pub(super) struct Context {
     pub deck: Deck,
@@ -46,60 +43,35 @@ pub(super) struct Context {
 }
 
 impl Context {
-    pub(crate) fn real(&mut self, card: &Card<'_>, k: usize) -> Result<Option<f64>, Missing> {
-        self.real_of(card.field(k), card.place)
-    }
-
-    pub(crate) fn integer(&mut self, card: &Card<'_>, k: usize) -> Result<Option<i64>, Missing> {
-        self.integer_of(card.field(k), card.place)
-    }
-
-    pub(crate) fn real_of(
-        &mut self,
-        field: Field<'_>,
-        place: Place,
-    ) -> Result<Option<f64>, Missing> {
+    pub(crate) fn real(&mut self, field: Field<'_>) -> Result<Option<f64>, Missing> {
         let number = self.parameters.real(field);
-        self.named(number, field, place)
+        self.found(number, field)
     }
 
-    pub(crate) fn integer_of(
-        &mut self,
-        field: Field<'_>,
-        place: Place,
-    ) -> Result<Option<i64>, Missing> {
+    pub(crate) fn integer(&mut self, field: Field<'_>) -> Result<Option<i64>, Missing> {
         let number = self.parameters.integer(field);
-        self.named(number, field, place)
+        self.found(number, field)
     }
 
-    fn named<T>(
-        &mut self,
-        number: Result<T, NoNumber>,
-        field: Field<'_>,
-        place: Place,
-    ) -> Result<T, Missing> {
-        number.map_err(|e| {
-            if let NoNumber::Bad(message) = e {
-                self.problem(ProblemCode::BadField, place, Some(field.columns), message);
+    fn found<T>(&mut self, number: Result<T, NoNumber>, field: Field<'_>) -> Result<T, Missing> {
+        number.map_err(|message| {
+            if let Some(message) = message {
+                self.bad_field(field, message);
             }
             Missing
         })
     }
 
-    pub(crate) fn required_id(&mut self, card: &Card<'_>, k: usize) -> Option<i64> {
-        self.required_id_of(card.field(k), card.place)
+    pub(crate) fn bad_field(&mut self, field: Field<'_>, message: String) {
+        self.problem(ProblemCode::BadField, field.place, Some(field.columns), message);
     }
 
-    pub(crate) fn required_id_of(&mut self, field: Field<'_>, place: Place) -> Option<i64> {
-        match self.integer_of(field, place) {
-            Ok(Some(id)) => Some(id),
-            Ok(None) => {
-                let message = "expected an id, found blanks".into();
-                self.problem(ProblemCode::BadField, place, Some(field.columns), message);
-                None
-            }
-            Err(Missing) => None,
+    pub(crate) fn required_id(&mut self, field: Field<'_>) -> Option<i64> {
+        let id = self.integer(field).ok()?;
+        if id.is_none() {
+            self.bad_field(field, "expected an id, found blanks".into());
         }
+        id
     }
 
     pub(crate) fn at(&self, place: Place) -> DeckPlace {
@@ -119,7 +91,7 @@ impl Context {
         };
         // A field beyond the end of its card has no columns.
         let columns = columns.filter(|c| c[0] > 0);
-        self.problems.add(code, Some(place), columns, message);
+        self.problems.add_in_columns(code, Some(place), columns, message);
     }
 
     /// Notes that a list had to leave out entries.

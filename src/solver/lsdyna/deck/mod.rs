@@ -5,17 +5,13 @@
 //! that are not listed here are skipped; nothing of them is kept.
 
 mod card;
+mod cards;
 pub(crate) mod contents;
 mod context;
-mod definitions;
-mod includes;
 mod keyword;
-mod kind;
-mod named;
 pub(crate) mod parameters;
 mod reader;
 mod units;
-mod velocity;
 
 use std::io::{self, BufRead};
 
@@ -44,121 +40,13 @@ pub fn parse_deck(
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::problem::ProblemCode;
-    use super::contents::{DeckInterface, DeckPlace, Scope, TitledEntity};
-    use super::parameters::Value;
+    use super::contents::Scope;
     use super::*;
-    use crate::unit::UnitSystem;
-    use proptest::prelude::*;
-
-    fn deck(text: &str) -> Deck {
-        deck_with(text, &[])
-    }
-
-    /// A deck with its included files.
-    fn deck_with(text: &str, files: &[(&str, &str)]) -> Deck {
-        let mut open = |name: &str| {
-            let (_, text) = files.iter().find(|(n, _)| *n == name)?;
-            Some(Box::new(io::Cursor::new(text.as_bytes().to_vec())) as Box<dyn BufRead>)
-        };
-        parse_deck(&mut text.as_bytes(), &mut open).unwrap()
-    }
-
-    fn messages(deck: &Deck) -> Vec<String> {
-        deck.problems.iter().map(ToString::to_string).collect()
-    }
-
-    fn named(list: &[TitledEntity]) -> Vec<(i64, Option<&str>)> {
-        list.iter().map(|n| (n.id, n.title.as_deref())).collect()
-    }
-
-    fn interfaces(list: &[DeckInterface]) -> Vec<(Option<i64>, Option<&str>)> {
-        list.iter().map(|n| (n.id, n.title.as_deref())).collect()
-    }
-
-    const CAR: &str = "\
-*KEYWORD
-*TITLE
-$#                                                                         title
-a car against a wall
-$ units: Mg mm s N MPa
-*DATABASE_NODOUT
-$#      dt    binary
-   0.00075         2
-*DATABASE_RCFORC_MOMENT
-    1.0E-4
-*DATABASE_BINARY_D3PLOT
-      0.01
-*PART
-crossbeam, left
-         5         5         1
-
-$ a blank title
-         6         5         1
-*INITIAL_VELOCITY
-         2
-
- -6944.444         0         0
-*RIGIDWALL_PLANAR_ID
-         1rigid wall
-         3         0         0         0
-    -120.5         0         0     -20.5         0         0       0.2
-*CONTACT_AUTOMATIC_SINGLE_SURFACE_ID
-         7 self contact
-         0         0         5         0
-*DATABASE_HISTORY_NODE
-    900001      5017      5145      2801      3153      3537      3889      4241
-      4593
-*DATABASE_HISTORY_NODE_ID
-       201nose, upper
-*DATABASE_HISTORY_NODE_SET
-         3         4
-*end
-*PART
-after the end
-        99
-";
-
-    #[test]
-    fn reads_what_names_and_sizes_a_run() {
-        // The blank line is a card in *PART, so it must not be one in *INITIAL_VELOCITY here.
-        let text = CAR.replace("         2\n\n -6944", "         2\n -6944");
-        let d = deck(&text);
-        assert_eq!(messages(&d), [""; 0]);
-        assert_eq!(d.title.as_deref(), Some("a car against a wall"));
-        let units = d.units.as_ref().unwrap();
-        assert_eq!(units.at, DeckPlace { line: 5, include: None });
-        assert_eq!(units.system, Some(UnitSystem::parse("t-mm-s").unwrap()));
-        let outputs: Vec<_> = d.outputs.iter().map(|o| (o.file, o.interval, o.binary)).collect();
-        assert_eq!(outputs, [("nodout", Some(0.00075), Some(2)), ("rcforc", Some(1.0e-4), None)]);
-        assert_eq!(named(&d.parts), [(5, Some("crossbeam, left")), (6, None)]);
-        assert_eq!(interfaces(&d.rigid_walls), [(Some(1), Some("rigid wall"))]);
-        assert_eq!(interfaces(&d.contacts), [(Some(7), Some("self contact"))]);
-        assert_eq!(d.history_nodes.len(), 10);
-        assert_eq!(named(&d.history_nodes)[8..], [(4593, None), (201, Some("nose, upper"))]);
-        assert_eq!(d.history_node_sets, [3, 4]);
-        let [velocity] = d.initial_velocities.as_slice() else { panic!("one velocity") };
-        assert_eq!(velocity.scope, Scope::NodeSet(2));
-        assert_eq!(velocity.velocity, Some([-6944.444, 0.0, 0.0]));
-        let speed = d.impact_speed().unwrap();
-        assert_eq!((speed.speed, speed.at.line), (6944.444, 19));
-        let crlf = deck(&text.replace('\n', "\r\n").replace("*PART", "*part  "));
-        assert_eq!(Deck { problems: vec![], ..crlf }, d);
-    }
-
-    #[test]
-    fn a_blank_line_is_a_card() {
-        // The velocity's card is blank, that is zero; the third is for exempted nodes.
-        let d = deck(CAR);
-        assert_eq!(d.initial_velocities.len(), 1);
-        assert_eq!(d.initial_velocities[0].velocity, Some([0.0; 3]));
-        assert_eq!(d.impact_speed(), None);
-    }
 
     #[test]
     fn reads_velocities_of_all_cards() {
         fn t(cards: &str, expected: &[(Scope, Option<[f64; 3]>)], speed: Option<(f64, u64)>) {
-            let d = deck(cards);
+            let d = parse_deck(&mut cards.as_bytes(), &mut |_| None).unwrap();
             let read: Vec<_> = d.initial_velocities.iter().map(|v| (v.scope, v.velocity)).collect();
             assert_eq!(read, expected, "{cards}");
             assert_eq!(d.impact_speed().map(|s| (s.speed, s.at.line)), speed, "{cards}");
@@ -168,6 +56,18 @@ after the end
             "*INITIAL_VELOCITY\n\n3.0,4.0\n",
             &[(Scope::AllNodes, Some([3., 4., 0.]))],
             Some((5., 1)),
+        );
+        t(
+            "*INITIAL_VELOCITY\n2\n-9.\n",
+            &[(Scope::NodeSet(2), Some([-9., 0., 0.]))],
+            Some((9., 1)),
+        );
+        // The velocity's card is blank, that is zero; the third is for exempted nodes.
+        t("*INITIAL_VELOCITY\n2\n\n-9.\n", &[(Scope::NodeSet(2), Some([0.0; 3]))], None);
+        t(
+            "*PARAMETER\nR speed,-10.5\n*PARAMETER_EXPRESSION\nR      two       2.0\n*INITIAL_VELOCITY\n\n-&speed,&two\n",
+            &[(Scope::AllNodes, Some([10.5, 2.0, 0.0]))],
+            Some((10.5_f64.hypot(2.0), 5)),
         );
         t("*INITIAL_VELOCITY\n2,,8\n10.\n", &[(Scope::Box(8), x10)], Some((10., 1)));
         t(
@@ -214,179 +114,5 @@ after the end
             &[(Scope::AllNodes, x10)],
             None, // so does the wall
         );
-    }
-
-    #[test]
-    fn interfaces_are_counted_when_none_has_an_id() {
-        fn t(keywords: &str, expected: &[Option<i64>]) {
-            let d = deck(keywords);
-            let ids: Vec<_> = d.contacts.iter().chain(&d.rigid_walls).map(|i| i.id).collect();
-            assert_eq!(ids, expected, "{keywords}");
-        }
-        t("*CONTACT_INTERIOR\n*CONTACT_A_B\n*CONTACT_C_D_MPP\n", &[Some(1), Some(2)]);
-        t("*CONTACT_A_ID\n7\n*CONTACT_B\n", &[Some(7), None]);
-        t("*CONTACT_A_ID_MPP\n\n*CONTACT_B\n", &[None, None]);
-        t("*CONTACT_A\n*CONTACT_2D_AUTOMATIC\n", &[None, None]);
-        t("*RIGIDWALL_PLANAR_FORCES\n*RIGIDWALL_PLANAR\n", &[Some(1), Some(2)]);
-        t("*RIGIDWALL_PLANAR\n*RIGIDWALL_GEOMETRIC_FLAT\n", &[None, None]);
-    }
-
-    #[test]
-    fn parameters_hold_below_and_in_any_case() {
-        let d = deck(
-            "*DATABASE_GLSTAT\n&dt\n*PARAMETER\nR       dt     0.001I      bin         2\n\
-             C     name      nose\nR speed,-10.5\n*PARAMETER_EXPRESSION\nR   dtplot         DT*2\n\
-             R      two       2.0\n*DATABASE_NODOUT\n       &DT      &bin\n*DATABASE_RCFORC\n\
-             &dtplot\n*DATABASE_RWFORC\n      &bin     &name\n*INITIAL_VELOCITY\n\n-&speed,&two\n",
-        );
-        let intervals: Vec<_> = d.outputs.iter().map(|o| (o.interval, o.binary)).collect();
-        assert_eq!(
-            intervals,
-            [(None, None), (Some(0.001), Some(2)), (None, None), (Some(2.0), None)]
-        );
-        assert_eq!(d.initial_velocities[0].velocity, Some([10.5, 2.0, 0.0]));
-        let value = |name: &str| &d.parameters.iter().find(|(n, _)| n == name).unwrap().1;
-        assert_eq!(*value("name"), Value::Text("nose".into()));
-        assert_eq!(*value("dtplot"), Value::Unknown);
-        assert_eq!(
-            messages(&d),
-            [
-                "line 2, columns 1-3: parameter \"dt\" is not defined above",
-                "line 8: parameter \"dtplot\" is not evaluated: it is the expression DT*2",
-                "line 15, columns 11-20: expected an integer, found \"&name\"",
-            ]
-        );
-        let twice = deck("*PARAMETER\nR a,1.\nR A,1.\nR b,1.\nR b,2.\n");
-        assert_eq!(
-            twice.parameters,
-            [("a".into(), Value::Real(1.0)), ("b".into(), Value::Unknown)]
-        );
-    }
-
-    #[test]
-    fn includes_are_read_where_they_stand() {
-        let main = "*INCLUDE_PATH\nmesh +\n/fine/\n*INCLUDE\ndt.k\nparts.k\n\ngone.k\n\
-                    *DATABASE_NODOUT\n&dt\n*INCLUDE_TRANSFORM\nx.k\n";
-        let d = deck_with(
-            main,
-            &[
-                ("dt.k", "*PARAMETER\nR dt,0.5\n*END\n*TITLE\nnever read\n"),
-                ("mesh/fine/parts.k", "*PART\nnose\n1\n*INCLUDE\nparts.k\n*PART\ntail\nx\n"),
-            ],
-        );
-        assert_eq!(d.title, None);
-        assert_eq!(d.outputs[0].interval, Some(0.5));
-        assert_eq!(d.parts[0].at, DeckPlace { line: 3, include: Some(1) });
-        let includes: Vec<_> = d.includes.iter().map(|i| (&*i.name, i.found, i.at.line)).collect();
-        assert_eq!(
-            includes,
-            [("dt.k", true, 5), ("parts.k", true, 6), ("parts.k", true, 5), ("gone.k", false, 8)]
-        );
-        assert_eq!(
-            messages(&d),
-            [
-                "line 5: include \"parts.k\" includes itself; it is not read again (in \"mesh/fine/parts.k\")",
-                "line 8, columns 1-1: expected an integer, found \"x\" (in \"mesh/fine/parts.k\")",
-                "line 8: include \"gone.k\" is missing",
-                "line 11: *INCLUDE_TRANSFORM: files included by this keyword are not read",
-            ]
-        );
-    }
-
-    #[test]
-    fn includes_end_somewhere() {
-        // Every name opens a file that includes two new names.
-        let mut open = |name: &str| {
-            let text = format!("*INCLUDE\n{name}a\n{name}b\n");
-            Some(Box::new(io::Cursor::new(text.into_bytes())) as Box<dyn BufRead>)
-        };
-        let d = parse_deck(&mut &b"*INCLUDE\nx\n"[..], &mut open).unwrap();
-        assert_eq!(d.includes.len(), 1000);
-        let messages = messages(&d);
-        let deep = "include \"xaaaaaaaaaaaaaaaa\" is more than 16 files deep; it is left out";
-        assert!(messages.iter().any(|m| m.contains(deep)), "{messages:?}");
-        assert!(messages.iter().any(|m| m == "includes beyond the first 1000 are left out"));
-    }
-
-    #[test]
-    fn reads_the_long_format() {
-        let long = "*CONTACT_TIED_ID\n                   3nose\n*DATABASE_NODOUT\n             \
-                    0.00075                   2\n*DATABASE_HISTORY_NODE -\n        11        12\n";
-        let d = deck(&format!("*KEYWORD LONG=Y\n{long}"));
-        assert_eq!(interfaces(&d.contacts), [(Some(3), Some("nose"))]);
-        assert_eq!((d.outputs[0].interval, d.outputs[0].binary), (Some(0.00075), Some(2)));
-        assert_eq!(named(&d.history_nodes), [(11, None), (12, None)]);
-        let one = deck("*DATABASE_NODOUT +\n                0.25                   2\n");
-        assert_eq!((one.outputs[0].interval, one.outputs[0].binary), (Some(0.25), Some(2)));
-    }
-
-    #[test]
-    fn units_of_the_card_stand_above_comments() {
-        let card =
-            "*CONTROL_UNITS\n$   LENGTH      TIME      MASS\n        mm       sec  mtrc_ton\n";
-        let d = deck(&format!("$ units: Mg mm s N MPa\n{card}$ units: mm-t-s\n"));
-        assert_eq!(messages(&d), [""; 0]);
-        let units = d.units.unwrap();
-        assert_eq!((&*units.text, units.at.line), ("mm sec mtrc_ton", 4));
-        assert_eq!(units.system, Some(UnitSystem::parse("mm-t-s").unwrap()));
-        let d = deck(&format!("$ units: kg mm ms\n{card}$ units: mm-t-s\n"));
-        assert_eq!(
-            messages(&d),
-            ["line 4: units \"mm sec mtrc_ton\" contradict \"kg mm ms\" of line 1"]
-        );
-        assert_eq!(d.units.unwrap().system, None);
-        assert_eq!(deck("*CONTROL_UNITS\n\n").units.unwrap().system, Some(UnitSystem::SI));
-    }
-
-    #[test]
-    fn damage_is_named_and_the_deck_goes_on() {
-        let d = deck(
-            "* \n*PART\nnose\n     x2\n*PART\ntail\n*DATABASE_NODOUT\n 1.2.3\n*CONTACT_A_ID\n\
-             *INITIAL_VELOCITY\n\n1E999\n*DATABASE_HISTORY_NODE\n1,2x,3\n*PARAMETER\nX y,1\n\
-             *INCLUDE\nname +\n",
-        );
-        assert_eq!(named(&d.history_nodes), [(1, None), (3, None)]);
-        assert_eq!(
-            messages(&d),
-            [
-                "line 1: expected a keyword, found \"* \"",
-                "line 4, columns 1-7: expected an integer, found \"x2\"",
-                "line 5: *PART: expected a card with the part's id below its title, found its end",
-                "line 8, columns 1-6: expected a real number, found \"1.2.3\"",
-                "line 9: *CONTACT_A_ID: expected a card with its id, found its end",
-                "line 12, columns 1-5: expected a real number, found \"1E999\"",
-                "line 14, columns 3-4: expected an integer, found \"2x\"",
-                "line 16, columns 1-3: expected R, I or C and a parameter's name, found \"X y\"",
-                "line 17: *INCLUDE: expected a file name that ends, found its end",
-            ]
-        );
-        assert_eq!((d.problems[3].code, d.problems[3].byte), (ProblemCode::BadField, Some(50)));
-    }
-
-    #[test]
-    fn lists_are_bounded() {
-        let mut text = String::from("*DATABASE_HISTORY_NODE\n");
-        for id in 1..=100_001 {
-            text.push_str(&format!("{id}\n"));
-        }
-        let d = deck(&text);
-        assert_eq!(d.history_nodes.len(), 100_000);
-        assert_eq!(messages(&d), ["history nodes beyond the first 100000 are left out"]);
-    }
-
-    proptest! {
-        #[test]
-        fn any_bytes_are_read(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
-            parse_deck(&mut &bytes[..], &mut |_| None).unwrap();
-        }
-
-        /// Damaged decks reach further than bytes without sense.
-        #[test]
-        fn damaged_decks_are_read(at in 0..CAR.len(), with: u8, cut in 0..CAR.len()) {
-            let mut bytes = CAR.as_bytes().to_vec();
-            bytes[at] = with;
-            bytes.truncate(cut);
-            parse_deck(&mut &bytes[..], &mut |_| None).unwrap();
-        }
     }
 }

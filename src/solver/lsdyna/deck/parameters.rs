@@ -22,14 +22,9 @@ pub enum Value {
     Unknown,
 }
 
-/// Why a field has no number.
-#[derive(Debug, PartialEq)]
-pub(super) enum NoNumber {
-    /// It names a parameter of which a problem already says that its value is not known.
-    Unknown,
-    /// What was expected and found.
-    Bad(String),
-}
+/// Why a field has no number: what was expected and found; `None` if it names a parameter of which a
+/// problem already says that its value is not known.
+pub(super) type NoNumber = Option<String>;
 
 /// Parameters in order of definition.
 #[derive(Default)]
@@ -67,27 +62,22 @@ impl Parameters {
         Defined::Kept
     }
 
-    /// The number of a field; `None` when blank.
     pub(crate) fn real(&self, field: Field<'_>) -> Result<Option<f64>, NoNumber> {
         let number = match self.named(field)? {
             Some((_, Value::Text(_))) => None,
-            Some((_, Value::Unknown)) => return Err(NoNumber::Unknown),
+            Some((_, Value::Unknown)) => return Err(None),
             Some((sign, Value::Real(value))) => Some(sign as f64 * value),
             Some((sign, Value::Integer(value))) => Some(sign as f64 * *value as f64),
             None if field.text.is_empty() => return Ok(None),
-            None => match line::free_real(field.text) {
-                line::Field::Real(value) => Some(value),
-                _ => None,
-            },
+            None => line::free_real(field.text).number(),
         };
         number.map(Some).ok_or_else(|| bad("a real number", field))
     }
 
-    /// The integer of a field; `None` when blank.
     pub(crate) fn integer(&self, field: Field<'_>) -> Result<Option<i64>, NoNumber> {
         let number = match self.named(field)? {
             Some((_, Value::Text(_) | Value::Real(_))) => None,
-            Some((_, Value::Unknown)) => return Err(NoNumber::Unknown),
+            Some((_, Value::Unknown)) => return Err(None),
             Some((sign, Value::Integer(value))) => value.checked_mul(sign),
             None if field.text.is_empty() => return Ok(None),
             None => line::integer(field.text),
@@ -105,11 +95,11 @@ impl Parameters {
         let name = start(name.trim_ascii()).to_lowercase();
         match self.places.get(&name).and_then(|&k| self.list.get(k)) {
             Some((_, value)) => Ok(Some((sign, value))),
-            None => Err(NoNumber::Bad(format!("parameter \"{name}\" is not defined above"))),
+            None => Err(Some(format!("parameter \"{name}\" is not defined above"))),
         }
     }
 }
 
 fn bad(expected: &str, field: Field<'_>) -> NoNumber {
-    NoNumber::Bad(format!("expected {expected}, found \"{}\"", start(field.text)))
+    Some(format!("expected {expected}, found \"{}\"", start(field.text)))
 }

@@ -1,16 +1,14 @@
-//! Reads a deck card by card, with includes in place.
+//! Reads a deck card by card, with includes in place: `*INCLUDE` and `*INCLUDE_PATH`.
 
 use std::cell::Cell;
 use std::io::{self, BufRead, Read};
 use std::rc::Rc;
 
-use super::super::line::{Line, Lines};
+use super::super::line::{Line, Lines, shown};
 use super::card::{Card, start, text};
-use super::contents::{Deck, DeckInterface, Scope};
-use super::context::{Block, Context};
-use super::includes::{Included, Includes, Open};
-use super::keyword::{Format, Keyword};
-use super::kind::{Kind, kind};
+use super::contents::{Deck, DeckInterface, Include, Scope};
+use super::context::{Block, Context, MAX_INCLUDES};
+use super::keyword::{Keyword, Kind, STANDARD, kind};
 use super::units;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::read_buffered;
@@ -22,11 +20,11 @@ const MAX_BYTES: u64 = 4_000_000_000;
 pub(super) fn read(source: &mut dyn BufRead, open: &mut Open<'_>) -> io::Result<Deck> {
     let left = Rc::new(Cell::new(MAX_BYTES));
     let mut reader = Reader { context: Context::default(), includes: Includes::new(open) };
-    let mut files = vec![OpenFile::new(Box::new(source), &left, Format::Standard, None)];
+    let mut files = vec![OpenFile::new(Box::new(source), &left, STANDARD, None)];
     while let Some(file) = files.last_mut() {
         let failed = match reader.read_on(file) {
-            Ok(Some(Included { source, name, place, format })) => {
-                files.push(OpenFile::new(source, &left, format, Some((name, place))));
+            Ok(Some(Included { source, name, place, width })) => {
+                files.push(OpenFile::new(source, &left, width, Some((name, place))));
                 continue;
             }
             Ok(None) => None,
@@ -47,11 +45,10 @@ pub(super) fn read(source: &mut dyn BufRead, open: &mut Open<'_>) -> io::Result<
     Ok(reader.context.finish())
 }
 
-/// A file of the deck that is being read.
 struct OpenFile<'a> {
     lines: Lines<SizeLimited<'a>>,
-    /// Default format of its cards.
-    format: Format,
+    /// Default width of the fields of its cards.
+    width: usize,
     block: Option<Block>,
     /// Its name, and where in the file below on the stack it is included; `None` for the deck
     /// itself.
@@ -62,11 +59,11 @@ impl<'a> OpenFile<'a> {
     fn new(
         source: Box<dyn BufRead + 'a>,
         left: &Rc<Cell<u64>>,
-        format: Format,
+        width: usize,
         included: Option<(String, Place)>,
     ) -> Self {
         let lines = Lines::new(SizeLimited { source, left: left.clone() });
-        Self { lines, format, block: None, included }
+        Self { lines, width, block: None, included }
     }
 }
 
@@ -121,8 +118,8 @@ impl Reader<'_, '_> {
                     if keyword.name == "END" {
                         return Ok(None);
                     }
-                    file.format = keyword.deck_format().unwrap_or(file.format);
-                    file.block = self.begin(keyword, &line, file.format);
+                    file.width = keyword.deck_width().unwrap_or(file.width);
+                    file.block = self.begin(keyword, &line, file.width);
                 }
                 _ => {
                     if let Some(block) = &mut file.block
@@ -143,7 +140,7 @@ impl Reader<'_, '_> {
         }
     }
 
-    fn begin(&mut self, keyword: Keyword, line: &Line<'_>, deck: Format) -> Option<Block> {
+    fn begin(&mut self, keyword: Keyword, line: &Line<'_>, deck: usize) -> Option<Block> {
         let kind = kind(&keyword);
         let place: Place = line.into();
         let at = self.context.at(place);
@@ -166,8 +163,8 @@ impl Reader<'_, '_> {
             }
             _ => {}
         }
-        let format = keyword.format.unwrap_or(deck);
-        Some(Block { kind, keyword, place, format, cards: 0, ids: [None; 3], text: None })
+        let width = keyword.width.unwrap_or(deck);
+        Some(Block { kind, keyword, place, width, cards: 0, ids: [None; 3], text: None })
     }
 
     /// Reads a card; `Some` if it includes a file that is there.
@@ -177,7 +174,7 @@ impl Reader<'_, '_> {
                 "expected a card, found a line of more than 4096 bytes; the rest of it is left out";
             self.context.problem(ProblemCode::BadLine, line.into(), None, message.into());
         }
-        let card = Card::new(line, block.format);
+        let card = Card::new(line, block.width);
         let first = block.cards == 0;
         block.cards += 1;
         match block.kind {
@@ -193,24 +190,21 @@ impl Reader<'_, '_> {
             Kind::VelocityGeneration => self.context.velocity_generation(block, &card),
             Kind::InertiaBody { part, velocity } => {
                 if block.cards == part + 1 {
-                    block.ids[0] = self.context.integer(&card, 0).unwrap_or(None);
+                    block.ids[0] = self.context.integer(card.field(0)).unwrap_or(None);
                 } else if block.cards == velocity + 1 {
                     self.context.velocity_of_inertia(block, &card);
                 }
             }
             Kind::Output(file) if first => self.context.output(file, block, &card),
-            Kind::HistoryNodes | Kind::HistoryNodeSets => {
-                for k in 0..card.fields().count().min(8) {
-                    self.context.history(block.kind, &card, k);
+            Kind::History { sets, on_card } => {
+                for k in 0..card.fields().count().min(on_card) {
+                    self.context.history(sets, &card, k);
                 }
             }
-            Kind::HistoryNodesLocal | Kind::HistoryNodeSetsLocal => {
-                self.context.history(block.kind, &card, 0);
-            }
-            Kind::HistoryNodesWithHeadings => self.context.history_with_heading(&card),
+            Kind::HistoryWithHeadings => self.context.history_with_heading(&card),
             Kind::Contact | Kind::Wall if first => {
                 let (field, title) = card.id_and_text();
-                let id = self.context.integer_of(field, card.place).unwrap_or(None);
+                let id = self.context.integer(field).unwrap_or(None);
                 let name = block.keyword.name.clone();
                 self.context.interface(block.kind, name, self.context.at(block.place), id, title);
             }
@@ -268,4 +262,107 @@ fn number_in_order(list: &mut [DeckInterface], kind: impl Fn(&str) -> Option<&'s
 
 fn has_id_card(keyword: &str) -> bool {
     keyword.split('_').any(|option| option == "ID" || option == "TITLE")
+}
+
+const MAX_DEPTH: usize = 16;
+/// The manual allows 236 characters; file systems allow more.
+const MAX_FILE_NAME: usize = 1024;
+
+/// Gives the bytes of an included file by its name.
+pub(super) type Open<'a> = dyn FnMut(&str) -> Option<Box<dyn BufRead>> + 'a;
+
+pub(super) struct Includes<'a, 'o> {
+    open: &'a mut Open<'o>,
+    /// Of `*INCLUDE_PATH`.
+    folders: Vec<String>,
+}
+
+pub(super) struct Included {
+    pub source: Box<dyn BufRead>,
+    pub name: String,
+    pub place: Place,
+    /// Width of fields where it is included, with which it begins.
+    pub width: usize,
+}
+
+impl<'a, 'o> Includes<'a, 'o> {
+    pub(crate) fn new(open: &'a mut Open<'o>) -> Self {
+        Self { open, folders: Vec::new() }
+    }
+
+    /// One name per card; " +" at the end of a card says that the name continues below. `Some`
+    /// for a file that is to be read before the next card.
+    pub(crate) fn file_name(
+        &mut self,
+        context: &mut Context,
+        block: &mut Block,
+        card: &Card<'_>,
+    ) -> Option<Included> {
+        let line = card.text.trim_ascii();
+        if line.is_empty() {
+            return None;
+        }
+        let (part, goes_on) = match line.strip_suffix(b" +") {
+            Some(part) => (part.trim_ascii_end(), true),
+            None => (line, false),
+        };
+        let mut name = block.text.take().unwrap_or_default();
+        name.push_str(&shown(part));
+        if name.len() > MAX_FILE_NAME {
+            let message = format!("expected a file name, found more than {MAX_FILE_NAME} bytes");
+            context.problem(ProblemCode::BadLine, card.place, None, message);
+        } else if goes_on {
+            block.text = Some(name);
+        } else if block.kind == Kind::Include {
+            return self.include(context, name, card.place, block.width);
+        } else if self.folders.len() < MAX_INCLUDES {
+            self.folders.push(name.trim_end_matches(['/', '\\']).to_string());
+        } else {
+            context.note_full("include folders");
+        }
+        None
+    }
+
+    fn include(
+        &mut self,
+        context: &mut Context,
+        name: String,
+        place: Place,
+        width: usize,
+    ) -> Option<Included> {
+        let index = context.deck.includes.len();
+        if index >= MAX_INCLUDES {
+            context.note_full("includes");
+            return None;
+        }
+        let too_deep = context.reading.len() >= MAX_DEPTH;
+        let opened = if too_deep { None } else { self.find(&name) };
+        let (at, found) = (context.at(place), opened.is_some());
+        context.deck.includes.push(Include { name: name.clone(), at, found });
+        let problem = match opened {
+            Some((path, _)) if context.reading.iter().any(|(_, open)| *open == path) => {
+                format!("include \"{name}\" includes itself; it is not read again")
+            }
+            Some((path, source)) => {
+                context.reading.push((index, path));
+                return Some(Included { source, name, place, width });
+            }
+            None if too_deep => {
+                format!("include \"{name}\" is more than {MAX_DEPTH} files deep; it is left out")
+            }
+            None => format!("include \"{name}\" is missing"),
+        };
+        context.problem(ProblemCode::UnreadRows, place, None, problem);
+        None
+    }
+
+    fn find(&mut self, name: &str) -> Option<(String, Box<dyn BufRead>)> {
+        if let Some(source) = (self.open)(name) {
+            return Some((name.into(), source));
+        }
+        self.folders.iter().find_map(|folder| {
+            let path = format!("{folder}/{name}");
+            (self.open)(&path).map(|source| (path, source))
+        })
+    }
 }

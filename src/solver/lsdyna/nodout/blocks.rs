@@ -13,10 +13,9 @@ use super::Nodout;
 use super::rows::Wanted;
 use super::stride::Stride;
 use crate::history::EntityId;
-use crate::solver::lsdyna::ascii::AsciiReader;
+use crate::solver::lsdyna::ascii::{AsciiReader, Body};
 use crate::solver::problem;
 use crate::solver::source::{Source, Window};
-use crate::solver::states::TableId;
 use crate::solver::{Selection, SolverFile};
 
 /// Values below which reading state by state saves nothing.
@@ -47,7 +46,7 @@ impl Blocks {
     /// `None` if the file is damaged, has too few states to show their layout, or too few
     /// values to be worth it: then the line reader gives what there is.
     pub(crate) fn open(source: Box<dyn Source>, selection: &Selection) -> io::Result<Option<Self>> {
-        let mut frame = AsciiReader::new(&super::FORMAT, &*source, selection);
+        let mut frame = AsciiReader::new::<Nodout>(&super::FORMAT, &*source, selection);
         let mut body = Nodout::default();
         let mut above = None;
         let start = loop {
@@ -62,16 +61,16 @@ impl Blocks {
         };
         frame.states.close(false);
         body.announced = None;
-        let Some(tables) = body.tables.filter(|_| frame.states.kept() == 1) else {
+        if frame.states.kept() != 1 {
             return Ok(None);
-        };
-        let learnt = Stride::learn(&*source, start.0, start.1, &frame.states, tables)?;
+        }
+        let learnt = Stride::learn(&*source, start.0, start.1, &frame.states)?;
         let Some(stride) = learnt else { return Ok(None) };
         let wanted = stride.wanted_by_column(&frame.states);
         let rows: Vec<Vec<EntityId>> = (0..wanted.len())
             .map(|k| {
                 let all = frame.states.rows(stride.table(k));
-                wanted[k].rows().iter().map(|&row| all[row]).collect()
+                wanted[k].rows.iter().map(|&row| all[row]).collect()
             })
             .collect();
         let start = start.0.byte;
@@ -83,7 +82,7 @@ impl Blocks {
         }
         let times = times(&*source, &stride, start, count)?;
         let mut file = frame.finish(&mut body);
-        let ends_there = size <= start + count as u64 * stride.period();
+        let ends_there = size <= start + count as u64 * stride.period;
         let rising = times.as_ref().is_some_and(|t| t.is_sorted_by(|a, b| a < b));
         let (Some(times), true) = (times, ends_there && rising && file.problems.is_empty()) else {
             return Ok(None);
@@ -93,9 +92,9 @@ impl Blocks {
         file.histories.clear();
         let mut columns: Vec<(usize, Column)> = Vec::new();
         for ((k, wanted), rows) in wanted.iter().enumerate().zip(&rows) {
-            let components = body.components(stride.table(k));
-            for (i, &column) in wanted.columns().iter().enumerate() {
-                let first = wanted.range().start + i * rows.len();
+            let (_, components) = Nodout::TABLES[stride.table(k).0];
+            for (i, &column) in wanted.columns.iter().enumerate() {
+                let first = wanted.start + i * rows.len();
                 let component = components[column].to_string();
                 columns.push((first, Column { component, entities: rows.clone() }));
             }
@@ -117,7 +116,7 @@ impl Blocks {
 
     /// Reads one state into `out`, column by column; false if it is damaged.
     pub fn read(&self, window: &mut Window<'_>, state: usize, out: &mut [f64]) -> io::Result<bool> {
-        let at = self.start + state as u64 * self.stride.period();
+        let at = self.start + state as u64 * self.stride.period;
         let found = self.stride.state(window, at, &self.wanted, false, out)?;
         Ok(found.map(|(_, time)| time) == Some(self.file.time[state]))
     }
@@ -136,19 +135,10 @@ fn times(
         .map_init(
             || Window::new(source),
             |window, k| {
-                let at = start + k as u64 * stride.period();
+                let at = start + k as u64 * stride.period;
                 let found = stride.state(window, at, &nothing, false, &mut [])?;
                 Ok(found.map(|(_, time)| time))
             },
         )
         .collect()
-}
-
-impl Nodout {
-    fn components(&self, table: TableId) -> &'static [&'static str] {
-        match self.tables {
-            Some([translations, _]) if translations == table => &super::TRANSLATIONS,
-            _ => &super::ROTATIONS,
-        }
-    }
 }

@@ -2,10 +2,7 @@
 //!
 //! A state is a translational block and, where nodes have rotations, a rotational block
 //! under its own state line with the same cycle and time. The column line shows
-//! which block it is.
-//!
-//! The column line distinguishes translations from rotations. A block joins the pending state if it has the same cycle and
-//! time. Ends of fields are counted from the right, because l2a pushes rows with wide ids to the right. `nodout`
+//! which block it is. Ends of fields are counted from the right, because l2a pushes rows with wide ids to the right. `nodout`
 //! writes the cycle of a state, so states of one time are only repeated if the cycle does not increase.
 
 pub(crate) mod blocks;
@@ -15,10 +12,9 @@ mod stride;
 use std::io;
 
 use super::ascii::{self, Body};
-use super::label_values::Widths;
-use super::line::{Field, Line, integer, real, shown};
+use super::line::{Line, integer, real, shown};
 use crate::history::EntityId;
-use crate::solver::format::Format;
+use crate::solver::Format;
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
 use crate::solver::states::{StateReader, TableId};
@@ -63,40 +59,32 @@ const FIELD_WIDTH: usize = 12;
 /// Digits, point and exponent of a time.
 const TIME: usize = 13;
 
-fn signature(line: &[u8]) -> bool {
-    line.starts_with(STATE)
-}
-
 pub(crate) const FORMAT: Format =
-    Format::text("nodout", "node", signature, ascii::read_default::<Nodout>);
+    Format::text("nodout", "node", |line| line.starts_with(STATE), ascii::read::<Nodout>);
+
+/// Tables of both blocks.
+const TABLES: [TableId; 2] = [TableId(0), TableId(1)];
 
 #[derive(Default)]
 struct Nodout {
-    tables: Option<[TableId; 2]>,
     /// Cycle and time of the state line above, until its column line comes.
     announced: Option<(i64, f64, Place)>,
     cycle: Option<i64>,
-    block: Option<Block>,
+    /// The table that the rows belong to, inside a block.
+    block: Option<TableId>,
     /// Where the pending state and the announced one begin, if the latter is a new state.
     pending_start: Option<Place>,
     new_start: Option<Place>,
     /// How states are laid out, from the last one that was read line by line.
     stride: Option<Stride>,
-    widths: Widths,
-}
-
-#[derive(Clone, Copy)]
-struct Block {
-    table: TableId,
-    fields: usize,
 }
 
 impl Body for Nodout {
-    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
-        if line.is_blank() {
-            // The blank line between state line and column line ends nothing.
-            self.block = None;
-        } else if line.text.starts_with(STATE) {
+    const TABLES: ascii::Tables =
+        &[("translational rows", &TRANSLATIONS), ("rotational rows", &ROTATIONS)];
+
+    fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
+        if line.text.starts_with(STATE) {
             self.block = None;
             self.announced = self.state_line(line, states);
             self.note_start(states);
@@ -106,13 +94,14 @@ impl Body for Nodout {
             row(block, line, states);
         } else {
             self.unfinished(line, states);
-            let found = shown(line.columns(1, 60));
-            states.damage(
-                line,
-                None,
-                format!("expected a state line, found \"{}\"", found.trim_end()),
-            );
+            states.unexpected(line, None, "a state line", 60);
         }
+        Some(())
+    }
+
+    /// The blank line between state line and column line ends nothing.
+    fn blank(&mut self, _: &mut StateReader<'_>) {
+        self.block = None;
     }
 
     fn unfinished(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) {
@@ -139,11 +128,10 @@ impl Body for Nodout {
         states.close(false);
         // A state that was left out shows no layout, but an earlier one may have.
         let above = above.filter(|_| states.kept() > kept);
-        let tables = self.tables.unwrap_or_default();
         for known in [true, false] {
             if !known {
                 let Some(above) = above else { break };
-                self.stride = Stride::learn(source, above, start, states, tables)?;
+                self.stride = Stride::learn(source, above, start, states)?;
             }
             let Some(stride) = &self.stride else { continue };
             if let Some(end) = stride.leap(source, start, states)? {
@@ -155,7 +143,7 @@ impl Body for Nodout {
         Ok(None)
     }
 
-    fn end(&mut self, _: Place, states: &mut StateReader<'_>) {
+    fn end(&mut self, states: &mut StateReader<'_>) {
         // A state line without the rows it announces.
         if self.continue_announced(states) {
             states.mark_damaged();
@@ -180,18 +168,15 @@ impl Nodout {
         states: &mut StateReader<'_>,
     ) -> Option<(i64, f64, Place)> {
         let parsed = cycle_and_time(line.text).filter(|_| {
-            let text = super::at_time(line.text).unwrap_or_default();
-            super::printed_time(text, TIME, &mut self.widths, line, states).is_some()
+            super::heading_time(super::at_time(line.text), TIME, line, states).is_some()
         });
         let parsed = parsed.map(|(cycle, time)| (cycle, time, line.into()));
         if parsed.is_none() {
             // Without its time the block cannot be placed: what was pending ends here.
             states.begin(None, line.into());
-            states.damage(
-                line,
-                Some([STATE.len() + 1, line.text.len()]),
-                "expected a cycle number and \"( at time … )\"".into(),
-            );
+            let columns = [STATE.len() + 1, line.text.len()];
+            let message = "expected a cycle number and \"( at time … )\"";
+            states.damage(line, Some(columns), message.into());
         }
         parsed
     }
@@ -208,19 +193,13 @@ impl Nodout {
         true
     }
 
-    fn column_line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<Block> {
-        let [translations, rotations] = *self.tables.get_or_insert_with(|| {
-            [
-                states.table("translational rows", &TRANSLATIONS),
-                states.table("rotational rows", &ROTATIONS),
-            ]
-        });
+    fn column_line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<TableId> {
         let heading = &line.text[COLUMN_LINE.len()..];
         let starts = |name: &[u8]| heading.trim_ascii_start().starts_with(name);
-        let block = if starts(b"x-disp") {
-            Block { table: translations, fields: TRANSLATIONS.len() }
+        let table = if starts(b"x-disp") {
+            TABLES[0]
         } else if starts(b"x-rot") {
-            Block { table: rotations, fields: ROTATIONS.len() }
+            TABLES[1]
         } else {
             if self.continue_announced(states) {
                 states.mark_damaged();
@@ -230,12 +209,12 @@ impl Nodout {
         };
         let (cycle, time, place) = self.announced?;
         self.continue_announced(states);
-        if states.has_rows(block.table) {
+        if states.has_rows(table) {
             // A second block of the same kind: a state of its own, at the same time.
             states.begin(Some(time), place);
             states.set_cycle(cycle);
         }
-        Some(block)
+        Some(table)
     }
 }
 
@@ -246,34 +225,27 @@ fn cycle_and_time(line: &[u8]) -> Option<(i64, f64)> {
     let at = memchr::memmem::find(rest, AT)?;
     let close = memchr::memchr(b')', rest)?;
     let cycle = integer(&rest[..at])?;
-    match real(rest.get(at + AT.len()..close)?) {
-        Field::Real(time) if rest[close + 1..].trim_ascii().is_empty() => Some((cycle, time)),
-        _ => None,
-    }
+    let time = real(rest.get(at + AT.len()..close)?).number()?;
+    rest[close + 1..].trim_ascii().is_empty().then_some((cycle, time))
 }
 
 /// One node. Ids of more than nine digits push l2a's rows to the right, so the first
 /// field begins where the id ends; a row of any other width is damaged or cut.
-fn row(block: Block, line: &Line<'_>, states: &mut StateReader<'_>) {
+fn row(table: TableId, line: &Line<'_>, states: &mut StateReader<'_>) {
     let text = line.text.trim_ascii_end();
     let id_end = id_end(text);
     let first = id_end.max(ID_WIDTH - 1) + 1;
-    let width = first + block.fields * FIELD_WIDTH;
-    let id = integer(&text[..id_end]);
-    let (Some(id), true) = (id, text.len() == width) else {
-        states.damage(
-            line,
-            Some([1, width]),
-            format!(
-                "expected a node id and {} numbers in {width} columns, found {} columns, \"{}\"",
-                block.fields,
-                text.len(),
-                shown(line.columns(1, 40)).trim_end()
-            ),
+    let fields = Nodout::TABLES[table.0].1.len();
+    let width = first + fields * FIELD_WIDTH;
+    let Some(id) = integer(&text[..id_end]).filter(|_| text.len() == width) else {
+        let message = format!(
+            "expected a node id and {fields} numbers in {width} columns, found {} columns, \"{}\"",
+            text.len(),
+            shown(line.columns(1, 40)).trim_end()
         );
-        return;
+        return states.damage(line, Some([1, width]), message);
     };
-    states.row(block.table, EntityId::new(id), line, |k| {
+    states.row(table, EntityId::new(id), line, |k| {
         let from = first + k * FIELD_WIDTH;
         Some((from + 1, from + FIELD_WIDTH))
     });

@@ -7,7 +7,7 @@ use std::ops::Range;
 use super::{FIELD_WIDTH, cycle_and_time, id_end};
 use crate::history::EntityId;
 use crate::solver::lsdyna::e12;
-use crate::solver::lsdyna::line::{Field, integer, real};
+use crate::solver::lsdyna::line::{integer, real};
 use crate::solver::source::Window;
 use crate::solver::states::TableId;
 
@@ -36,6 +36,7 @@ pub(crate) struct Block {
 }
 
 /// What is wanted of a block.
+#[derive(Default)]
 pub(crate) struct Wanted {
     pub rows: Vec<usize>,
     pub columns: Vec<usize>,
@@ -49,18 +50,6 @@ pub(crate) struct Wanted {
 impl Wanted {
     pub(crate) fn values(&self) -> usize {
         self.rows.len() * self.columns.len()
-    }
-
-    pub(crate) fn rows(&self) -> &[usize] {
-        &self.rows
-    }
-
-    pub(crate) fn columns(&self) -> &[usize] {
-        &self.columns
-    }
-
-    pub(crate) fn range(&self) -> Range<usize> {
-        self.start..self.start + self.values()
     }
 
     /// Whether enough pages of the block are wanted to read it as a whole.
@@ -125,10 +114,7 @@ impl Block {
     fn field(&self, row: &[u8], column: usize) -> Option<f64> {
         let from = self.first + column * FIELD_WIDTH;
         let field: &[u8; FIELD_WIDTH] = row.get(from..from + FIELD_WIDTH)?.try_into().ok()?;
-        e12::parse(field).or_else(|| match real(field) {
-            Field::Real(value) => Some(value),
-            _ => None,
-        })
+        e12::parse(field).or_else(|| real(field).number())
     }
 
     fn store(&self, row: &[u8], k: usize, wanted: &Wanted, out: &mut [f64]) -> Option<()> {

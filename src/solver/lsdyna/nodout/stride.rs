@@ -4,20 +4,16 @@
 //! Every state with the same nodes has the same number of bytes. The text around its
 //! rows (blank lines, state line, column line) must equal the state above but for cycle and
 //! time, and the id columns of the first and last row of each block must equal theirs; where
-//! all rows are read, those of all rows. At the first irregularity the line reader continues.
-//!
-//! The layout is learned from a state that was read by lines. Of each further state this module verifies the state
-//! line, the column lines, the blank lines, and the ids of the first and last row (of all rows where all are read);
-//! then it takes the selected rows. Batches of states are parsed in parallel and passed on in order. At the first
-//! irregularity the line reader takes that state, and skipping continues after it. `tests/stride.rs` compares both ways
-//! on intact and on damaged files.
+//! all rows are read, those of all rows. Batches of states are parsed in parallel and passed on in
+//! order. At the first irregularity the line reader takes that state, and skipping continues after it.
+//! `tests/stride.rs` compares both ways on intact and on damaged files.
 
 use std::io;
 
 use rayon::prelude::*;
 
 use super::rows::{Block, DENSE_READ, Wanted};
-use super::{COLUMN_LINE, ROTATIONS, STATE, TRANSLATIONS};
+use super::{COLUMN_LINE, ROTATIONS, STATE, TABLES, TRANSLATIONS};
 use crate::solver::lsdyna::line::Lines;
 use crate::solver::problem::Place;
 use crate::solver::source::{Source, Stream, Window};
@@ -34,7 +30,7 @@ type ReadState = ((i64, f64), Vec<f64>);
 pub(crate) struct Stride {
     blocks: Vec<Block>,
     /// Bytes and lines from one state to the next.
-    period: u64,
+    pub period: u64,
     lines: u64,
     /// Blank lines after the last row.
     tail: Vec<u8>,
@@ -48,7 +44,6 @@ fn blocks(
     source: &dyn Source,
     from: Place,
     to: Place,
-    tables: [TableId; 2],
 ) -> io::Result<Option<(Vec<Block>, Vec<u8>)>> {
     let mut lines = Lines::new(Stream::new(source));
     lines.go_to(from);
@@ -86,7 +81,7 @@ fn blocks(
             let rotations = memchr::memmem::find(&head, b" x-rot").is_some();
             let fields = if rotations { ROTATIONS.len() } else { TRANSLATIONS.len() };
             let (head, line) = (std::mem::take(&mut head), std::mem::take(&mut state_line));
-            let table = tables[usize::from(rotations)];
+            let table = TABLES[usize::from(rotations)];
             blocks.push(Block::below(head, line, table, end - from.byte, fields));
         }
     }
@@ -100,19 +95,18 @@ impl Stride {
         from: Place,
         to: Place,
         states: &StateReader<'_>,
-        tables: [TableId; 2],
     ) -> io::Result<Option<Self>> {
-        let Some((blocks, tail)) = blocks(source, from, to, tables)? else { return Ok(None) };
+        let Some((blocks, tail)) = blocks(source, from, to)? else { return Ok(None) };
         let (period, lines) = (to.byte - from.byte, to.line - from.line);
         let mut stride = Self { blocks, period, lines, tail, wanted: Vec::new() };
         stride.wanted = stride.wanted(states);
-        Ok(stride.fits(states, tables).then_some(stride))
+        Ok(stride.fits(states).then_some(stride))
     }
 
     /// Whether the blocks hold the rows of the tables, in their order.
-    fn fits(&self, states: &StateReader<'_>, tables: [TableId; 2]) -> bool {
+    fn fits(&self, states: &StateReader<'_>) -> bool {
         let is_once = |table| self.blocks.iter().filter(|b| b.table == table).count() <= 1;
-        tables.into_iter().all(|table| {
+        TABLES.into_iter().all(|table| {
             let block = self.blocks.iter().find(|b| b.table == table);
             let ids = block.into_iter().flat_map(Block::entities);
             is_once(table) && ids.eq(states.rows(table).iter().map(|&e| Some(e)))
@@ -128,7 +122,7 @@ impl Stride {
         states: &mut StateReader<'_>,
     ) -> io::Result<Option<Place>> {
         let wanted = &self.wanted;
-        let audit = states.is_audit();
+        let audit = states.selection.audit;
         let values = wanted.iter().map(Wanted::values).sum::<usize>();
         let largest = (BATCH_VALUES / values.max(1)).clamp(2, MAX_BATCH);
         // Grows while states are read without surprise, so that little work is lost at one.
@@ -181,10 +175,6 @@ impl Stride {
         }
     }
 
-    pub(crate) fn period(&self) -> u64 {
-        self.period
-    }
-
     /// What the states keep of each block, in their order of values.
     fn wanted(&self, states: &StateReader<'_>) -> Vec<Wanted> {
         let mut wanted: Vec<Wanted> = self
@@ -218,14 +208,7 @@ impl Stride {
 
     /// No value of any block.
     pub(crate) fn nothing(&self) -> Vec<Wanted> {
-        let none = || Wanted {
-            rows: Vec::new(),
-            columns: Vec::new(),
-            start: 0,
-            row_step: 0,
-            column_step: 0,
-        };
-        self.blocks.iter().map(|_| none()).collect()
+        self.blocks.iter().map(|_| Wanted::default()).collect()
     }
 
     pub(crate) fn table(&self, block: usize) -> TableId {
