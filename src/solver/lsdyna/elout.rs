@@ -335,7 +335,7 @@ impl Elout {
     }
 }
 
-/// First and last column of the `k`-th number of a width behind the column `from`.
+/// First and last column of the `k`-th number of a width after the column `from`.
 fn column(from: usize, k: usize, width: usize) -> (usize, usize) {
     (from + k * width + 1, from + (k + 1) * width)
 }

@@ -10,7 +10,7 @@ use crate::solver::problem::ProblemCode;
 use crate::solver::{SolverFile, restart};
 
 impl StateReader<'_> {
-    /// Ends the pending state; keeps it if it is whole.
+    /// Ends the pending state; keeps it if it is complete.
     pub(crate) fn close(&mut self, at_end: bool) {
         let Some(pending) = self.pending.take() else { return };
         match (pending.time, self.missing(&pending, at_end)) {
@@ -56,7 +56,7 @@ impl StateReader<'_> {
         }
     }
 
-    /// What a pending state lacks to be whole.
+    /// What a pending state lacks to be complete.
     pub(super) fn missing(&self, pending: &Pending, at_end: bool) -> Option<String> {
         for table in &self.tables {
             let (have, want) = (table.filled_rows.len(), table.rows.len());

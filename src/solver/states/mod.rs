@@ -61,7 +61,7 @@ pub(crate) struct StateReader<'a> {
     pub skip: usize,
     /// States left out because their rows are not those of the first complete state.
     disagreeing: usize,
-    /// Whether a state without rows is whole.
+    /// Whether a state without rows is complete.
     pub allow_empty_states: bool,
     /// Values that the kept states have and lack, selected or not.
     present_cells: usize,
@@ -75,7 +75,7 @@ pub(crate) struct StateReader<'a> {
     /// Lines of unknown meaning between those that are read, and the first of them.
     skipped_lines: usize,
     first_skipped: Option<(Place, String)>,
-    /// The entity that the lines are of, where one has several; none behind a damaged line.
+    /// The entity that the lines are of, where one has several; none after a damaged line.
     pub entity: Option<EntityId>,
     /// Contacts that the file declares to have no resultants.
     pub single_surfaces: Vec<i64>,
@@ -260,7 +260,7 @@ impl<'a> StateReader<'a> {
         self.problems.add(ProblemCode::UnreadRows, Some(*place), message);
     }
 
-    /// Whether the number behind a label may be that wide, where `usual` is what most files have.
+    /// Whether the number after a label may be that wide, where `usual` is what most files have.
     pub(crate) fn allows_width(
         &mut self,
         label: &str,
