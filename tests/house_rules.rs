@@ -87,6 +87,7 @@ const MAY_NAME: [(&str, &[&str]); 36] = [
             "curve",
             "signal",
             "history",
+            "file",
             "unit",
         ],
     ),
@@ -318,7 +319,7 @@ fn no_unwrap_outside_tests() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 75939), ("files", 360), ("public types", 240), ("error types", 11)];
+    [("lines", 74786), ("files", 360), ("public types", 238), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {

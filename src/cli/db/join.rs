@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crate::curate::{self, Effect, Joined, OnConflict, Target};
+use crate::curate::{self, Joined, OnConflict};
 use crate::database::CasePath;
 use serde::Serialize;
 
@@ -33,10 +33,6 @@ impl How {
             _ => OnConflict::Refuse,
         }
     }
-
-    fn effect(&self) -> Effect {
-        if self.dry_run { Effect::DryRun } else { Effect::Written }
-    }
 }
 
 /// Databases, and where they are joined.
@@ -54,7 +50,7 @@ pub(super) struct MergeArgs {
 
 pub(super) fn merge(args: &MergeArgs, options: GlobalOptions) -> CommandResult {
     let joined =
-        curate::merge(&args.databases, &args.output, args.how.on_conflict(), args.how.effect())?;
+        curate::merge(&args.databases, &args.output, args.how.on_conflict(), args.how.dry_run)?;
     report(&joined, &args.output, args.how.dry_run, options)
 }
 
@@ -82,9 +78,9 @@ pub(super) fn copy(args: &CopyArgs, options: GlobalOptions) -> CommandResult {
         ));
     }
     let selection = args.chosen.some("copied")?;
-    let target = Target { database: args.to.clone(), group: args.to_group.clone() };
-    let (on_conflict, effect) = (args.how.on_conflict(), args.how.effect());
-    let joined = curate::copy(&args.database, &selection, &target, on_conflict, effect)?;
+    let target = (args.to.as_deref(), args.to_group.as_deref());
+    let (on_conflict, dry_run) = (args.how.on_conflict(), args.how.dry_run);
+    let joined = curate::copy(&args.database, &selection, target, on_conflict, dry_run)?;
     let output = args.to.as_deref().unwrap_or(&args.database);
     report(&joined, output, args.how.dry_run, options)
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::curate::{self, Effect};
+use crate::curate;
 use serde::Serialize;
 
 use super::chosen::Chosen;
@@ -38,8 +38,7 @@ struct Named {
 
 pub(super) fn remove(args: &RemoveArgs, options: GlobalOptions) -> CommandResult {
     let selection = args.chosen.some("removed")?;
-    let effect = if args.dry_run { Effect::DryRun } else { Effect::Written };
-    let cases = curate::remove(&args.database, &selection, effect)?;
+    let cases = curate::remove(&args.database, &selection, args.dry_run)?;
     let database = args.database.display().to_string();
     if options.json {
         let removed =
