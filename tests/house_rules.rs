@@ -88,6 +88,7 @@ const MAY_NAME: [(&str, &[&str]); 37] = [
             "curve",
             "signal",
             "history",
+            "file",
             "unit",
         ],
     ),

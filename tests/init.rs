@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use crumple::curve::Case;
 use crumple::database::Database;
-use crumple::init::{Request, UserHints, propose};
+use crumple::init::{UserHints, propose};
 use serde_json::Value;
 use toml::Table;
 
@@ -959,11 +959,7 @@ fn damaged_files_give_a_study_or_a_reason() {
         random = random.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (random >> 33) as usize % most
     };
-    let request = Request {
-        folders: vec![run.clone()],
-        study: folder.path().join("study.toml"),
-        given: UserHints::default(),
-    };
+    let (study, hints) = (folder.path().join("study.toml"), UserHints::default());
     let (mut studies, mut reasons) = (0, 0);
     for k in 0..if is_thorough() { 2_000 } else { 150 } {
         copy_run(&source, &run, TEXTS);
@@ -982,7 +978,7 @@ fn damaged_files_give_a_study_or_a_reason() {
             }),
         }
         fs::write(&path, bytes).unwrap();
-        match propose(&request, |_| {}) {
+        match propose(&[run.clone()], &study, &hints, |_| {}) {
             Ok(proposal) => {
                 studies += 1;
                 proposal.to_toml().parse::<Table>().unwrap();

@@ -13,9 +13,8 @@ use crate::database::{CasePath, Database};
 use crate::error::{Error, ErrorCode, error};
 use crate::file::{WriterLock, is_file};
 use crate::study::{self, LocatedRun, Study};
-use previous::{Named, Previous};
+use previous::Previous;
 
-/// Problems that a message repeats.
 const LISTED: usize = 3;
 
 fn listed(problems: &[String]) -> String {
@@ -102,7 +101,10 @@ pub fn build(
     let mut database = if is_there { Database::read_as_it_is(path)? } else { Database::default() };
     let located: Vec<Result<LocatedRun<'_>, Error>> =
         study.runs().par_iter().map(|entry| study.locate(entry)).collect();
-    let previous = previous(&study, &located, &database);
+    let hash = |run: &Result<LocatedRun<'_>, _>| run.as_ref().ok()?.source_hash();
+    let runs = study.runs().iter().map(|entry| entry.case_name());
+    let runs = runs.zip(located.iter().map(hash)).collect();
+    let previous = Previous::find(&study, &runs, &database);
     // A case that somebody has changed since is made again.
     let unaltered = database.all().filter(|c| !database.is_altered(&c.id.group, &c.id.name));
     let fingerprints: HashMap<CasePath, &str> =
@@ -151,23 +153,6 @@ pub fn build(
     })
 }
 
-/// The study's cases as the database has them.
-fn previous(
-    study: &Study,
-    located: &[Result<LocatedRun<'_>, Error>],
-    database: &Database,
-) -> Previous {
-    let source_hash = |run: &Result<LocatedRun<'_>, _>| run.as_ref().ok()?.source_hash();
-    let runs = study.runs().iter().zip(located);
-    let named = Named {
-        study: study.name(),
-        group: study.group(),
-        manifest: &study.path(),
-        runs: runs.map(|(entry, run)| (entry.case_name(), source_hash(run))).collect(),
-    };
-    named.previous(database)
-}
-
 /// The run's case, or `None` if its fingerprint is the one it had before.
 fn case(
     study: &Study,
@@ -208,7 +193,6 @@ fn move_along(
     Ok(moves.into_iter().collect())
 }
 
-/// Puts the cases that were built into the database.
 fn put(
     database: &mut Database,
     study: &Study,

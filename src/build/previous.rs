@@ -19,18 +19,7 @@ use crate::curve::Case;
 use crate::curve::from_table::IMPORTED;
 use crate::database::{CasePath, Database};
 use crate::file;
-
-/// A study as its cases know it.
-pub(super) struct Named<'a> {
-    /// Name of the study.
-    pub study: &'a str,
-    /// Its group.
-    pub group: &'a str,
-    /// Path of its manifest from the root on.
-    pub manifest: &'a str,
-    /// Names of its runs, each with what its case is made of if its files were found.
-    pub runs: Vec<(String, Option<String>)>,
-}
+use crate::study::Study;
 
 /// The cases of a study as a database has them.
 #[derive(Default)]
@@ -44,21 +33,24 @@ pub(super) struct Previous {
     pub earlier: BTreeSet<String>,
 }
 
-impl Named<'_> {
-    /// Finds the study's cases.
-    pub(super) fn previous(&self, database: &Database) -> Previous {
+/// Names of a study's runs, each with the hash of what its case is made of if its files were found.
+pub(super) type RunHashes = Vec<(String, Option<String>)>;
+
+impl Previous {
+    pub(super) fn find(study: &Study, runs: &RunHashes, database: &Database) -> Self {
         let built: Vec<&Case> = database.all().filter(|case| case.id.study != IMPORTED).collect();
-        let is_own = |case: &&&Case| case.id.study == self.study && group_of(case) == self.group;
+        let is_own =
+            |case: &&&Case| case.id.study == study.name() && group_of(case) == study.group();
         let mut cases: Vec<&Case> = built.iter().filter(is_own).copied().collect();
         if cases.is_empty() {
-            cases = self.renamed(&built);
+            cases = renamed(study, runs, &built);
         }
-        let names: HashSet<&str> = self.runs.iter().map(|(name, _)| name.as_str()).collect();
-        let mut previous = Previous::default();
+        let names: HashSet<&str> = runs.iter().map(|(name, _)| name.as_str()).collect();
+        let mut previous = Self::default();
         let mut without: Vec<&Case> = Vec::new();
         for case in cases {
             if names.contains(run_of(case)) {
-                let (run, place) = (run_of(case), self.place(case, run_of(case)));
+                let (run, place) = (run_of(case), place(study, case, run_of(case)));
                 // Of several, as after a merge, the one of the run's own name.
                 if case.id.name == run || !previous.of_run.contains_key(run) {
                     previous.of_run.insert(run.into(), (CasePath::of(case), place));
@@ -72,22 +64,21 @@ impl Named<'_> {
         for case in without {
             source_hash.entry(case.source_hash()).or_default().push(case);
         }
-        for (name, made) in &self.runs {
+        for (name, made) in runs {
             if previous.of_run.contains_key(name) || made.is_none() {
                 continue;
             }
             if let Some(case) = source_hash.get_mut(made).and_then(Vec::pop) {
-                let place = (CasePath::of(case), self.place(case, name));
+                let place = (CasePath::of(case), place(study, case, name));
                 previous.of_run.insert(name.clone(), place);
             }
         }
         if previous.of_run.is_empty() {
+            let manifest = study.path();
             let is_ours = |case: &&&Case| {
-                case.provenance
-                    .origin
-                    .as_ref()
-                    .is_some_and(|origin| origin.manifest == self.manifest)
-                    && case.id.group != self.group
+                let origin = case.provenance.origin.as_ref();
+                origin.is_some_and(|origin| origin.manifest == manifest)
+                    && case.id.group != study.group()
             };
             previous.earlier = built.iter().filter(is_ours).map(|c| c.id.group.clone()).collect();
         }
@@ -95,41 +86,41 @@ impl Named<'_> {
         previous.left.sort();
         previous
     }
+}
 
-    /// The cases that this study had under another name or in another group.
-    fn renamed<'a>(&self, built: &[&'a Case]) -> Vec<&'a Case> {
-        let ours: HashSet<&String> =
-            self.runs.iter().filter_map(|(_, source_hash)| source_hash.as_ref()).collect();
-        // Of one study and group, so that two under one path are both kept.
-        let mut found: BTreeMap<(&str, &str, &str), Vec<&Case>> = BTreeMap::new();
-        for &case in built {
-            if let Some(origin) = &case.provenance.origin {
-                let key = (&*case.id.study, &*origin.group, &*origin.manifest);
-                found.entry(key).or_default().push(case);
-            }
+/// The cases that this study had under another name or in another group.
+fn renamed<'a>(study: &Study, runs: &RunHashes, built: &[&'a Case]) -> Vec<&'a Case> {
+    let ours: HashSet<&String> = runs.iter().filter_map(|(_, hash)| hash.as_ref()).collect();
+    // Of one study and group, so that two under one path are both kept.
+    let mut found: BTreeMap<(&str, &str, &str), Vec<&Case>> = BTreeMap::new();
+    for &case in built {
+        if let Some(origin) = &case.provenance.origin {
+            let key = (&*case.id.study, &*origin.group, &*origin.manifest);
+            found.entry(key).or_default().push(case);
         }
-        found.retain(|(_, _, manifest), _| {
-            let (then, now) = (Path::new(manifest), Path::new(self.manifest));
-            then == now || then.try_exists().is_ok_and(|is| !is) || file::is_same(then, now)
-        });
-        let same = |cases: &[&Case]| {
-            let source_hash = cases.iter().filter_map(|case| case.source_hash());
-            source_hash.filter(|source_hash| ours.contains(source_hash)).count()
-        };
-        let counted = found.into_values().map(|cases| (same(&cases), cases));
-        let most = counted.filter(|(same, _)| *same > 0).max_by_key(|(same, _)| *same);
-        most.map(|(_, cases)| cases).unwrap_or_default()
     }
+    let manifest = study.path();
+    found.retain(|(_, _, then), _| {
+        let (then, now) = (Path::new(then), Path::new(&manifest));
+        then == now || then.try_exists().is_ok_and(|is| !is) || file::is_same(then, now)
+    });
+    let same = |cases: &[&Case]| {
+        let hashes = cases.iter().filter_map(|case| case.source_hash());
+        hashes.filter(|hash| ours.contains(hash)).count()
+    };
+    let counted = found.into_values().map(|cases| (same(&cases), cases));
+    let most = counted.filter(|(same, _)| *same > 0).max_by_key(|(same, _)| *same);
+    most.map(|(_, cases)| cases).unwrap_or_default()
+}
 
-    /// Where a case belongs that is of the run of this name.
-    fn place(&self, case: &Case, run: &str) -> CasePath {
-        let now = |then: &str, said: &str, is: &String| {
-            if then == said { is.clone() } else { said.into() }
-        };
-        CasePath {
-            group: now(group_of(case), self.group, &case.id.group),
-            name: now(run_of(case), run, &case.id.name),
-        }
+/// Where a case belongs that is of the run of this name.
+fn place(study: &Study, case: &Case, run: &str) -> CasePath {
+    let now = |then: &str, wanted: &str, is: &String| {
+        if then == wanted { is.clone() } else { wanted.into() }
+    };
+    CasePath {
+        group: now(group_of(case), study.group(), &case.id.group),
+        name: now(run_of(case), run, &case.id.name),
     }
 }
 

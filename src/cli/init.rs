@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use crate::file::write_whole;
-use crate::init::{self, GivenForce, Proposal, Proposed, Request, UserHints};
+use crate::init::{self, GivenForce, Proposal, Proposed, UserHints};
 use crate::plural::counted;
 use crate::study::StudyKind;
 use crate::table::Table;
@@ -108,24 +108,21 @@ fn study(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
     let known = &args.given;
     let folders =
         if args.inputs.is_empty() { vec![PathBuf::from(".")] } else { args.inputs.clone() };
-    let request = Request {
-        folders,
-        study: if is_stdout(output) { "study.toml".into() } else { output.into() },
-        given: UserHints {
-            units: known.units,
-            kind: known.kind,
-            half_model: known.half_model,
-            node: known.node,
-            minus_node: known.minus_node,
-            force: known.force.clone(),
-            mass_kg: known.mass,
-            other_mass_kg: known.other_mass,
-            group: known.group.clone(),
-        },
+    let place = if is_stdout(output) { Path::new("study.toml") } else { output };
+    let hints = UserHints {
+        units: known.units,
+        kind: known.kind,
+        half_model: known.half_model,
+        node: known.node,
+        minus_node: known.minus_node,
+        force: known.force.clone(),
+        mass_kg: known.mass,
+        other_mass_kg: known.other_mass,
+        group: known.group.clone(),
     };
     let bar = Bar::new(options, "examining runs");
     let done = AtomicUsize::new(0);
-    let proposal = init::propose(&request, |name| {
+    let proposal = init::propose(&folders, place, &hints, |name| {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         bar.step(&format!("{done} runs examined, last {name}"));
     })?;
@@ -204,7 +201,7 @@ fn chosen(proposal: &Proposal) -> [(&'static str, String, &'static str); 7] {
         shown: impl Fn(&T) -> String,
     ) -> (&'static str, String, &'static str) {
         match proposed {
-            Proposed::Found { value, evidence } => (key, shown(value), evidence.word()),
+            Proposed::Found { value, evidence, .. } => (key, shown(value), evidence.word()),
             Proposed::Missing { .. } => (key, "?".into(), "fill in"),
         }
     }

@@ -8,47 +8,31 @@ use crate::dataset::grid;
 use crate::signal::l1_ratio;
 use crate::unit::SpeedKind;
 
-/// Cases side by side.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Comparison {
-    /// The case that the others are compared with.
     pub reference: String,
-    /// One entry per case, the reference first.
     pub cases: Vec<Difference>,
 }
 
 /// One case, and its differences from the reference; those of values are shares of the reference's.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Difference {
-    /// Group of the case.
     pub group: String,
-    /// Name of the case.
     pub case: String,
-    /// Impact speed, in m/s.
     pub speed_m_per_s: f64,
-    /// What it is measured against.
     pub speed_kind: SpeedKind,
-    /// Which force the curve is.
     pub force_kind: ForceKind,
-    /// Mass of the body, in kg.
     pub mass_kg: f64,
-    /// Maximum deflection, in m.
     pub max_deflection_m: f64,
     /// ∫F dd up to it, in J.
     #[serde(rename = "work_J")]
     pub work_j: f64,
-    /// Peak force, in N.
     #[serde(rename = "peak_force_N")]
     pub peak_force_n: f64,
-    /// Difference of the speed.
     pub speed_difference: f64,
-    /// Difference of the mass.
     pub mass_difference: f64,
-    /// Difference of the maximum deflection.
     pub max_deflection_difference: f64,
-    /// Difference of the work.
     pub work_difference: f64,
-    /// Difference of the peak force.
     pub peak_force_difference: f64,
     /// Deflection up to which both have a loading branch, in m.
     pub common_deflection_m: f64,
@@ -60,7 +44,6 @@ pub(crate) struct Difference {
 /// Steps of the common deflection at least.
 const STEPS: usize = 400;
 
-/// Compares cases with the first of them.
 pub(crate) fn compare(cases: &[&Case]) -> Result<Option<Comparison>, Error> {
     let Some(first) = cases.first() else { return Ok(None) };
     let reference = first.loading()?.envelope;

@@ -3,8 +3,9 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use super::Selection;
+use super::labels::merge_labels;
 use super::names::check;
-use super::{Effect, Selection, write};
 use crate::curve::Case;
 use crate::database::{self, CasePath, Database};
 use crate::error::{Error, error};
@@ -40,22 +41,13 @@ pub(crate) struct Joined {
     pub not_taken: Vec<(PathBuf, String)>,
 }
 
-/// Where cases are copied to.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Target {
-    /// Another database, which is created if it does not exist; the cases' own if absent.
-    pub database: Option<PathBuf>,
-    /// Their group there; their own if absent.
-    pub group: Option<String>,
-}
-
 /// Joins the databases at `inputs`, in their order, into the file at `output`, which is one of them
 /// and then comes first, or does not exist yet. Equal curves of a group are taken once, with the tags and notes of both.
 pub(crate) fn merge(
     inputs: &[PathBuf],
     output: &Path,
     on_conflict: OnConflict,
-    effect: Effect,
+    dry_run: bool,
 ) -> Result<Joined, Error> {
     let _lock = WriterLock::take(output)?;
     let is_input = inputs.iter().any(|input| is_same(input, output));
@@ -77,77 +69,68 @@ pub(crate) fn merge(
         let foreign = database::foreign_items(input)?;
         join.joined.not_taken.extend(foreign.map(|items| (input.clone(), items)));
         let cases = Database::read(input)?.into_cases();
-        join.take(input, cases.into_iter().map(|(case, hashes)| Incoming::of(case, hashes)))?;
+        let incoming = cases.into_iter().map(|(case, altered)| {
+            let from = CasePath::of(&case);
+            (case, from, altered)
+        });
+        join.take(input, incoming)?;
     }
-    write(&join.database, output, effect)?;
-    Ok(join.joined)
+    join.written(output, dry_run)
 }
 
-/// Copies the chosen cases of the database at `path`. A copy in another group is no longer its
-/// study's: building that leaves it as it is.
+/// Copies the chosen cases of the database at `path` into another, which is created if it does not exist, or
+/// into another group, or both. A copy in another group is no longer its study's: building that leaves
+/// it as it is.
 pub(crate) fn copy(
     path: &Path,
     selection: &Selection,
-    target: &Target,
+    (to, to_group): (Option<&Path>, Option<&str>),
     on_conflict: OnConflict,
-    effect: Effect,
+    dry_run: bool,
 ) -> Result<Joined, Error> {
-    if let Some(group) = &target.group {
+    if let Some(group) = to_group {
         check("group", group)?;
     }
-    let output = target.database.as_deref().unwrap_or(path);
+    let output = to.unwrap_or(path);
     let _lock = WriterLock::take(output)?;
     let source = Database::read(path)?;
     let chosen = selection.find(path, &source)?;
     let chosen: HashSet<CasePath> = chosen.into_iter().map(CasePath::of).collect();
-    let is_itself = target.database.is_none() || is_same(path, output);
+    let is_itself = to.is_none_or(|output| is_same(path, output));
     let there = match (is_itself, is_there(output)?) {
         (true, _) => source.clone(),
         (false, true) => Database::read(output)?,
         (false, false) => Database::default(),
     };
     let mut incoming = Vec::new();
-    for (case, hashes) in source.into_cases() {
-        if !chosen.contains(&CasePath::of(&case)) {
+    for (mut case, altered) in source.into_cases() {
+        let from = CasePath::of(&case);
+        if !chosen.contains(&from) {
             continue;
         }
-        let mut new = Incoming::of(case, hashes);
-        if let Some(group) = target.group.as_ref().filter(|group| **group != new.case.id.group) {
-            new.case.id.group.clone_from(group);
-            new.case.provenance.origin = None;
+        if let Some(group) = to_group.filter(|group| *group != case.id.group) {
+            case.id.group = group.into();
+            case.provenance.origin = None;
         } else if is_itself {
-            let case = new.from;
             return Err(error!(
                 Database,
-                "the copy of {case} would be {case} itself: choose another group (--to-group) or database (--to)"
+                "the copy of {from} would be {from} itself: choose another group (--to-group) or database (--to)"
             ));
         }
-        incoming.push(new);
+        incoming.push((case, from, altered));
     }
     let mut join = Join::new(there, on_conflict);
     join.take(path, incoming)?;
     if let Some(items) = database::foreign_items(path)? {
         join.joined.not_taken.push((path.into(), items));
     }
-    write(&join.database, output, effect)?;
-    Ok(join.joined)
+    join.written(output, dry_run)
 }
 
-/// A case that is to be joined.
-struct Incoming {
-    case: Case,
-    from: CasePath,
-    /// The hashes that it was written with if somebody has changed it since.
-    altered: Option<BTreeMap<String, String>>,
-}
+/// A case that is to be joined, where it was, and the hashes that it was written with if somebody has
+/// changed it since.
+type Incoming = (Case, CasePath, Option<BTreeMap<String, String>>);
 
-impl Incoming {
-    fn of(case: Case, altered: Option<BTreeMap<String, String>>) -> Self {
-        Self { from: CasePath::of(&case), case, altered }
-    }
-}
-
-/// A database that others are joined to.
 struct Join {
     database: Database,
     on_conflict: OnConflict,
@@ -159,7 +142,6 @@ impl Join {
         Self { database, on_conflict, joined: Joined::default() }
     }
 
-    /// Takes the cases of one database.
     fn take(
         &mut self,
         path: &Path,
@@ -175,7 +157,7 @@ impl Join {
             .collect::<Result<_, Error>>()?;
         let mut names: HashSet<CasePath> = self.database.all().map(CasePath::of).collect();
         let (mut conflicts, mut doubles, mut new) = (Vec::new(), HashMap::new(), Vec::new());
-        for Incoming { mut case, from, altered } in incoming {
+        for (mut case, from, altered) in incoming {
             if let Some(there) =
                 records.get(&(case.id.group.clone(), database::record_hash(&case)?))
             {
@@ -214,27 +196,25 @@ impl Join {
         Ok(())
     }
 
-    /// Whether a case is of the kinds of its group.
     fn check_kinds(&self, path: &Path, case: &Case) -> Result<(), Error> {
         let replaces = |other: &&Case| {
             other.id.name == case.id.name && self.on_conflict == OnConflict::Replace
         };
         let mut there = self.database.cases(&case.id.group).iter().filter(|c| !replaces(c));
         let Some(other) = there.next() else { return Ok(()) };
-        let kinds = [
-            ("speed", case.conditions.speed.kind.name(), other.conditions.speed.kind.name()),
-            ("force", case.curves.force_kind.name(), other.curves.force_kind.name()),
-        ];
-        match kinds.into_iter().find(|(_, found, expected)| found != expected) {
-            None => Ok(()),
-            Some((what, found, expected)) => {
-                let (path, case, there) = (path.display(), CasePath::of(case), CasePath::of(other));
-                Err(error!(
-                    Database,
-                    "{path}: {case} has a {found} {what}, {there} a {expected} {what}: no model can be trained on both: use another group"
-                ))
-            }
+        let Some((what, found, expected)) = case.other_kind(other) else { return Ok(()) };
+        let (path, case, there) = (path.display(), CasePath::of(case), CasePath::of(other));
+        Err(error!(
+            Database,
+            "{path}: {case} has a {found} {what}, {there} a {expected} {what}: no model can be trained on both: use another group"
+        ))
+    }
+
+    fn written(self, output: &Path, dry_run: bool) -> Result<Joined, Error> {
+        if !dry_run {
+            self.database.write(output)?;
         }
+        Ok(self.joined)
     }
 }
 
@@ -245,16 +225,4 @@ fn free_name(path: &CasePath, taken: &HashSet<CasePath>) -> String {
     // One of as many as there are names, and one more, is free.
     let free = (2..taken.len() + 3).map(numbered).find(|name| !taken.contains(name));
     free.map_or_else(|| path.name.clone(), |free| free.name)
-}
-
-/// Gives a case the tags and notes of its double.
-fn merge_labels(case: &mut Case, tags: Vec<String>, notes: Vec<String>) {
-    case.provenance.tags.extend(tags);
-    case.provenance.tags.sort();
-    case.provenance.tags.dedup();
-    for note in notes {
-        if !case.provenance.user_notes.contains(&note) {
-            case.provenance.user_notes.push(note);
-        }
-    }
 }

@@ -4,7 +4,7 @@ use crate::error::{Error, error};
 use std::collections::{BTreeSet, HashSet};
 use std::path::Path;
 
-use super::{Effect, Selection, write};
+use super::Selection;
 use crate::curve::Case;
 use crate::database::{CasePath, Database};
 use crate::file::WriterLock;
@@ -12,17 +12,12 @@ use crate::file::WriterLock;
 /// What is added to cases and taken from them.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Labels {
-    /// Tags that they get.
     pub add_tags: Vec<String>,
-    /// Tags that they lose.
     pub remove_tags: Vec<String>,
-    /// Whether they lose all tags that they have.
     pub clear_tags: bool,
     /// Notes that they get, after those that they have.
     pub add_notes: Vec<String>,
-    /// Notes that they lose.
     pub remove_notes: Vec<String>,
-    /// Whether they lose all notes that they have.
     pub clear_notes: bool,
 }
 
@@ -30,7 +25,6 @@ pub(crate) struct Labels {
 const MAX_TAG: usize = 100;
 const MAX_NOTE: usize = 10_000;
 
-/// The error of a text that cannot be a tag or note.
 fn refused(what: &str, text: &str, why: &str) -> Error {
     let text: String = text.chars().take(MAX_TAG).collect();
     error!(Database, "\"{}\" is not a {what}: {why}", text.escape_debug())
@@ -67,13 +61,11 @@ impl Labels {
 
     /// Whether every tag and note that is to be taken away is that of a case.
     fn check_removed(&self, path: &Path, cases: &[&Case]) -> Result<(), Error> {
-        type Texts = fn(&Case) -> &Vec<String>;
-        let of_tags: (&'static str, &[String], Texts) =
-            ("tag", &self.remove_tags, |c| &c.provenance.tags);
-        let of_notes: (&'static str, &[String], Texts) =
-            ("note", &self.remove_notes, |c| &c.provenance.user_notes);
-        for (what, removed, texts) in [of_tags, of_notes] {
-            let there: BTreeSet<&String> = cases.iter().flat_map(|case| texts(case)).collect();
+        let tags = cases.iter().flat_map(|case| &case.provenance.tags).collect();
+        let notes = cases.iter().flat_map(|case| &case.provenance.user_notes).collect();
+        let all: [(_, _, BTreeSet<&String>); 2] =
+            [("tag", &self.remove_tags, tags), ("note", &self.remove_notes, notes)];
+        for (what, removed, there) in all {
             if let Some(text) = removed.iter().find(|text| !there.contains(text)) {
                 let known: Vec<String> = there.iter().map(|text| format!("\"{text}\"")).collect();
                 let known = if known.is_empty() { "none".into() } else { known.join(", ") };
@@ -89,16 +81,22 @@ impl Labels {
 
     fn apply(&self, case: &mut Case) {
         case.provenance.tags.retain(|tag| !self.clear_tags && !self.remove_tags.contains(tag));
-        case.provenance.tags.extend(self.add_tags.iter().cloned());
-        case.provenance.tags.sort();
-        case.provenance.tags.dedup();
         case.provenance
             .user_notes
             .retain(|note| !self.clear_notes && !self.remove_notes.contains(note));
-        for note in &self.add_notes {
-            if !case.provenance.user_notes.contains(note) {
-                case.provenance.user_notes.push(note.clone());
-            }
+        merge_labels(case, self.add_tags.clone(), self.add_notes.clone());
+    }
+}
+
+/// Gives a case further tags and notes, each once.
+pub(super) fn merge_labels(case: &mut Case, tags: Vec<String>, notes: Vec<String>) {
+    let own = &mut case.provenance;
+    own.tags.extend(tags);
+    own.tags.sort();
+    own.tags.dedup();
+    for note in notes {
+        if !own.user_notes.contains(&note) {
+            own.user_notes.push(note);
         }
     }
 }
@@ -119,14 +117,14 @@ pub(crate) fn label(
     let (mut changed, mut cases) = (false, Vec::new());
     database.change(|case| {
         if chosen.contains(&CasePath::of(case)) {
-            let before = (case.provenance.tags.clone(), case.provenance.user_notes.clone());
+            let before = case.provenance.clone();
             labels.apply(case);
-            changed |= before != (case.provenance.tags.clone(), case.provenance.user_notes.clone());
+            changed |= before != case.provenance;
             cases.push(case.clone());
         }
     });
     if changed {
-        write(&database, path, Effect::Written)?;
+        database.write(path)?;
     }
     Ok(cases)
 }

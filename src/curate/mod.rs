@@ -12,38 +12,9 @@ mod names;
 mod selection;
 mod tables;
 
-use crate::error::Error;
-use std::path::Path;
-
-use crate::database::Database;
-pub(crate) use compare::Difference;
-pub(crate) use compare::compare;
-pub(crate) use join::Joined;
-pub(crate) use join::OnConflict;
-pub(crate) use join::Target;
-pub(crate) use join::copy;
-pub(crate) use join::merge;
-pub(crate) use labels::Labels;
-pub(crate) use labels::label;
-pub(crate) use names::remove;
-pub(crate) use names::rename_case;
-pub(crate) use names::rename_group;
-pub(crate) use selection::Selection;
-pub(crate) use selection::SpeedRange;
-pub(crate) use tables::Tables;
+pub(crate) use compare::{Difference, compare};
+pub(crate) use join::{Joined, OnConflict, copy, merge};
+pub(crate) use labels::{Labels, label};
+pub(crate) use names::{remove, rename_case, rename_group};
+pub(crate) use selection::{Selection, SpeedRange};
 pub(crate) use tables::write_tables;
-
-/// Whether a database is changed, or only the changes are reported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Effect {
-    Written,
-    DryRun,
-}
-
-/// Writes a database, unless this is a dry run.
-fn write(database: &Database, path: &Path, effect: Effect) -> Result<(), Error> {
-    match effect {
-        Effect::Written => Ok(database.write(path)?),
-        Effect::DryRun => Ok(()),
-    }
-}

@@ -4,22 +4,24 @@ use crate::error::{Error, error};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::{Effect, Selection, write};
+use super::Selection;
 use crate::curve::Case;
 use crate::database::{CasePath, Database, names};
 use crate::file::WriterLock;
 
-/// Removes the chosen cases from the database at `path`; returns them.
+/// Removes the chosen cases from the database at `path`, unless it is a `dry_run`; returns them.
 pub(crate) fn remove(
     path: &Path,
     selection: &Selection,
-    effect: Effect,
+    dry_run: bool,
 ) -> Result<Vec<Case>, Error> {
     let _lock = WriterLock::take(path)?;
     let mut database = Database::read_as_it_is(path)?;
     let chosen: Vec<Case> = selection.find(path, &database)?.into_iter().cloned().collect();
     database.remove(&chosen.iter().map(CasePath::of).collect());
-    write(&database, path, effect)?;
+    if !dry_run {
+        database.write(path)?;
+    }
     Ok(chosen)
 }
 
@@ -68,7 +70,6 @@ pub(crate) fn rename_group(path: &Path, group: &str, name: &str) -> Result<Vec<C
     Ok(moves.into_values().collect())
 }
 
-/// Whether a group or case may have this name.
 pub(super) fn check(what: &'static str, name: &str) -> Result<(), Error> {
     names::check(name).map_err(|why| {
         let name = names::shown(name);

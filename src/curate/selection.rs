@@ -17,7 +17,6 @@ pub(crate) struct Selection {
     pub groups: Vec<String>,
     /// Names of cases, or `GROUP/NAME`; all if empty.
     pub cases: Vec<String>,
-    /// Impact speeds.
     pub speed: Option<SpeedRange>,
     /// Cases that have one of these; all if empty.
     pub tags: Vec<String>,
@@ -81,7 +80,6 @@ impl SpeedRange {
     }
 }
 
-/// Cases that a message lists.
 const LISTED: usize = 20;
 
 impl Selection {

@@ -10,22 +10,14 @@ use crate::curve::body::body_force_n;
 use crate::curve::{Case, Parameter};
 use crate::file::{not_written, write_at};
 
-/// Which tables are written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Tables {
-    /// `cases.csv` and `curves.csv`, the curves at their common interval.
-    Sampled,
-    /// Also `originals.csv`, the curves at the solver's rate.
-    WithOriginals,
-}
-
 /// Writes the tables of cases into the folder at `path`, which is created if it does not exist; returns
-/// their paths. Numbers have as many digits as they need to be read back the same; what a case
+/// their paths: `cases.csv` and `curves.csv`, the curves at their common interval, and with `originals`
+/// those at the solver's rate. Numbers have as many digits as they need to be read back the same; what a case
 /// does not have is empty.
 pub(crate) fn write_tables(
     cases: &[&Case],
     path: &Path,
-    tables: Tables,
+    originals: bool,
 ) -> Result<Vec<PathBuf>, Error> {
     std::fs::create_dir_all(path).map_err(|e| not_written(path, e))?;
     let mut written = Vec::new();
@@ -42,59 +34,37 @@ pub(crate) fn write_tables(
     };
     table("cases.csv", &|out| write_cases(out, cases))?;
     table("curves.csv", &|out| write_sampled(out, cases))?;
-    if tables == Tables::WithOriginals {
+    if originals {
         table("originals.csv", &|out| write_originals(out, cases))?;
     }
     Ok(written)
 }
 
-/// Columns of every case; its parameters follow, each as `parameter_NAME`.
-const COLUMNS: [&str; 25] = [
-    "group",
-    "case",
-    "study",
-    "speed_m_per_s",
-    "speed_kind",
-    "mass_kg",
-    "other_mass_kg",
-    "force_kind",
-    "max_deflection_m",
-    "peak_force_N",
-    "work_J",
-    "kinetic_energy_J",
-    "work_over_energy",
-    "unloading_stiffness_N_per_m",
-    "truncated",
-    "contact_time_s",
-    "solver_wall_time_s",
-    "states",
-    "tags",
-    "user_notes",
-    "warnings",
-    "sources",
-    "solver",
-    "built_utc",
-    "fingerprint",
-];
-
 fn write_cases(out: &mut dyn Write, cases: &[&Case]) -> io::Result<()> {
     let parameters: BTreeSet<&String> =
         cases.iter().flat_map(|c| c.conditions.parameters.keys()).collect();
     let mut table = csv::Writer::from_writer(out);
-    let named = parameters.iter().map(|name| format!("parameter_{name}"));
-    table.write_record(COLUMNS.iter().map(ToString::to_string).chain(named))?;
-    for case in cases {
-        let values = parameters.iter().map(|name| match case.conditions.parameters.get(*name) {
-            Some(Parameter::Number(number)) => shown(*number),
-            Some(Parameter::Category(category)) => category.clone(),
-            None => String::new(),
-        });
-        table.write_record(row(case).into_iter().chain(values))?;
+    for (k, case) in cases.iter().enumerate() {
+        let (mut names, mut values): (Vec<String>, Vec<String>) =
+            columns(case).into_iter().map(|(name, value)| (name.to_string(), value)).unzip();
+        for name in &parameters {
+            names.push(format!("parameter_{name}"));
+            values.push(match case.conditions.parameters.get(*name) {
+                Some(Parameter::Number(number)) => shown(*number),
+                Some(Parameter::Category(category)) => category.clone(),
+                None => String::new(),
+            });
+        }
+        if k == 0 {
+            table.write_record(names)?;
+        }
+        table.write_record(values)?;
     }
     table.flush()
 }
 
-fn row(case: &Case) -> [String; COLUMNS.len()] {
+/// Columns of every case; its parameters follow.
+fn columns(case: &Case) -> [(&'static str, String); 25] {
     let optional = |value: Option<f64>| value.map_or(String::new(), shown);
     let sources =
         case.provenance.sources.iter().map(|s| s.absolute_path.clone().unwrap_or(s.path.clone()));
@@ -102,31 +72,31 @@ fn row(case: &Case) -> [String; COLUMNS.len()] {
         Some([source.solver.as_deref()?, source.version.as_deref().unwrap_or("")].join(" "))
     });
     [
-        case.id.group.clone(),
-        case.id.name.clone(),
-        case.id.study.clone(),
-        shown(case.conditions.speed.m_per_s),
-        case.conditions.speed.kind.name().into(),
-        shown(case.conditions.masses.body_kg),
-        optional(case.conditions.masses.other_kg),
-        case.curves.force_kind.name().into(),
-        shown(case.max_deflection_m()),
-        shown(case.peak_force_n()),
-        shown(case.quality.audit.work_j),
-        shown(case.quality.audit.kinetic_j),
-        shown(case.quality.audit.ratio()),
-        optional(case.curves.unloading_stiffness_n_per_m),
-        case.is_truncated().to_string(),
-        shown(case.curves.contact_time_s),
-        optional(case.provenance.solver_wall_time_s),
-        case.curves.sampled.time_s().len().to_string(),
-        case.provenance.tags.join(";"),
-        case.provenance.user_notes.join("\n"),
-        case.quality.warnings.join("\n"),
-        sources.collect::<Vec<_>>().join(";"),
-        solver.map(|s| s.trim().into()).unwrap_or_default(),
-        case.provenance.built_utc.clone().unwrap_or_default(),
-        case.provenance.fingerprint.clone(),
+        ("group", case.id.group.clone()),
+        ("case", case.id.name.clone()),
+        ("study", case.id.study.clone()),
+        ("speed_m_per_s", shown(case.conditions.speed.m_per_s)),
+        ("speed_kind", case.conditions.speed.kind.name().into()),
+        ("mass_kg", shown(case.conditions.masses.body_kg)),
+        ("other_mass_kg", optional(case.conditions.masses.other_kg)),
+        ("force_kind", case.curves.force_kind.name().into()),
+        ("max_deflection_m", shown(case.max_deflection_m())),
+        ("peak_force_N", shown(case.peak_force_n())),
+        ("work_J", shown(case.quality.audit.work_j)),
+        ("kinetic_energy_J", shown(case.quality.audit.kinetic_j)),
+        ("work_over_energy", shown(case.quality.audit.ratio())),
+        ("unloading_stiffness_N_per_m", optional(case.curves.unloading_stiffness_n_per_m)),
+        ("truncated", case.is_truncated().to_string()),
+        ("contact_time_s", shown(case.curves.contact_time_s)),
+        ("solver_wall_time_s", optional(case.provenance.solver_wall_time_s)),
+        ("states", case.curves.sampled.time_s().len().to_string()),
+        ("tags", case.provenance.tags.join(";")),
+        ("user_notes", case.provenance.user_notes.join("\n")),
+        ("warnings", case.quality.warnings.join("\n")),
+        ("sources", sources.collect::<Vec<_>>().join(";")),
+        ("solver", solver.map(|s| s.trim().into()).unwrap_or_default()),
+        ("built_utc", case.provenance.built_utc.clone().unwrap_or_default()),
+        ("fingerprint", case.provenance.fingerprint.clone()),
     ]
 }
 

@@ -360,6 +360,21 @@ impl Case {
         self.curves.original.force_n.iter().copied().fold(0.0, f64::max)
     }
 
+    /// In what kind it differs from another, so that no model can be trained on both: of what, its own
+    /// and the other's.
+    pub(crate) fn other_kind(
+        &self,
+        other: &Self,
+    ) -> Option<(&'static str, &'static str, &'static str)> {
+        let (speed, force) = (self.conditions.speed.kind, self.curves.force_kind);
+        if speed != other.conditions.speed.kind {
+            Some(("speed", speed.name(), other.conditions.speed.kind.name()))
+        } else {
+            (force != other.curves.force_kind)
+                .then(|| ("force", force.name(), other.curves.force_kind.name()))
+        }
+    }
+
     /// Whether the run ended before the bodies moved apart again.
     pub fn is_truncated(&self) -> bool {
         self.loading_end() + 1 == self.curves.original.time_s.len()

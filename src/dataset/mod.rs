@@ -118,11 +118,7 @@ pub(crate) fn feature_values(
         } else {
             format!(", one of {}", known.join(", "))
         };
-        error!(
-            Dataset,
-            "the model needs {parameter}{among}: give it with the query",
-            parameter = feature.parameter
-        )
+        error!(Dataset, "the model needs {}{among}: give it with the query", feature.parameter)
     };
     let is_known = |feature: &Feature, parameter: &Parameter| match parameter {
         Parameter::Number(v) => feature.category.is_none() && v.is_finite(),
@@ -162,11 +158,9 @@ fn features(cases: &[&Case]) -> Result<Vec<Feature>, Error> {
         let has = |p: &BTreeMap<String, Parameter>| p.contains_key(name);
         let with = of.iter().find(|(_, p)| has(p)).map_or("", |(case, _)| *case);
         if let Some((without, _)) = of.iter().find(|(_, p)| !has(p)) {
-            let (with, without) = (with.to_string(), without.to_string());
             return Err(error!(
                 Dataset,
-                "case \"{without}\" has no parameter \"{parameter}\", which case \"{with}\" has: give it to every run of the group",
-                parameter = name
+                "case \"{without}\" has no parameter \"{name}\", which case \"{with}\" has: give it to every run of the group"
             ));
         }
         let (mut number, mut category) = (None, None);
@@ -186,19 +180,14 @@ fn features(cases: &[&Case]) -> Result<Vec<Feature>, Error> {
         if let (Some(number), Some(category)) = (number, category) {
             return Err(error!(
                 Dataset,
-                "parameter \"{parameter}\" is a number in case \"{number}\" and a category in case \"{category}\": give every run the same kind",
-                parameter = name
+                "parameter \"{name}\" is a number in case \"{number}\" and a category in case \"{category}\": give every run the same kind"
             ));
         }
-        let parameter = name.clone();
+        let feature = |category| Feature { parameter: name.clone(), category };
         if values.windows(2).any(|w| w[0] != w[1]) {
-            features.push(Feature { parameter, category: None });
+            features.push(feature(None));
         } else if categories.len() > 1 {
-            features.extend(
-                categories
-                    .into_iter()
-                    .map(|c| Feature { parameter: parameter.clone(), category: Some(c) }),
-            );
+            features.extend(categories.into_iter().map(|category| feature(Some(category))));
         }
     }
     Ok(features)
@@ -257,7 +246,6 @@ pub(crate) const GRID_M: f64 = 2e-3;
 /// Speeds within this share of each other count as one.
 const SAME_SPEED: f64 = 1e-3;
 
-/// Whether two speeds count as one.
 pub(crate) fn is_same_speed(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() <= SAME_SPEED
 }
@@ -286,14 +274,12 @@ pub(crate) fn of_one_kind<'a>(cases: impl IntoIterator<Item = &'a Case>) -> Resu
     let mut cases = cases.into_iter();
     let Some(first) = cases.next() else { return Ok(()) };
     for other in cases {
-        let what = if first.conditions.speed.kind != other.conditions.speed.kind {
-            "wall and closing speeds"
-        } else if first.curves.force_kind != other.curves.force_kind {
-            "contact and body forces"
-        } else {
-            continue;
+        let what = match first.other_kind(other) {
+            Some(("speed", ..)) => "wall and closing speeds",
+            Some(_) => "contact and body forces",
+            None => continue,
         };
-        let (first, second) = (first.id.name.clone(), other.id.name.clone());
+        let (first, second) = (&first.id.name, &other.id.name);
         return Err(error!(
             Dataset,
             "cases \"{first}\" and \"{second}\" mix {what}: keep one kind per group"
@@ -414,7 +400,6 @@ impl TrainingCase {
         Some(self.case.provenance.solver_wall_time_s? * self.runs.len() as f64)
     }
 
-    /// What cases are ordered by.
     fn key(&self) -> (f64, &[f64]) {
         (self.speed_m_per_s, &self.features)
     }

@@ -1,34 +1,33 @@
 //! From a file to its case: reading, metadata, extraction, provenance.
 
-use std::path::Path;
-
 use serde::Serialize;
 
-use super::said::Said;
+use super::metadata::StatedAndFound;
 use super::{Item, Settings};
 use crate::curve::from_table::{IMPORTED, from_table};
 use crate::curve::recipe::{Filter, Sampling};
 use crate::curve::{
-    Case, CaseId, Conditions, ForceKind, Impact, Parameter, Provenance, Quality, RecordedCurves,
-    SourceFile, Table,
+    Case, CaseId, Conditions, ForceKind, Impact, Parameter, Provenance, Quality, SourceFile, Table,
 };
 use crate::database::names;
 use crate::error::{Error, ErrorCode, error};
+use crate::file::absolute;
 use crate::formats::read::{self, ReadCurve};
 use crate::unit::{SpeedKind, UnitSystem};
 
-/// The case of one file.
 pub(super) fn of(item: &Item, settings: &Settings, group: Option<&Case>) -> Result<Case, Error> {
     check_name(item, "group", &settings.group)?;
     let (curve, reader) = read::read(&item.path, &settings.read)?;
     let name = case_name(item)?;
     check_name(item, "case", &name)?;
-    let said = Said::of(item, settings, &curve, group)?;
+    let (notes, warnings) = (Vec::new(), Vec::new());
+    let mut both = StatedAndFound { item, settings, facts: &curve.facts, notes, warnings };
+    let (speed, masses, force_kind) = both.impact(group)?;
     let stiffness = settings.unloading_stiffness_n_per_m;
     let impact = Impact {
-        force_kind: said.force,
-        speed: said.speed,
-        masses: said.masses,
+        force_kind,
+        speed,
+        masses,
         unloading_stiffness_n_per_m: stiffness.or(curve.facts.unloading_stiffness_n_per_m),
         // One that was given belongs to the force of the curve.
         body_unloading_stiffness_n_per_m: match stiffness {
@@ -44,21 +43,9 @@ pub(super) fn of(item: &Item, settings: &Settings, group: Option<&Case>) -> Resu
         time_s: curve.time_s.as_deref(),
         body_force_n: curve.body_force_n.as_deref(),
     };
-    let made = from_table(&table, &impact)
+    let (curves, quality) = from_table(&table, &impact)
         .map_err(|error| error.coded(ErrorCode::Import).of(item.path.display()))?;
-    let recipe = recipe(item, settings, &curve, reader.name, &said);
-    Ok(assembled(name, settings, &curve, reader.name, said, made, recipe))
-}
-
-fn assembled(
-    name: String,
-    settings: &Settings,
-    curve: &ReadCurve,
-    format: &str,
-    said: Said,
-    (curves, made): (RecordedCurves, Quality),
-    recipe: String,
-) -> Case {
+    let recipe = recipe(item, settings, &curve, reader.name, &impact);
     let mut hash = blake3::Hasher::new();
     hash.update(recipe.as_bytes());
     for file in &curve.files {
@@ -66,28 +53,24 @@ fn assembled(
     }
     let sources = curve.files.iter().map(|file| SourceFile {
         path: file.path.display().to_string(),
-        absolute_path: absolute(&file.path),
+        absolute_path: Some(absolute(&file.path)),
         size_bytes: file.size_bytes,
         blake3: file.blake3.clone(),
-        format: format.into(),
+        format: reader.name.into(),
         solver: None,
         version: None,
         title: curve.title.clone(),
         problems: 0,
     });
-    let notes = curve.notes.iter().cloned().chain(said.notes).chain(made.notes);
-    Case {
+    let notes = curve.notes.iter().cloned().chain(both.notes).chain(quality.notes);
+    Ok(Case {
         id: CaseId { study: IMPORTED.into(), group: settings.group.clone(), name },
-        conditions: Conditions {
-            speed: said.speed,
-            masses: said.masses,
-            parameters: settings.parameters.clone(),
-        },
+        conditions: Conditions { speed, masses, parameters: settings.parameters.clone() },
         curves,
         quality: Quality {
-            audit: made.audit,
+            audit: quality.audit,
             notes: notes.collect(),
-            warnings: said.warnings.into_iter().chain(made.warnings).collect(),
+            warnings: both.warnings.into_iter().chain(quality.warnings).collect(),
         },
         provenance: Provenance {
             fingerprint: hash.finalize().to_hex().to_string(),
@@ -95,12 +78,7 @@ fn assembled(
             sources: sources.collect(),
             ..Provenance::default()
         },
-    }
-}
-
-/// A path from the root on, as given: links are not followed.
-fn absolute(path: &Path) -> Option<String> {
-    Some(std::path::absolute(path).ok()?.display().to_string())
+    })
 }
 
 /// Everything besides the file that determines the case's numbers.
@@ -139,24 +117,24 @@ fn recipe(
     settings: &Settings,
     curve: &ReadCurve,
     format: &str,
-    said: &Said,
+    impact: &Impact,
 ) -> String {
-    let stiffness = settings.unloading_stiffness_n_per_m;
+    let Impact { speed, masses, force_kind, .. } = *impact;
     let recipe = Recipe {
         study: IMPORTED,
         units: curve.units,
-        kind: said.speed.kind,
+        kind: speed.kind,
         imported: Imported {
             path: item.path.display().to_string(),
             format,
             curve: settings.read.curve.as_deref(),
             has_times: curve.time_s.is_some(),
             moves_by_its_force: curve.time_s.is_none() && curve.body_force_n.is_none(),
-            force: said.force,
-            speed_m_per_s: said.speed.m_per_s,
-            mass_kg: said.masses.body_kg,
-            other_mass_kg: said.masses.other_kg,
-            unloading_stiffness_n_per_m: stiffness.or(curve.facts.unloading_stiffness_n_per_m),
+            force: force_kind,
+            speed_m_per_s: speed.m_per_s,
+            mass_kg: masses.body_kg,
+            other_mass_kg: masses.other_kg,
+            unloading_stiffness_n_per_m: impact.unloading_stiffness_n_per_m,
             parameters: &settings.parameters,
             accept_energy: settings.accept_energy,
             filter: Filter::None,

@@ -4,9 +4,8 @@
 //! meanwhile, and written as a whole.
 
 mod case;
-mod said;
+mod metadata;
 
-use crate::error::{Error, error};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -14,6 +13,7 @@ use crate::clock;
 use crate::curve::from_table::IMPORTED;
 use crate::curve::{Case, Parameter};
 use crate::database::Database;
+use crate::error::{Error, error};
 use crate::file::WriterLock;
 use crate::formats::read::ReadOptions;
 use crate::unit::SpeedKind;
@@ -32,7 +32,6 @@ pub(crate) struct Item {
 /// Metadata of all files that are added at once.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Settings {
-    /// Group of the database.
     pub group: String,
     /// What speeds are measured against; the file's if absent, else the group's.
     pub kind: Option<SpeedKind>,
@@ -44,7 +43,6 @@ pub(crate) struct Settings {
     pub unloading_stiffness_n_per_m: Option<f64>,
     /// How the files are read; its force is also the kind of a curve whose file does not state it.
     pub read: ReadOptions,
-    /// Further parameters of the cases.
     pub parameters: BTreeMap<String, Parameter>,
     /// Replace cases of these names that were added before.
     pub replace: bool,
@@ -67,20 +65,19 @@ pub(crate) fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Ve
         let mut case = case::of(item, settings, database.cases(&settings.group).first())?;
         case.provenance.built_utc = Some(now.clone());
         if let Some(k) = cases.iter().position(|c| c.id.name == case.id.name) {
-            let (first, second) = (items[k].path.clone(), item.path.clone());
             return Err(error!(
                 Import,
                 "{first} and {second} would both be case \"{name}\": name them with --case",
-                first = first.display(),
+                first = items[k].path.display(),
                 name = case.id.name,
-                second = second.display()
+                second = item.path.display()
             ));
         }
         check_place(&database, item, &case, settings.replace)?;
         if let Some(first) = cases.first() {
             check_kinds(item, &case, first)?;
         }
-        if let Some(before) = there(&database, &case) {
+        if let Some(before) = existing_case(&database, &case) {
             // Tags and notes are kept for the case that replaces it.
             (case.provenance.tags, case.provenance.user_notes) =
                 (before.provenance.tags.clone(), before.provenance.user_notes.clone());
@@ -97,52 +94,36 @@ pub(crate) fn case_of_file(item: &Item, settings: &Settings) -> Result<Case, Err
     case::of(item, settings, None)
 }
 
-/// The case of the same names that the database has.
-fn there<'a>(database: &'a Database, case: &Case) -> Option<&'a Case> {
+fn existing_case<'a>(database: &'a Database, case: &Case) -> Option<&'a Case> {
     database.cases(&case.id.group).iter().find(|c| c.id.name == case.id.name)
 }
 
-/// Whether the case may take its place in the database.
 fn check_place(database: &Database, item: &Item, case: &Case, replace: bool) -> Result<(), Error> {
-    let (path, group, name) = (item.path.clone(), case.id.group.clone(), case.id.name.clone());
-    match there(database, case) {
-        Some(other) if other.id.study != IMPORTED => {
-            return Err(error!(
-                Import,
-                "{path}: case \"{name}\" of group \"{group}\" belongs to the study \"{study}\", which builds it: give another name with --case",
-                path = path.display(),
-                study = other.id.study
-            ));
-        }
-        Some(_) if !replace => {
-            return Err(error!(
-                Import,
-                "{path}: group \"{group}\" has a case \"{name}\" already: replace it with --replace, or give another name with --case",
-                path = path.display()
-            ));
-        }
-        _ => {}
-    }
-    // A case that is replaced imposes no restriction.
-    match database.cases(&case.id.group).iter().find(|c| c.id.name != case.id.name) {
-        Some(other) => check_kinds(item, case, other),
-        None => Ok(()),
+    let (path, group, name) = (item.path.display(), &case.id.group, &case.id.name);
+    match existing_case(database, case) {
+        Some(other) if other.id.study != IMPORTED => Err(error!(
+            Import,
+            "{path}: case \"{name}\" of group \"{group}\" belongs to the study \"{study}\", which builds it: give another name with --case",
+            study = other.id.study
+        )),
+        Some(_) if !replace => Err(error!(
+            Import,
+            "{path}: group \"{group}\" has a case \"{name}\" already: replace it with --replace, or give another name with --case"
+        )),
+        // A case that is replaced imposes no restriction.
+        _ => match database.cases(group).iter().find(|c| c.id.name != *name) {
+            Some(other) => check_kinds(item, case, other),
+            None => Ok(()),
+        },
     }
 }
 
-/// Whether two cases of a group are of one kind.
 fn check_kinds(item: &Item, case: &Case, other: &Case) -> Result<(), Error> {
-    let kinds = [
-        ("speed", case.conditions.speed.kind.name(), other.conditions.speed.kind.name()),
-        ("force", case.curves.force_kind.name(), other.curves.force_kind.name()),
-    ];
-    match kinds.into_iter().find(|(_, found, there)| found != there) {
-        None => Ok(()),
-        Some((what, found, there)) => Err(error!(
-            Import,
-            "{path}: this curve has a {found} {what}, the cases of group \"{group}\" have a {there} one: no model can be trained on both; give another --group",
-            group = case.id.group,
-            path = item.path.display()
-        )),
-    }
+    let Some((what, found, there)) = case.other_kind(other) else { return Ok(()) };
+    Err(error!(
+        Import,
+        "{path}: this curve has a {found} {what}, the cases of group \"{group}\" have a {there} one: no model can be trained on both; give another --group",
+        group = case.id.group,
+        path = item.path.display()
+    ))
 }

@@ -1,15 +1,16 @@
 //! The findings in words: each value of a proposal with its source.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::Path;
 
 use super::UserHints;
-use super::agree::{Agreed, names_centre_of_gravity, percent};
 use super::explain::FOLLOWS;
-use super::folders::{Reason, speed_in};
-use super::measure::{self, MassEstimates, Measured, SAME_SPEED, SiRun, is_near};
-use super::proposal::{Evidence, Proposal, Proposed, ProposedRun};
-use super::record::Recorded;
+use super::folders::{seen_from, speed_in};
+use super::measure::{self, Impact, MassEstimates, SAME_MASS, SAME_SPEED, is_near};
+use super::proposal::Evidence::{Computed, Given, Guessed, Read};
+use super::proposal::{Proposal, Proposed, ProposedRun};
+use super::recipe::{CommonRecipe, names_centre_of_gravity, percent};
+use super::record::Record;
 use super::sources::MOTION;
 use super::units::digits;
 use crate::curve::recipe::{DeflectionSource, Filter, ForceSource, RecordedMotion};
@@ -20,254 +21,432 @@ use crate::unit::{SPEED, UnitSystem, km_per_h};
 
 /// Bodies whose speed lies along an axis by less than this share move obliquely.
 const ALONG: f64 = 0.99;
+/// Masses of a pair that differ by more, according to their velocities, are not equal.
+const UNEQUAL: f64 = 0.1;
 
-/// How a path is written in the study.
-pub(super) type Seen<'a> = &'a dyn Fn(&PathBuf) -> Option<String>;
+/// What is known of the runs together; most functions of it make one choice of the proposal.
+pub(super) struct Facts<'a> {
+    pub recipe: &'a CommonRecipe,
+    pub records: &'a [Record],
+    pub units: Proposed<UnitSystem>,
+    pub hints: &'a UserHints,
+    /// Of the study: paths in it begin there.
+    pub folder: &'a Path,
+}
 
-/// The proposal for runs that were measured; `group`: name of the folder above them.
-pub(super) fn proposal(
-    measured: &Measured<'_>,
-    given: &UserHints,
-    group: String,
-    seen: Seen<'_>,
-    warnings: &mut Vec<String>,
-) -> Proposal {
-    let agreed = measured.agreed;
-    let group = match &given.group {
-        Some(name) => Proposed::found(name.clone(), Evidence::UserHints("by --group".into())),
-        None => {
-            let from = "name of the folder above the runs".into();
-            Proposed::found(group, Evidence::Guessed(from))
+impl Facts<'_> {
+    /// The proposal; `group`: name of the folder above the runs.
+    pub(super) fn proposal(&self, group: String, mut warnings: Vec<String>) -> Proposal {
+        let recipe = self.recipe;
+        let group = match &self.hints.group {
+            Some(name) => Proposed::found(name.clone(), Given, "by --group"),
+            None => Proposed::found(group, Guessed, "name of the folder above the runs"),
+        };
+        let (filter, cuts) = self.filter();
+        let runs = self.runs(&cuts, &mut warnings);
+        self.warn(&mut warnings);
+        let impacts: Vec<&Impact> = self.impacts().map(|(_, impact)| impact).collect();
+        let no_units = || Proposed::missing("the times are unknown without units");
+        Proposal {
+            group,
+            units: self.units.clone(),
+            kind: self.kind(),
+            half_model: self.hints.half_model,
+            deflection: self.deflection(),
+            node_titles: recipe.nodes.iter().map(|node| node.title.clone()).collect(),
+            other_nodes: recipe.nodes.iter().map(|node| node.others.clone()).collect(),
+            force: self.force(),
+            force_title: recipe.force.as_ref().and_then(|force| force.title.clone()),
+            other_side: recipe.force.as_ref().is_some_and(|force| force.other_side),
+            other_forces: recipe.other_forces.clone(),
+            filter,
+            sampling: measure::sampling(&impacts).unwrap_or_else(no_units),
+            runs,
+            left_out: Vec::new(),
+            notes: self.notes(),
+            warnings,
         }
-    };
-    let (filter, truncated) = filter(measured);
-    let runs = runs(measured, given, &truncated, seen, warnings);
-    let times: Vec<measure::Times> = measured.runs.iter().map(|run| run.times).collect();
-    let no_units = || Proposed::missing("the times are unknown without units");
-    doubts(measured, warnings);
-    Proposal {
-        group,
-        units: measured.units.clone(),
-        kind: kind(measured, given),
-        half_model: given.half_model,
-        deflection: deflection(measured, given),
-        node_titles: agreed.nodes.iter().map(|node| node.title.clone()).collect(),
-        other_nodes: agreed.nodes.iter().map(|node| node.others.clone()).collect(),
-        force: force(measured, given),
-        force_title: agreed.force.as_ref().and_then(|force| force.title.clone()),
-        other_side: agreed.force.as_ref().is_some_and(|force| force.other_side),
-        other_forces: agreed.force.as_ref().map_or(Vec::new(), |force| force.others.clone()),
-        filter,
-        sampling: measure::sampling(&times).unwrap_or_else(no_units),
-        runs,
-        left_out: Vec::new(),
-        notes: notes(measured),
-        warnings: Vec::new(),
     }
-}
 
-fn kind(measured: &Measured<'_>, given: &UserHints) -> Proposed<StudyKind> {
-    let Agreed { kind, force, .. } = measured.agreed;
-    if given.half_model {
-        let from = "by --half-model: the other body is this one's mirror image".into();
-        return Proposed::found(StudyKind::Pair, Evidence::UserHints(from));
+    /// The runs with their values in SI: none if the units are unknown.
+    fn impacts(&self) -> impl Iterator<Item = (&Record, &Impact)> {
+        self.records.iter().filter_map(|record| Some((record, record.impact.as_ref()?)))
     }
-    if given.kind.is_some() {
-        return Proposed::found(*kind, Evidence::UserHints("by --kind".into()));
-    }
-    if given.minus_node.is_some() {
-        return Proposed::found(*kind, Evidence::UserHints("by --minus-node".into()));
-    }
-    let evidence = match (kind, force) {
-        (StudyKind::Pair, Some(force)) => Evidence::Computed(format!(
-            "two bodies move, and {} {} drives them apart",
-            force.file, force.id
-        )),
-        (StudyKind::Pair, None) => Evidence::Guessed(format!(
-            "two bodies move, and their changes of momentum balance within {} %; no force shows whether they meet",
-            percent(measured.agreed.opposed.unwrap_or(1.0))
-        )),
-        (StudyKind::Wall, None) if measured.agreed.bodies > 1 => Evidence::Guessed(
-            "several bodies move, no force shows which of them meet, and no two changes of momentum balance: the fastest is taken, as if it hit a wall".into(),
-        ),
-        (StudyKind::Wall, Some(force)) if force.file == "rwforc" => Evidence::Guessed(
-            "one body moves, and a rigid wall stops it (which may be the symmetry plane of a pair: see half_model)".into(),
-        ),
-        (StudyKind::Wall, _) => Evidence::Guessed(
-            "one body moves in the files: if what it meets moves too, write one of its nodes to nodout".into(),
-        ),
-    };
-    Proposed::found(*kind, evidence)
-}
 
-fn deflection(measured: &Measured<'_>, given: &UserHints) -> Proposed<DeflectionSource> {
-    let agreed = measured.agreed;
-    let Some(node) = agreed.nodes.first() else {
-        return Proposed::missing("no node of the runs moves with the body: name one with --node");
-    };
-    let source = DeflectionSource {
-        file: MOTION.into(),
-        node: node.id,
-        minus_node: agreed.nodes.get(1).map(|other| other.id),
-        component: agreed.direction,
-    };
-    if given.node.is_some() {
-        return Proposed::found(source, Evidence::UserHints("by --node".into()));
+    fn force_is_of_section(&self) -> bool {
+        self.recipe.force.as_ref().is_some_and(|force| force.file == "secforc")
     }
-    let mut because = vec![format!("the bodies start along {}", agreed.direction.axis())];
-    let runs = measured.recorded.len();
-    let of_runs = match runs {
-        1 => "the run".into(),
-        2 => "both runs".into(),
-        _ => format!("all {runs} runs"),
-    };
-    if agreed.force.is_some() {
-        because.push(format!(
-            "change of velocity and impulse of the force agree within {} % in {of_runs}",
-            percent(agreed.residual)
-        ));
-    }
-    if agreed.nodes.iter().all(|node| names_centre_of_gravity(node.title.as_deref())) {
-        because.push("the title says centre of gravity".into());
-    }
-    let is_only = agreed.nodes.iter().all(|node| node.others.is_empty()) && agreed.force.is_some();
-    let from = because.join("; ");
-    let evidence = if is_only { Evidence::Computed(from) } else { Evidence::Guessed(from) };
-    Proposed::found(source, evidence)
-}
 
-fn force(measured: &Measured<'_>, given: &UserHints) -> Proposed<ForceSource> {
-    let agreed = measured.agreed;
-    let Some(force) = &agreed.force else {
-        let Some(node) = agreed.nodes.first() else {
+    fn kind(&self) -> Proposed<StudyKind> {
+        let CommonRecipe { kind, force, opposed, bodies, .. } = self.recipe;
+        if self.hints.half_model {
+            let from = "by --half-model: the other body is this one's mirror image";
+            return Proposed::found(StudyKind::Pair, Given, from);
+        }
+        if self.hints.kind.is_some() {
+            return Proposed::found(*kind, Given, "by --kind");
+        }
+        if self.hints.minus_node.is_some() {
+            return Proposed::found(*kind, Given, "by --minus-node");
+        }
+        let from = match (kind, force) {
+            (StudyKind::Pair, Some(force)) => {
+                let from = format!("two bodies move, and {} {} drives them apart", force.file, force.id);
+                return Proposed::found(*kind, Computed, from);
+            }
+            (StudyKind::Pair, None) => format!(
+                "two bodies move, and their changes of momentum balance within {} %; no force shows whether they meet",
+                percent(opposed.unwrap_or(1.0))
+            ),
+            (StudyKind::Wall, None) if *bodies > 1 => "several bodies move, no force shows which of them meet, and no two changes of momentum balance: the fastest is taken, as if it hit a wall".into(),
+            (StudyKind::Wall, Some(force)) if force.file == "rwforc" => "one body moves, and a rigid wall stops it (which may be the symmetry plane of a pair: see half_model)".into(),
+            (StudyKind::Wall, _) => "one body moves in the files: if what it meets moves too, write one of its nodes to nodout".into(),
+        };
+        Proposed::found(*kind, Guessed, from)
+    }
+
+    fn deflection(&self) -> Proposed<DeflectionSource> {
+        let CommonRecipe { nodes, direction, force, .. } = self.recipe;
+        let Some(node) = nodes.first() else {
             return Proposed::missing(
-                "no force of the runs acts on the bodies: name one with --force",
+                "no node of the runs moves with the body: name one with --node",
             );
         };
-        let component = agreed.direction.velocity();
-        let source = ForceSource::Body {
+        let source = DeflectionSource {
             file: MOTION.into(),
             node: node.id,
-            motion: RecordedMotion::Velocity,
-            component: component.into(),
+            minus_node: nodes.get(1).map(|other| other.id),
+            component: *direction,
         };
-        let from = "no wall, contact or section of the runs moves the body, so its mass times its acceleration is taken as the force".into();
-        return Proposed::found(source, Evidence::Guessed(from));
-    };
-    let named = given.force.as_ref();
-    let source = ForceSource::Contact {
-        file: force.file.into(),
-        id: force.id,
-        side: named.and_then(|named| named.side).or(force.side),
-        component: named.and_then(|n| n.component.clone()).unwrap_or(force.component.clone()),
-    };
-    if named.is_some() {
-        return Proposed::found(source, Evidence::UserHints("by --force".into()));
-    }
-    let evidence = if force.others.is_empty() {
-        Evidence::Computed("the only force along the motion, and the bodies follow it".into())
-    } else {
-        Evidence::Guessed(
-        "of the forces that the bodies follow, the one with the largest impulse along the motion".into(),
-    )
-    };
-    Proposed::found(source, evidence)
-}
-
-/// The filter, and for each run a state that has to be cut for it: a solver's last state often
-/// comes right after the one before.
-fn filter(measured: &Measured<'_>) -> (Proposed<Filter>, Vec<Option<f64>>) {
-    let runs = measured.runs;
-    let none = vec![None; runs.len()];
-    let means = measured.agreed.force.as_ref().and_then(|force| {
-        let source = measured.recorded.first()?.run.sources.force(force.file)?;
-        source.means.clone()
-    });
-    let coarsest = runs.iter().map(|run| run.times.interval_s).fold(0.0, f64::max);
-    let proposed = measure::filter(means.as_deref(), coarsest);
-    let Some(Filter::Cfc(class)) = proposed.value() else { return (proposed, none) };
-    let fits = |time: &[f64], force: &[f64]| cfc::filter(*class, time, force).map(|_| ());
-    let mut cut = none.clone();
-    for (run, cut) in runs.iter().zip(&mut cut) {
-        let Some((time, force)) = &run.force else { continue };
-        let Err(error) = fits(time, force) else { continue };
-        let last = time.len() - 1;
-        if fits(&time[..last], &force[..last]).is_ok() {
-            *cut = Some(0.5 * (time[last - 1] + time[last]));
-            continue;
+        if self.hints.node.is_some() {
+            return Proposed::found(source, Given, "by --node");
         }
-        let from = format!("run {}: {error}", run.recorded.run.name);
-        return (Proposed::found(Filter::None, Evidence::Computed(from)), none);
+        let mut because = format!("the bodies start along {}", direction.axis());
+        if force.is_some() {
+            let of_runs = match self.records.len() {
+                1 => "the run".into(),
+                2 => "both runs".into(),
+                runs => format!("all {runs} runs"),
+            };
+            because += &format!(
+                "; change of velocity and impulse of the force agree within {} % in {of_runs}",
+                percent(self.recipe.residual)
+            );
+        }
+        if nodes.iter().all(|node| names_centre_of_gravity(node.title.as_deref())) {
+            because += "; the title says centre of gravity";
+        }
+        let is_only = nodes.iter().all(|node| node.others.is_empty()) && force.is_some();
+        Proposed::found(source, if is_only { Computed } else { Guessed }, because)
     }
-    (proposed, cut)
-}
 
-/// What the user should check.
-fn doubts(measured: &Measured<'_>, warnings: &mut Vec<String>) {
-    let agreed = measured.agreed;
-    if agreed.force.is_some() && agreed.residual > FOLLOWS {
-        warnings.push(format!(
-            "no node's velocity follows the impulse of a force closely (residual {} %): several bodies in a row, or a force on part of the body? Check node and force",
-            percent(agreed.residual)
-        ));
-    }
-    if agreed.force.as_ref().is_some_and(|force| force.file == "secforc") {
-        warnings.push(
-            "the force is that of a section, which may carry only part of what stops the body"
-                .into(),
-        );
-    }
-    let oblique = measured.recorded.iter().find(|run| run.run.survey.aligned < ALONG);
-    if let Some(run) = oblique {
-        warnings.push(format!(
-            "run {}: only {:.0} % of the initial speed lie along {}: deflection and speed of a recipe are along an axis",
-            run.run.name,
-            run.run.survey.aligned * 100.0,
-            agreed.direction.axis()
-        ));
-    }
-    for run in measured.recorded {
-        warnings.extend(run.run.sources.unread.iter().map(|why| format!("not read: {why}")));
-        warnings.extend(run.record.damage.iter().map(|d| format!("run {}: {d}", run.run.name)));
-    }
-}
-
-/// What was chosen on the way: of several files with the same histories, one.
-fn notes(measured: &Measured<'_>) -> Vec<String> {
-    let mut chosen: BTreeMap<String, usize> = BTreeMap::new();
-    for recorded in measured.recorded {
-        let sources = &recorded.run.sources;
-        let used = measured.agreed.force.as_ref().and_then(|force| sources.force(force.file));
-        for source in [Some(&sources.motion), used].into_iter().flatten() {
-            if !source.others.is_empty() {
-                let note = format!(
-                    "{} is read, {} holds it too",
-                    source.shown(),
-                    source.others.join(" and ")
+    fn force(&self) -> Proposed<ForceSource> {
+        let CommonRecipe { nodes, direction, force, other_forces, .. } = self.recipe;
+        let (Some(force), named) = (force, &self.hints.force) else {
+            let Some(node) = nodes.first() else {
+                return Proposed::missing(
+                    "no force of the runs acts on the bodies: name one with --force",
                 );
-                *chosen.entry(note).or_default() += 1;
+            };
+            let source = ForceSource::Body {
+                file: MOTION.into(),
+                node: node.id,
+                motion: RecordedMotion::Velocity,
+                component: direction.velocity().into(),
+            };
+            let from = "no wall, contact or section of the runs moves the body, so its mass times its acceleration is taken as the force";
+            return Proposed::found(source, Guessed, from);
+        };
+        let component = named.as_ref().and_then(|named| named.component.clone());
+        let source = ForceSource::Contact {
+            file: force.file.into(),
+            id: force.id,
+            side: named.as_ref().and_then(|named| named.side).or(force.side),
+            component: component.unwrap_or_else(|| force.component.into()),
+        };
+        if named.is_some() {
+            Proposed::found(source, Given, "by --force")
+        } else if other_forces.is_empty() {
+            let from = "the only force along the motion, and the bodies follow it";
+            Proposed::found(source, Computed, from)
+        } else {
+            let from = "of the forces that the bodies follow, the one with the largest impulse along the motion";
+            Proposed::found(source, Guessed, from)
+        }
+    }
+
+    /// The filter, and for each run a time at which it has to be cut for it: a solver's last state
+    /// often comes right after the one before.
+    fn filter(&self) -> (Proposed<Filter>, Vec<Option<f64>>) {
+        let means = self.recipe.force.as_ref().and_then(|force| {
+            let source = self.records.first()?.run.sources.force(force.file)?;
+            source.means.as_deref()
+        });
+        let coarsest = self.impacts().map(|(_, impact)| impact.interval_s).fold(0.0, f64::max);
+        let proposed = measure::filter(means, coarsest);
+        let mut cuts = vec![None; self.records.len()];
+        let Some(Filter::Cfc(class)) = proposed.value() else { return (proposed, cuts) };
+        for ((record, impact), cut) in self.impacts().zip(&mut cuts) {
+            let (time, force) = (&impact.force_time_s, &impact.force_n);
+            let fits = |states: usize| cfc::filter(*class, &time[..states], &force[..states]);
+            let Some(last) = force.len().checked_sub(1) else { continue };
+            let Err(error) = fits(last + 1) else { continue };
+            if fits(last).is_err() {
+                let from = format!("run {}: {error}", record.run.name);
+                let none = vec![None; self.records.len()];
+                return (Proposed::found(Filter::None, Computed, from), none);
+            }
+            *cut = Some(0.5 * (time[last - 1] + time[last]));
+        }
+        (proposed, cuts)
+    }
+
+    /// What the user should check.
+    fn warn(&self, warnings: &mut Vec<String>) {
+        let recipe = self.recipe;
+        if recipe.force.is_some() && recipe.residual > FOLLOWS {
+            warnings.push(format!(
+                "no node's velocity follows the impulse of a force closely (residual {} %): several bodies in a row, or a force on part of the body? Check node and force",
+                percent(recipe.residual)
+            ));
+        }
+        if self.force_is_of_section() {
+            warnings.push(
+                "the force is that of a section, which may carry only part of what stops the body"
+                    .into(),
+            );
+        }
+        let oblique = self.records.iter().find(|record| record.run.survey.aligned < ALONG);
+        if let Some(Record { run, .. }) = oblique {
+            warnings.push(format!(
+                "run {}: only {:.0} % of the initial speed lie along {}: deflection and speed of a recipe are along an axis",
+                run.name,
+                run.survey.aligned * 100.0,
+                recipe.direction.axis()
+            ));
+        }
+        for Record { run, damage, .. } in self.records {
+            warnings.extend(run.sources.unread.iter().map(|why| format!("not read: {why}")));
+            warnings.extend(damage.iter().map(|damage| format!("run {}: {damage}", run.name)));
+        }
+    }
+
+    /// What was chosen on the way: of several files with the same histories, one.
+    fn notes(&self) -> Vec<String> {
+        let mut chosen: BTreeMap<String, usize> = BTreeMap::new();
+        for Record { run, .. } in self.records {
+            let force = self.recipe.force.as_ref();
+            let force = force.and_then(|force| run.sources.force(force.file));
+            for source in [&run.sources.motion].into_iter().chain(force) {
+                if !source.others.is_empty() {
+                    let (read, others) = (source.shown(), source.others.join(" and "));
+                    *chosen.entry(format!("{read} is read, {others} holds it too")).or_default() +=
+                        1;
+                }
             }
         }
+        let of_runs = |runs: usize| match runs {
+            runs if runs == self.records.len() => String::new(),
+            1 => " (in 1 run)".into(),
+            runs => format!(" (in {runs} runs)"),
+        };
+        chosen.into_iter().map(|(note, runs)| note + &of_runs(runs)).collect()
     }
-    let all = measured.recorded.len();
-    let of_runs = |runs: usize| match runs {
-        runs if runs == all => String::new(),
-        1 => " (in 1 run)".into(),
-        runs => format!(" (in {runs} runs)"),
-    };
-    chosen.into_iter().map(|(note, runs)| format!("{note}{}", of_runs(runs))).collect()
+
+    /// The runs by speed, then by name; `cuts`: where their records have to end.
+    fn runs(&self, cuts: &[Option<f64>], warnings: &mut Vec<String>) -> Vec<ProposedRun> {
+        let (bodies, others) = self.masses(warnings);
+        let is_half = self.names_say_half();
+        if is_half {
+            warnings.push("the folders' names state twice the recorded speeds: closing speeds of half models? Then use --half-model".into());
+        }
+        let no_units = || Proposed::missing("it is unknown without units");
+        let mut runs = Vec::new();
+        for (k, record) in self.records.iter().enumerate() {
+            let (run, impact) = (&record.run, record.impact.as_ref());
+            let cut_because = "the last state follows the previous one too soon for the filter";
+            runs.push(ProposedRun {
+                folder: run.path.clone(),
+                path: seen_from(self.folder, &run.path).unwrap_or_default(),
+                name: run.name.clone(),
+                speed_m_per_s: impact.map_or_else(no_units, |impact| self.speed(record, impact)),
+                mass_kg: bodies.get(k).cloned().unwrap_or_else(no_units),
+                other_mass_kg: others.as_ref().and_then(|others| others.get(k)).cloned(),
+                truncate_s: cuts[k].map(|s| Proposed::found(s, Computed, cut_because)),
+                crush_m: impact.map(|impact| impact.crush_m),
+                states: record.states,
+                notes: impact
+                    .filter(|_| !is_half)
+                    .map_or(Vec::new(), |impact| doubts_of_speed(record, impact)),
+            });
+        }
+        let speed = |run: &ProposedRun| run.speed_m_per_s.value().copied().unwrap_or_default();
+        runs.sort_by(|a, b| speed(a).total_cmp(&speed(b)).then(a.name.cmp(&b.name)));
+        let alike: Vec<String> = runs
+            .windows(2)
+            .filter(|pair| speed(&pair[0]) > 0.0)
+            .filter(|pair| is_near(speed(&pair[0]), speed(&pair[1]), SAME_SPEED))
+            .map(|pair| format!("{} and {}", pair[0].name, pair[1].name))
+            .collect();
+        if !alike.is_empty() {
+            warnings.push(format!(
+                "runs of one speed with different histories: {}; a group holds one design",
+                alike.join(", ")
+            ));
+        }
+        runs
+    }
+
+    /// Speed of a run, from its first velocities or those right before the contact.
+    fn speed(&self, record: &Record, impact: &Impact) -> Proposed<f64> {
+        let (state, time_s) = impact.state;
+        let values: Vec<String> = record.velocities.iter().map(|v| v[state].to_string()).collect();
+        let nodes: Vec<String> = self.recipe.nodes.iter().map(|n| n.id.to_string()).collect();
+        let when = match state {
+            0 => "in the first state".into(),
+            _ => format!("in the last state before the contact, at {:.3} ms", time_s * 1e3),
+        };
+        let unit = self.units.value().and_then(|units| SPEED.name_of(units.speed()));
+        let of = format!(
+            "{} of {} {when}: {} {}",
+            self.recipe.direction.velocity(),
+            nodes.join(" and "),
+            values.join(" and "),
+            unit.unwrap_or_default()
+        );
+        let (evidence, from) = match (values.len(), self.hints.half_model) {
+            (1, false) => (Read, of),
+            (1, true) => (Computed, format!("twice the {of}")),
+            _ => (Computed, format!("difference of the {of}")),
+        };
+        Proposed::found(impact.speed_m_per_s, evidence, from)
+    }
+
+    /// Whether the folders' names state twice the recorded speeds, for all runs whose name contains one.
+    fn names_say_half(&self) -> bool {
+        let mut named = self
+            .impacts()
+            .filter_map(|(record, impact)| Some((speed_in(&record.run.name)?, impact)))
+            .peekable();
+        self.recipe.kind == StudyKind::Wall
+            && !self.hints.half_model
+            && named.peek().is_some()
+            && named.all(|(named, impact)| is_near(named, 2.0 * impact.speed_m_per_s, SAME_SPEED))
+    }
+
+    /// Masses of the bodies and of the other bodies, where these are others.
+    fn masses(
+        &self,
+        warnings: &mut Vec<String>,
+    ) -> (Vec<Proposed<f64>>, Option<Vec<Proposed<f64>>>) {
+        let UserHints { mass_kg, other_mass_kg, .. } = *self.hints;
+        let is_weak = self.recipe.force.is_some() && self.recipe.residual > FOLLOWS;
+        let is_part = self.force_is_of_section();
+        let why = if is_weak {
+            format!(
+                "impulse and change of velocity differ by {} %, so momentum gives no mass: use --mass",
+                percent(self.recipe.residual)
+            )
+        } else if is_part {
+            "a section may carry only part of what stops the body, so momentum gives no mass: use --mass".into()
+        } else {
+            "no force and no energy give it: use --mass".into()
+        };
+        let estimates = |body: usize| -> Option<Vec<(String, MassEstimates)>> {
+            let of_runs = self.impacts().map(|(record, impact)| {
+                let mut estimates = *impact.masses.get(body)?;
+                estimates.by_momentum = estimates.by_momentum.filter(|_| !is_weak && !is_part);
+                estimates.by_energy = estimates.by_energy.filter(|_| !is_weak);
+                Some((record.run.name.clone(), estimates))
+            });
+            of_runs.collect()
+        };
+        let stated = |kg: f64, by: &str| vec![Proposed::found(kg, Given, by); self.records.len()];
+        let bodies = match mass_kg {
+            Some(kg) => stated(kg, "by --mass"),
+            None => measure::agree(&estimates(0).unwrap_or_default(), &why, warnings),
+        };
+        warnings.extend(measure::differ(&bodies));
+        if let Some(kg) = other_mass_kg {
+            return (bodies, Some(stated(kg, "by --other-mass")));
+        }
+        if mass_kg.is_none()
+            && let Some(others) = estimates(1)
+        {
+            let others = measure::agree(&others, &why, &mut Vec::new());
+            let are_equal = |(a, b): (&Proposed<f64>, &Proposed<f64>)| match (a.value(), b.value())
+            {
+                (Some(a), Some(b)) => is_near(*a, *b, SAME_MASS),
+                (a, b) => a.is_none() && b.is_none(),
+            };
+            if !bodies.iter().zip(&others).all(are_equal) {
+                return (bodies, Some(others));
+            }
+        }
+        let is_weighed = mass_kg.is_none() && bodies.iter().any(|mass| mass.value().is_some());
+        let why = if is_weighed { None } else { self.why_other_masses_differ(warnings) };
+        let missing = |why: String| vec![Proposed::missing(why); bodies.len()];
+        let others = why.map(missing);
+        (bodies, others)
+    }
+
+    /// If nothing determines the masses, what the velocities show of the other body in the mean of the
+    /// runs: nothing, if it is as heavy as the first one.
+    fn why_other_masses_differ(&self, warnings: &mut Vec<String>) -> Option<String> {
+        let ratios: Option<Vec<f64>> = self.records.iter().map(Record::mass_ratio).collect();
+        let ratios = ratios.filter(|all| !all.is_empty() && self.recipe.residual <= FOLLOWS)?;
+        let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+        if is_near(mean, 1.0, UNEQUAL) {
+            return None;
+        }
+        let times = digits(mean);
+        if self.hints.mass_kg.is_some() {
+            warnings.push(format!(
+                "mass: by their velocities the other body is {times} times as heavy, and --mass alone would apply to both: use --other-mass"
+            ));
+            return None;
+        }
+        Some(format!("by their velocities {times} times the mass: use --other-mass"))
+    }
+}
+
+/// Speeds in a folder's name and the run's own deck that contradict the record.
+fn doubts_of_speed(record: &Record, impact: &Impact) -> Vec<String> {
+    let (run, first) = (&record.run, record.closing(impact.state.0));
+    let mut notes = Vec::new();
+    if let Some(named) = speed_in(&run.name)
+        && !is_near(named, impact.speed_m_per_s, SAME_SPEED)
+    {
+        notes.push(format!(
+            "the folder's name states {}, the record {}",
+            km_per_h(named),
+            km_per_h(impact.speed_m_per_s)
+        ));
+    }
+    if let Some((path, deck)) = &run.sources.deck
+        && path.parent() == Some(&run.path)
+        && let Some(stated) = deck.impact_speed()
+        && !is_near(stated.speed, first, SAME_SPEED)
+    {
+        notes.push(format!(
+            "the deck {}, line {}, states {} in its units, the record {first}",
+            shown_name(path),
+            stated.at.line,
+            stated.speed
+        ));
+    }
+    notes
 }
 
 /// The units that the runs' decks state, with the place; warns where they contradict each other.
 pub(super) fn stated_units(
-    runs: &[Recorded],
+    runs: &[Record],
     warnings: &mut Vec<String>,
 ) -> Option<(UnitSystem, String)> {
-    let mut stated = runs.iter().filter_map(|run| {
-        let (path, deck) = run.run.sources.deck.as_ref()?;
+    let mut stated = runs.iter().filter_map(|Record { run, .. }| {
+        let (path, deck) = run.sources.deck.as_ref()?;
         let units = deck.units.as_ref()?;
-        let is_own = path.parent() == Some(&run.run.path);
-        let above = if is_own { "" } else { " above the runs" };
+        let above = if path.parent() == Some(&run.path) { "" } else { " above the runs" };
         let place = format!("the deck {}{above}, line {}", shown_name(path), units.at.line);
         Some((units.system?, format!("{place}: \"{}\"", units.text.trim())))
     });
@@ -277,238 +456,4 @@ pub(super) fn stated_units(
         return None;
     }
     Some(first)
-}
-
-/// Commented entries of the runs that are left out, so that the user can take them all the same.
-pub(super) fn entries_of_left_out(proposal: &mut Proposal, seen: Seen<'_>) {
-    for out in &mut proposal.left_out {
-        out.entry = match out.reason {
-            Reason::Empty | Reason::NoSolverFiles | Reason::OnlyDeck => None,
-            _ => seen(&out.path),
-        };
-    }
-}
-
-/// Masses of a pair that differ by more, according to their velocities, are not equal.
-const UNEQUAL: f64 = 0.1;
-
-/// The runs by speed, then by name.
-pub(super) fn runs(
-    measured: &Measured<'_>,
-    given: &UserHints,
-    truncated: &[Option<f64>],
-    seen: Seen<'_>,
-    warnings: &mut Vec<String>,
-) -> Vec<ProposedRun> {
-    let (bodies, others) = masses(measured, given, warnings);
-    let is_half = names_say_half(measured, given);
-    if is_half {
-        warnings.push("the folders' names state twice the recorded speeds: closing speeds of half models? Then use --half-model".into());
-    }
-    let mut runs: Vec<ProposedRun> = measured
-        .recorded
-        .iter()
-        .enumerate()
-        .map(|(k, recorded)| {
-            let run = measured.runs.get(k);
-            let folder = recorded.run.path.clone();
-            let no_units = || Proposed::missing("it is unknown without units");
-            ProposedRun {
-                path: seen(&folder).unwrap_or_default(),
-                folder,
-                name: recorded.run.name.clone(),
-                speed_m_per_s: run.map_or_else(no_units, |run| speed(run, measured, given)),
-                mass_kg: bodies.get(k).cloned().unwrap_or_else(no_units),
-                other_mass_kg: others.as_ref().and_then(|others| others.get(k)).cloned(),
-                truncate_s: truncated.get(k).copied().flatten().map(|s| {
-                    let from = "the last state follows the previous one too soon for the filter";
-                    Proposed::found(s, Evidence::Computed(from.into()))
-                }),
-                crush_m: run.map(|run| run.crush_m),
-                states: recorded.record.states,
-                notes: run.filter(|_| !is_half).map_or(Vec::new(), doubts_of_speed),
-            }
-        })
-        .collect();
-    let speed = |run: &ProposedRun| run.speed_m_per_s.value().copied().unwrap_or_default();
-    runs.sort_by(|a, b| speed(a).total_cmp(&speed(b)).then(a.name.cmp(&b.name)));
-    let alike = runs.windows(2).filter(|pair| {
-        let (a, b) = (speed(&pair[0]), speed(&pair[1]));
-        a > 0.0 && is_near(a, b, SAME_SPEED)
-    });
-    let alike: Vec<String> =
-        alike.map(|pair| format!("{} and {}", pair[0].name, pair[1].name)).collect();
-    if !alike.is_empty() {
-        warnings.push(format!(
-            "runs of one speed with different histories: {}; a group holds one design",
-            alike.join(", ")
-        ));
-    }
-    runs
-}
-
-/// Speed of a run, from its first velocities or those right before the contact.
-fn speed(run: &SiRun<'_>, measured: &Measured<'_>, given: &UserHints) -> Proposed<f64> {
-    let (state, time_s) = run.state;
-    let record = &run.recorded.record;
-    let values: Vec<String> = record.velocities.iter().map(|v| v[state].to_string()).collect();
-    let nodes: Vec<String> = measured.agreed.nodes.iter().map(|n| n.id.to_string()).collect();
-    let when = match state {
-        0 => "in the first state".into(),
-        _ => format!("in the last state before the contact, at {:.3} ms", time_s * 1e3),
-    };
-    let of = format!("{} of {} {when}", measured.agreed.direction.velocity(), nodes.join(" and "));
-    let unit = measured.units.value().and_then(|units| SPEED.name_of(units.speed()));
-    let values = format!("{} {}", values.join(" and "), unit.unwrap_or_default());
-    let evidence = match (record.velocities.len(), given.half_model) {
-        (1, false) => Evidence::Read(format!("{of}: {values}")),
-        (1, true) => Evidence::Computed(format!("twice the {of}: {values}")),
-        _ => Evidence::Computed(format!("difference of the {of}: {values}")),
-    };
-    Proposed::found(run.speed_m_per_s, evidence)
-}
-
-/// Whether the folders' names state twice the recorded speeds, for all runs whose name contains one.
-fn names_say_half(measured: &Measured<'_>, given: &UserHints) -> bool {
-    let said: Vec<bool> = measured
-        .runs
-        .iter()
-        .filter_map(|run| Some((run, speed_in(&run.recorded.run.name)?)))
-        .map(|(run, said)| is_near(said, 2.0 * run.speed_m_per_s, SAME_SPEED))
-        .collect();
-    let is_single = measured.agreed.kind == StudyKind::Wall && !given.half_model;
-    is_single && !said.is_empty() && said.into_iter().all(|is_twice| is_twice)
-}
-
-/// Speeds in a folder's name and the run's own deck that contradict the record.
-fn doubts_of_speed(run: &SiRun<'_>) -> Vec<String> {
-    let Recorded { run: of, record } = run.recorded;
-    let first = record.closing(run.state.0);
-    let mut notes = Vec::new();
-    let said = speed_in(&of.name);
-    if let Some(said) = said.filter(|said| !is_near(*said, run.speed_m_per_s, SAME_SPEED)) {
-        notes.push(format!(
-            "the folder's name states {}, the record {}",
-            km_per_h(said),
-            km_per_h(run.speed_m_per_s)
-        ));
-    }
-    if let Some((path, deck)) = &of.sources.deck
-        && path.parent() == Some(&of.path)
-        && let Some(said) =
-            deck.impact_speed().filter(|said| !is_near(said.speed, first, SAME_SPEED))
-    {
-        notes.push(format!(
-            "the deck {}, line {}, states {} in its units, the record {first}",
-            shown_name(path),
-            said.at.line,
-            said.speed
-        ));
-    }
-    notes
-}
-
-/// Masses of the bodies and of the other bodies, where these are others.
-fn masses(
-    measured: &Measured<'_>,
-    given: &UserHints,
-    warnings: &mut Vec<String>,
-) -> (Vec<Proposed<f64>>, Option<Vec<Proposed<f64>>>) {
-    let agreed = measured.agreed;
-    let is_weak = agreed.force.is_some() && agreed.residual > FOLLOWS;
-    let is_part = agreed.force.as_ref().is_some_and(|force| force.file == "secforc");
-    let why = match &agreed.force {
-        Some(_) if is_weak => format!(
-            "impulse and change of velocity differ by {} %, so momentum gives no mass: use --mass",
-            percent(agreed.residual)
-        ),
-        Some(_) if is_part => {
-            "a section may carry only part of what stops the body, so momentum gives no mass: use --mass".into()
-        }
-        _ => "no force and no energy give it: use --mass".into(),
-    };
-    let of =
-        |weighed: fn(&SiRun<'_>) -> Option<MassEstimates>| -> Option<Vec<(String, MassEstimates)>> {
-            let all = measured.runs.iter().map(|run| {
-                let weighed = match (is_weak, is_part) {
-                    (true, _) => MassEstimates::default(),
-                    (false, true) => MassEstimates { by_momentum: None, ..weighed(run)? },
-                    (false, false) => weighed(run)?,
-                };
-                Some((run.recorded.run.name.clone(), weighed))
-            });
-            all.collect()
-        };
-    let stated = |kg: Option<f64>, by: &str| {
-        kg.map(|kg| {
-            let one = Proposed::found(kg, Evidence::UserHints(format!("by {by}")));
-            vec![one; measured.recorded.len()]
-        })
-    };
-    let of_bodies = of(|run| Some(run.body)).unwrap_or_default();
-    let bodies = stated(given.mass_kg, "--mass")
-        .unwrap_or_else(|| measure::agree(&of_bodies, &why, warnings));
-    let others = stated(given.other_mass_kg, "--other-mass").or_else(|| {
-        let of_others = of(|run| run.other).filter(|_| given.mass_kg.is_none())?;
-        Some(measure::agree(&of_others, &why, &mut Vec::new()))
-    });
-    warnings.extend(measure::differ(&bodies));
-    let (bodies, others) = match others {
-        Some(others) if given.other_mass_kg.is_none() => one_mass(bodies, others),
-        others => (bodies, others),
-    };
-    let is_weighed = given.mass_kg.is_none() && bodies.iter().any(|mass| mass.value().is_some());
-    match others {
-        None if !is_weighed => {
-            let others = by_ratio(&bodies, measured, given, warnings);
-            (bodies, others)
-        }
-        others => (bodies, others),
-    }
-}
-
-/// If nothing determines the masses, what the velocities show of the other body: nothing, if they are
-/// as heavy as the first ones.
-fn by_ratio(
-    bodies: &[Proposed<f64>],
-    measured: &Measured<'_>,
-    given: &UserHints,
-    warnings: &mut Vec<String>,
-) -> Option<Vec<Proposed<f64>>> {
-    let times = digits(unequal(measured)?);
-    if given.mass_kg.is_some() {
-        warnings.push(format!(
-            "mass: by their velocities the other body is {times} times as heavy, and --mass alone would apply to both: use --other-mass"
-        ));
-        return None;
-    }
-    let why = format!("by their velocities {times} times the mass: use --other-mass");
-    Some(vec![Proposed::missing(why); bodies.len()])
-}
-
-/// Mass of the other bodies over that of the first ones, if the velocities of the runs say in
-/// the mean that they differ.
-fn unequal(measured: &Measured<'_>) -> Option<f64> {
-    if measured.agreed.residual > FOLLOWS {
-        return None;
-    }
-    let ratios: Option<Vec<f64>> =
-        measured.recorded.iter().map(|run| run.record.mass_ratio()).collect();
-    let ratios = ratios.filter(|ratios| !ratios.is_empty())?;
-    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
-    (!is_near(mean, 1.0, UNEQUAL)).then_some(mean)
-}
-
-/// Masses of both bodies, as one where they are equal in all runs.
-fn one_mass(
-    bodies: Vec<Proposed<f64>>,
-    others: Vec<Proposed<f64>>,
-) -> (Vec<Proposed<f64>>, Option<Vec<Proposed<f64>>>) {
-    let pairs = || bodies.iter().zip(&others);
-    let are_equal = |(a, b): (&Proposed<f64>, &Proposed<f64>)| match (a.value(), b.value()) {
-        (Some(a), Some(b)) => measure::are_equal(*a, *b),
-        (None, None) => true,
-        _ => false,
-    };
-    if pairs().all(are_equal) { (bodies, None) } else { (bodies, Some(others)) }
 }

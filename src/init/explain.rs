@@ -32,6 +32,32 @@ fn best(body: &Body, force: usize) -> (f64, f64) {
     })
 }
 
+/// The pair of bodies with the smallest residual, and that.
+fn best_pair(
+    bodies: usize,
+    residual: impl Fn(usize, usize) -> Option<f64>,
+) -> Option<(f64, Vec<usize>)> {
+    let pairs = (0..bodies).flat_map(|a| (a + 1..bodies).map(move |b| (a, b)));
+    let known = pairs.filter_map(|(a, b)| Some((residual(a, b)?, vec![a, b])));
+    known.min_by(|x, y| x.0.total_cmp(&y.0))
+}
+
+/// The kind that is requested; else a pair that is related, or a single body.
+fn chosen(
+    kind: Option<StudyKind>,
+    force: Option<usize>,
+    pair: Option<(f64, Vec<usize>)>,
+    single: Option<(f64, Vec<usize>)>,
+) -> Option<Explanation> {
+    let is_pair = match kind {
+        Some(kind) => kind == StudyKind::Pair,
+        None => pair.as_ref().is_some_and(|(residual, _)| *residual < RELATED),
+    };
+    let kind = if is_pair { StudyKind::Pair } else { StudyKind::Wall };
+    let (residual, bodies) = if is_pair { pair } else { single }?;
+    Some(Explanation { kind, force, bodies, residual })
+}
+
 /// What a force explains: two bodies that it drives apart, or one that it stops.
 pub(super) fn of_force(
     survey: &Survey,
@@ -39,23 +65,12 @@ pub(super) fn of_force(
     kind: Option<StudyKind>,
 ) -> Option<Explanation> {
     let bodies: Vec<(f64, f64)> = survey.bodies.iter().map(|body| best(body, force)).collect();
-    let indices = 0..bodies.len();
-    let pairs = indices.clone().flat_map(|a| (a + 1..bodies.len()).map(move |b| (a, b)));
-    let pair = pairs
-        .filter(|&(a, b)| bodies[a].1 * bodies[b].1 < 0.0)
-        .map(|(a, b)| (bodies[a].0.max(bodies[b].0), vec![a, b]))
-        .min_by(|x, y| x.0.total_cmp(&y.0));
-    let single = indices.map(|a| (bodies[a].0, vec![a])).min_by(|x, y| x.0.total_cmp(&y.0));
-    let explanation =
-        |kind, (residual, bodies)| Explanation { kind, force: Some(force), bodies, residual };
-    match kind {
-        Some(StudyKind::Pair) => pair.map(|found| explanation(StudyKind::Pair, found)),
-        Some(StudyKind::Wall) => single.map(|found| explanation(StudyKind::Wall, found)),
-        None => match pair.filter(|(residual, _)| *residual < RELATED) {
-            Some(found) => Some(explanation(StudyKind::Pair, found)),
-            None => single.map(|found| explanation(StudyKind::Wall, found)),
-        },
-    }
+    let pair = best_pair(bodies.len(), |a, b| {
+        let is_apart = bodies[a].1 * bodies[b].1 < 0.0;
+        is_apart.then_some(bodies[a].0.max(bodies[b].0))
+    });
+    let single = bodies.iter().enumerate().map(|(a, body)| (body.0, vec![a]));
+    chosen(kind, Some(force), pair, single.min_by(|x, y| x.0.total_cmp(&y.0)))
 }
 
 /// The force that explains most: of those that a node follows, the one with the largest impulse.
@@ -72,10 +87,10 @@ pub(super) fn best_of(survey: &Survey, kind: Option<StudyKind>) -> Option<Explan
                 explained.iter().filter(|(_, e)| e.residual <= FOLLOWS.max(2.0 * least));
             following.filter(move |(force, _)| files.contains(&force.file))
         };
-        let most = of_kind().map(|(force, _)| size(force)).fold(0.0, f64::max);
+        let most = of_kind().map(|(force, _)| force.size()).fold(0.0, f64::max);
         // The survey has them by size: of equal ones a wall's comes before an interface's.
-        let equal = of_kind().filter(|(force, _)| size(force) >= (1.0 - EQUAL) * most);
-        equal.min_by_key(|(force, _)| rank(force)).map(|(_, e)| e.clone())
+        let equal = of_kind().filter(|(force, _)| force.size() >= (1.0 - EQUAL) * most);
+        equal.min_by_key(|(force, _)| force.rank()).map(|(_, e)| e.clone())
     };
     // A section carries only what passes through it, and a rigid body may be the one that is stopped: neither represents
     // a contact that is there.
@@ -87,18 +102,9 @@ pub(super) fn best_of(survey: &Survey, kind: Option<StudyKind>) -> Option<Explan
 /// other at one ratio all along, as m₁Δv₁ = −m₂Δv₂ has it for two that meet only each other; else
 /// the fastest one. A pair that is requested is the two that come closest to it.
 pub(super) fn without_force(survey: &Survey, kind: Option<StudyKind>) -> Option<Explanation> {
-    let explanation = |kind, bodies, residual| Explanation { kind, force: None, bodies, residual };
-    let bodies = 0..survey.bodies.len();
-    let pairs = bodies.clone().flat_map(|a| (a + 1..bodies.end).map(move |b| (a, b)));
-    let pair = pairs
-        .map(|(a, b)| explanation(StudyKind::Pair, vec![a, b], opposed(survey, a, b)))
-        .min_by(|x, y| x.residual.total_cmp(&y.residual));
-    let single = || (!bodies.is_empty()).then(|| explanation(StudyKind::Wall, vec![0], 1.0));
-    match kind {
-        Some(StudyKind::Pair) => pair,
-        Some(StudyKind::Wall) => single(),
-        None => pair.filter(|pair| pair.residual < RELATED).or_else(single),
-    }
+    let bodies = survey.bodies.len();
+    let pair = best_pair(bodies, |a, b| Some(opposed(survey, a, b)));
+    chosen(kind, None, pair, (bodies > 0).then(|| (1.0, vec![0])))
 }
 
 /// Whether the bodies of an explanation stop closing within the record: a run that died before says
@@ -123,14 +129,4 @@ fn opposed(survey: &Survey, a: usize, b: usize) -> f64 {
         fit if fit.mass < 0.0 => fit.residual,
         _ => 1.0,
     }
-}
-
-/// Largest impulse of a force, in the file's units.
-pub(super) fn size(force: &ForceCandidate) -> f64 {
-    force.impulse.iter().map(|j| j.abs()).fold(0.0, f64::max)
-}
-
-fn rank(force: &ForceCandidate) -> (usize, i64) {
-    let place = super::sources::FORCES.iter().position(|name| *name == force.file);
-    (place.unwrap_or(usize::MAX), force.id)
 }

@@ -8,6 +8,7 @@ use std::path::{Component, Path, PathBuf};
 use serde::Serialize;
 
 use crate::error::{Error, error};
+use crate::file::folder_of;
 use crate::guess;
 use crate::solver::decks::{self, Search};
 use crate::solver::runs::{renamed_file, run_folders};
@@ -28,16 +29,9 @@ impl Folders {
         for root in given {
             let below = run_folders(root).map_err(|source| {
                 let guess = is_there_instead(root).filter(|_| !root.exists());
-                error!(
-                    Study,
-                    "{path}: {source}{}",
-                    guess.as_ref().map_or(String::new(), |guess| format!(
-                        "; did you mean {}?",
-                        guess.display()
-                    )),
-                    path = root.display()
-                )
-                .caused_by(source)
+                let guess = guess.map(|guess| format!("; did you mean {}?", guess.display()));
+                let (path, guess) = (root.display(), guess.unwrap_or_default());
+                error!(Study, "{path}: {source}{guess}").caused_by(source)
             })?;
             let shown = |path: PathBuf| match path.strip_prefix(".") {
                 Ok(below) if !below.as_os_str().is_empty() => below.to_path_buf(),
@@ -57,14 +51,13 @@ impl Folders {
         if found.runs.is_empty() {
             let searched: Vec<String> = given.iter().map(|p| p.display().to_string()).collect();
             let searched = searched.join(", ");
+            let left_out = match &found.left_out[..] {
+                [] => String::new(),
+                left_out => format!("\n{}", listed(left_out)),
+            };
             return Err(error!(
                 Study,
-                "no folder in {searched} holds solver files (nodout, rwforc, rcforc, binout, …T01): give the runs' folders, or one above them{}",
-                if found.left_out.is_empty() {
-                    String::new()
-                } else {
-                    format!("\n{}", listed(&found.left_out))
-                }
+                "no folder in {searched} holds solver files (nodout, rwforc, rcforc, binout, …T01): give the runs' folders, or one above them{left_out}"
             ));
         }
         Ok(found)
@@ -74,24 +67,19 @@ impl Folders {
     pub(super) fn refuse_groups(&self) -> Result<(), Error> {
         let mut groups: BTreeMap<PathBuf, usize> = BTreeMap::new();
         for run in &self.runs {
-            let parent = run.parent().filter(|p| !p.as_os_str().is_empty());
-            *groups.entry(parent.unwrap_or(Path::new(".")).into()).or_default() += 1;
+            *groups.entry(folder_of(run).into()).or_default() += 1;
         }
         groups.retain(|_, runs| *runs > 1);
-        match groups.len() {
-            0 | 1 => Ok(()),
-            _ => Err(error!(
-                Study,
-                "the runs are in {} folders of several runs each, which look like different groups: {listed}. Give one of them (crumple init {}), or use --group NAME if all belong to one group",
-                groups.len(),
-                groups.keys().next().map_or(String::new(), |path| path.display().to_string()),
-                listed = groups
-                    .iter()
-                    .map(|(path, runs)| format!("{} ({runs} runs)", path.display()))
-                    .collect::<Vec<_>>()
-                    .join(", ")
-            )),
-        }
+        let Some(first) = groups.keys().next().filter(|_| groups.len() > 1) else { return Ok(()) };
+        let listed: Vec<String> =
+            groups.iter().map(|(path, runs)| format!("{} ({runs} runs)", path.display())).collect();
+        Err(error!(
+            Study,
+            "the runs are in {count} folders of several runs each, which look like different groups: {listed}. Give one of them (crumple init {first}), or use --group NAME if all belong to one group",
+            count = groups.len(),
+            listed = listed.join(", "),
+            first = first.display()
+        ))
     }
 
     /// Name of the folder that holds all runs: their group, if nobody names it.
@@ -116,7 +104,7 @@ impl Folders {
 /// The folder next to a missing one whose name is most like its name.
 fn is_there_instead(missing: &Path) -> Option<PathBuf> {
     let parent = missing.parent().filter(|p| !p.as_os_str().is_empty());
-    let entries = parent.unwrap_or(Path::new(".")).read_dir().ok()?;
+    let entries = folder_of(missing).read_dir().ok()?;
     let folders = entries.filter_map(Result::ok).filter(|entry| entry.path().is_dir());
     let mut names: Vec<String> =
         folders.filter_map(|entry| entry.file_name().into_string().ok()).collect();
@@ -227,7 +215,6 @@ impl LeftOut {
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "reason", rename_all = "snake_case")]
 pub(crate) enum Reason {
-    /// There is nothing in the folder.
     #[error("the folder is empty")]
     Empty,
     #[error("it holds no solver files")]
@@ -236,33 +223,21 @@ pub(crate) enum Reason {
     #[error(
         "it holds no file with a solver's name, but {file} looks like a {format}: rename it accordingly"
     )]
-    Renamed {
-        file: String,
-        /// What it looks like.
-        format: String,
-    },
-    /// There is a deck and nothing that a solver wrote.
+    Renamed { file: String, format: String },
     #[error("it holds a deck but no solver output: it has not been run")]
     OnlyDeck,
-    /// A folder or file cannot be read.
     #[error("{why}")]
     Unreadable { why: String },
-    /// No file holds motions of nodes.
     #[error("it has no histories of nodes (a nodout, or a binout or T01 with one): it has {found}")]
-    NoMotion {
-        /// Its files, as a list.
-        found: String,
-    },
+    NoMotion { found: String },
     /// The record has hardly begun.
     #[error("it terminated early: {file} holds {states} complete {}{damage}", if *.states == 1 { "state" } else { "states" })]
     FewStates {
         file: String,
-        /// How many complete states it holds.
         states: usize,
         /// What is damaged, in brackets; empty if nothing is.
         damage: String,
     },
-    /// The record ends before the crash does.
     #[error(
         "it terminated early: the record ends at {end}, while the bodies still close at {} % of their first speed{damage}", (share * 100.0).round()
     )]
@@ -274,7 +249,6 @@ pub(crate) enum Reason {
         /// What is damaged, in brackets; empty if nothing is.
         damage: String,
     },
-    /// No node moves at the start.
     #[error(
         "nothing moves in its first state, so there is no impact speed to read: if a wall moves, write its study by hand"
     )]
@@ -282,31 +256,15 @@ pub(crate) enum Reason {
     /// The chosen histories cannot be used.
     #[error("{why}")]
     Unusable { why: String },
-    /// Its files are those of another run.
     #[error("its files are identical to those of {of}")]
-    SameBytes {
-        /// The other run's folder.
-        of: PathBuf,
-    },
+    SameBytes { of: PathBuf },
     /// Its histories are those of another run, in other files.
     #[error("its histories are identical to those of {of}")]
-    SameHistories {
-        /// The other run's folder.
-        of: PathBuf,
-    },
-    /// The study's recipe does not fit it.
+    SameHistories { of: PathBuf },
     #[error("it needs a different recipe from the other runs: {why}")]
-    OtherRecipe {
-        /// What differs.
-        why: String,
-    },
-    /// It is of another model than the other runs.
+    OtherRecipe { why: String },
     #[error("it seems to be a different model: {why}")]
-    OtherModel {
-        /// What differs.
-        why: String,
-    },
-    /// The study's build would refuse it.
+    OtherModel { why: String },
     #[error("crumple build would refuse it: {why}")]
     Refused { why: String },
 }

@@ -1,10 +1,10 @@
-//! Results of the chosen histories of a run in SI: speed, crush, times, masses.
+//! Results of the chosen histories of a run in SI: speed, crush, times, masses; and what follows from
+//! them for filter and sampling.
 
-use super::UserHints;
-use super::agree::Agreed;
-use super::proposal::{Evidence, Proposed};
-use super::record::{RawMasses, Record, Recorded};
-use super::units::{Magnitudes, digits, shown_mass, trimmed};
+use super::proposal::Evidence::{Computed, Guessed, Read};
+use super::proposal::Proposed;
+use super::record::Record;
+use super::units::{digits, shown_mass, trimmed};
 use crate::curve::contact;
 use crate::curve::recipe::{Filter, Sampling};
 use crate::signal::integral;
@@ -13,99 +13,67 @@ use crate::unit::UnitSystem;
 /// Speeds that differ by less are one.
 pub(super) const SAME_SPEED: f64 = 0.01;
 
-/// All runs of a proposal with what they have in common.
-pub(super) struct Measured<'a> {
-    pub agreed: &'a Agreed,
-    pub recorded: &'a [Recorded],
-    /// As many as were recorded, or none if the units are not known.
-    pub runs: &'a [SiRun<'a>],
-    pub(crate) units: &'a Proposed<UnitSystem>,
-}
-
-pub(super) struct SiRun<'a> {
-    pub recorded: &'a Recorded,
+/// What a run's record says in SI.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Impact {
     /// Closing speed before the contact, twice the run's for half a model.
     pub speed_m_per_s: f64,
     /// The state that it is taken from, and its time.
     pub state: (usize, f64),
     pub crush_m: f64,
-    pub times: Times,
-    pub body: MassEstimates,
-    pub other: Option<MassEstimates>,
-    /// Times and values of the force, positive in compression.
-    pub force: Option<(Vec<f64>, Vec<f64>)>,
+    pub contact_s: f64,
+    pub last_s: f64,
+    /// Usual interval of the states.
+    pub interval_s: f64,
+    pub states: usize,
+    /// Of the body, and of a pair the other body.
+    pub masses: Vec<MassEstimates>,
+    /// Empty without a force.
+    pub force_time_s: Vec<f64>,
+    /// Positive in compression.
+    pub force_n: Vec<f64>,
 }
 
-impl Record {
-    /// What depends on the units.
-    pub(super) fn magnitudes(&self) -> Magnitudes {
-        let (begin, end) = (self.contact(), self.loading_end().unwrap_or(self.time.len() - 1));
-        Magnitudes {
-            speed: self.closing(0),
-            crush: (self.travel[end] - self.travel[begin.min(end)]).abs(),
-            loading_time: self.time[end] - self.time[begin.min(end)],
-            mass: self.masses().map(|masses| masses.body),
+impl Impact {
+    pub(super) fn of(record: &Record, units: UnitSystem, half_model: bool) -> Self {
+        let bodies = if half_model { 2.0 } else { 1.0 };
+        let in_s = |time: &[f64]| time.iter().map(|t| t * units.time_s).collect::<Vec<f64>>();
+        let (time_s, force_time_s) = (in_s(&record.time), in_s(&record.force_time));
+        // Turned so that the impulse is positive.
+        let impulse = integral(&record.force_time, &record.force).last().copied();
+        let sign = if impulse.is_some_and(|impulse| impulse < 0.0) { -1.0 } else { 1.0 };
+        let force_n: Vec<f64> = record.force.iter().map(|f| sign * f * units.force()).collect();
+        let mut contact_s = time_s[0];
+        if !force_n.is_empty() {
+            let threshold_n = contact::threshold_n(&force_n, contact::THRESHOLD);
+            let onset = contact::onset(&force_time_s, &force_n, threshold_n);
+            contact_s = onset.map_or(contact_s, |onset| onset.time_s.max(contact_s));
         }
-    }
-}
-
-impl<'a> SiRun<'a> {
-    pub(super) fn of(recorded: &'a Recorded, units: UnitSystem, given: &UserHints) -> Self {
-        let record = &recorded.record;
-        let bodies = if given.half_model { 2.0 } else { 1.0 };
-        let time_s: Vec<f64> = record.time.iter().map(|t| t * units.time_s).collect();
-        let force = record.force.as_ref().map(|force| in_si(force, units));
-        let contact_s = force.as_ref().and_then(|(time_s, force_n)| {
-            let threshold_n = contact::threshold_n(force_n, contact::THRESHOLD);
-            Some(contact::onset(time_s, force_n, threshold_n)?.time_s)
-        });
-        let contact_s = contact_s.unwrap_or(time_s[0]).max(time_s[0]);
         let before = time_s.partition_point(|&t| t <= contact_s).saturating_sub(1);
         // The first velocities are the deck's; where they have changed by the contact, these count.
         let is_kept = is_near(record.closing(0), record.closing(before), SAME_SPEED);
         let state = if is_kept { 0 } else { before };
         let end = record.loading_end().unwrap_or(time_s.len() - 1);
         let crush = (record.travel[end] - record.travel[before.min(end)]).abs();
-        let (momentum, energy) = (record.masses(), record.masses_by_energy());
-        // A kinetic energy has the unit of mass times speed squared.
-        let weighed = |of: fn(&RawMasses) -> Option<f64>| MassEstimates {
-            by_momentum: momentum.as_ref().and_then(of).map(|mass| mass * units.mass_kg),
-            in_free_flight: momentum.is_some_and(|masses| masses.in_free_flight),
-            by_energy: energy.as_ref().and_then(of).map(|mass| mass * units.mass_kg),
-        };
-        let of_force = force.as_ref().map(|(time_s, _)| interval(time_s));
         Self {
-            recorded,
             speed_m_per_s: bodies * record.closing(state) * units.speed(),
             state: (state, time_s[state]),
             crush_m: bodies * crush * units.length_m,
-            times: Times {
-                contact_s,
-                last_s: time_s[time_s.len() - 1],
-                interval_s: of_force.unwrap_or_else(|| interval(&time_s)),
-                states: record.states,
-            },
-            body: weighed(|masses| Some(masses.body)),
-            other: record.velocities.get(1).map(|_| weighed(|masses| masses.other)),
-            force,
+            contact_s,
+            last_s: time_s[time_s.len() - 1],
+            interval_s: interval(if force_n.is_empty() { &time_s } else { &force_time_s }),
+            states: record.states,
+            masses: record.masses(units.mass_kg),
+            force_time_s,
+            force_n,
         }
     }
-}
-
-/// Times in s and forces in N, turned so that their impulse is positive.
-fn in_si((time, force): &(Vec<f64>, Vec<f64>), units: UnitSystem) -> (Vec<f64>, Vec<f64>) {
-    let time_s: Vec<f64> = time.iter().map(|t| t * units.time_s).collect();
-    let sign = match integral(time, force).last() {
-        Some(impulse) if *impulse < 0.0 => -1.0,
-        _ => 1.0,
-    };
-    (time_s, force.iter().map(|f| sign * f * units.force()).collect())
 }
 
 /// Masses by momentum and by kinetic energy that differ by less are one.
 const SAME_BY_ENERGY: f64 = 0.05;
 /// Masses of runs that differ by less are one: so much two runs of one model scatter.
-const SAME_MASS: f64 = 0.03;
+pub(super) const SAME_MASS: f64 = 0.03;
 
 /// What a run says of a mass, in kg.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -128,24 +96,20 @@ impl MassEstimates {
         }
     }
 
-    fn evidence(&self) -> String {
-        let other = |kg: Option<f64>, way: &str| {
-            kg.map_or(String::new(), |kg| format!(" ({way} {})", shown_mass(kg)))
+    /// What the mass follows from.
+    fn from(&self) -> String {
+        const IMPULSE: &str = "impulse of the force over the change of velocity";
+        let by_energy = (self.by_energy, "kinetic energy at the start");
+        let (from, (other, way)) = match self.kg() {
+            Some((_, true)) => (
+                "kinetic energy of the model at the start over ½v²".into(),
+                (self.by_momentum, "momentum"),
+            ),
+            _ if self.in_free_flight => (format!("{IMPULSE}, after the contact"), by_energy),
+            _ => (format!("{IMPULSE}, while loading (accurate to a few per cent)"), by_energy),
         };
-        match self.kg() {
-            Some((_, true)) => format!(
-                "kinetic energy of the model at the start over ½v²{}",
-                other(self.by_momentum, "momentum gives")
-            ),
-            _ if self.in_free_flight => format!(
-                "impulse of the force over the change of velocity, after the contact{}",
-                other(self.by_energy, "kinetic energy at the start gives")
-            ),
-            _ => format!(
-                "impulse of the force over the change of velocity, while loading (accurate to a few per cent){}",
-                other(self.by_energy, "kinetic energy at the start gives")
-            ),
-        }
+        let other = other.map(|kg| format!(" ({way} gives {})", shown_mass(kg)));
+        from + &other.unwrap_or_default()
     }
 }
 
@@ -157,17 +121,26 @@ pub(super) fn agree(
     why: &str,
     warnings: &mut Vec<String>,
 ) -> Vec<Proposed<f64>> {
-    warnings.extend(runs.iter().filter_map(|(name, weighed)| doubt(name, weighed)));
-    let known: Vec<(usize, f64)> =
-        runs.iter().enumerate().filter_map(|(k, (_, w))| Some((k, w.kg()?.0))).collect();
-    let mut by_mass = known.clone();
+    for (name, mass) in runs {
+        if let (Some(momentum), Some(energy)) = (mass.by_momentum, mass.by_energy)
+            && !is_near(momentum, energy, SAME_BY_ENERGY)
+        {
+            warnings.push(format!(
+                "mass: in {name} momentum gives {}, the kinetic energy at the start {}: the force acts on only part of the moving mass, or more than the bodies moves",
+                shown_mass(momentum),
+                shown_mass(energy)
+            ));
+        }
+    }
+    let mut by_mass: Vec<(usize, f64)> =
+        runs.iter().enumerate().filter_map(|(k, (_, mass))| Some((k, mass.kg()?.0))).collect();
     by_mass.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut found: Vec<Proposed<f64>> = runs.iter().map(|_| Proposed::missing(why)).collect();
     for one in by_mass.chunk_by(|a, b| is_near(a.1, b.1, SAME_MASS)) {
         let median = 0.5 * (one[(one.len() - 1) / 2].1 + one[one.len() / 2].1);
         let (least, most) = (one[0].1, one[one.len() - 1].1);
         for &(k, _) in one {
-            let mut from = runs[k].1.evidence();
+            let mut from = runs[k].1.from();
             if one.len() > 1 {
                 let range = if is_near(least, most, 5e-4) {
                     "all alike".into()
@@ -176,22 +149,10 @@ pub(super) fn agree(
                 };
                 from = format!("{from}; median of {} runs, {range}", one.len());
             }
-            found[k] = Proposed::found(rounded(median), Evidence::Computed(from));
+            found[k] = Proposed::found(rounded(median), Computed, from);
         }
     }
     found
-}
-
-/// Where momentum and kinetic energy give two masses.
-fn doubt(name: &str, weighed: &MassEstimates) -> Option<String> {
-    let (momentum, energy) = (weighed.by_momentum?, weighed.by_energy?);
-    (!is_near(momentum, energy, SAME_BY_ENERGY)).then(|| {
-        format!(
-            "mass: in {name} momentum gives {}, the kinetic energy at the start {}: the force acts on only part of the moving mass, or more than the bodies moves",
-            shown_mass(momentum),
-            shown_mass(energy)
-        )
-    })
 }
 
 pub(super) fn is_near(a: f64, b: f64, share: f64) -> bool {
@@ -206,11 +167,6 @@ fn rounded(kg: f64) -> f64 {
 /// A mass as in a study.
 pub(super) fn text(kg: f64) -> String {
     if kg >= 1e3 { format!("{}t", kg / 1e3) } else { format!("{kg}kg") }
-}
-
-/// Of the masses of a pair whether they are one.
-pub(super) fn are_equal(body: f64, other: f64) -> bool {
-    is_near(body, other, SAME_MASS)
 }
 
 /// That masses of the runs differ, if they do.
@@ -233,16 +189,6 @@ const CFC: u32 = 60;
 const FINEST_S: f64 = 1e-4;
 const MOST_STATES: f64 = 20_000.0;
 
-/// The times of a run's record.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Times {
-    pub contact_s: f64,
-    pub last_s: f64,
-    /// Usual interval of the states.
-    pub interval_s: f64,
-    pub states: usize,
-}
-
 /// Steps that differ from their median by less than this factor are one rate with jitter.
 const JITTER: f64 = 0.5;
 
@@ -262,23 +208,23 @@ pub(super) fn filter(means: Option<&str>, interval_s: f64) -> Proposed<Filter> {
     let longest_s = 1.0 / (10.0 * f64::from(CFC));
     let ms = digits(interval_s * 1e3);
     match means {
-        Some(why) => Proposed::found(Filter::None, Evidence::Read(why.into())),
-        None if interval_s <= longest_s => Proposed::found(
-            Filter::Cfc(CFC),
-            Evidence::Guessed(format!("the usual class; one force every {ms} ms allows it")),
-        ),
-        None => Proposed::found(
-            Filter::None,
-            Evidence::Computed(format!(
-                "one force every {ms} ms is too coarse for CFC {CFC}, which needs one every {} ms",
-                digits(longest_s * 1e3)
-            )),
-        ),
+        Some(why) => Proposed::found(Filter::None, Read, why),
+        None if interval_s <= longest_s => {
+            let from = format!("the usual class; one force every {ms} ms allows it");
+            Proposed::found(Filter::Cfc(CFC), Guessed, from)
+        }
+        None => {
+            let needed = digits(longest_s * 1e3);
+            let from = format!(
+                "one force every {ms} ms is too coarse for CFC {CFC}, which needs one every {needed} ms"
+            );
+            Proposed::found(Filter::None, Computed, from)
+        }
     }
 }
 
 /// Common times that cover every record from its contact on; the coarsest interval of all.
-pub(super) fn sampling(runs: &[Times]) -> Option<Proposed<Sampling>> {
+pub(super) fn sampling(runs: &[&Impact]) -> Option<Proposed<Sampling>> {
     let coarsest = runs.iter().map(|run| run.interval_s).fold(0.0, f64::max);
     let longest = runs.iter().map(|run| run.last_s - run.contact_s).fold(0.0, f64::max);
     if !(coarsest > 0.0 && longest > 0.0) {
@@ -289,23 +235,16 @@ pub(super) fn sampling(runs: &[Times]) -> Option<Proposed<Sampling>> {
     let states = (longest / interval_s * (1.0 + 1e-6)).floor() as usize + 1;
     let alike = runs.iter().all(|run| is_near(run.interval_s, coarsest, 0.01));
     let ms = |s: f64| digits(s * 1e3);
-    let from = match (alike, least > 1.01 * coarsest) {
-        (_, true) => format!(
-            "the coarsest record has a state every {} ms; {} ms is enough",
-            ms(coarsest),
-            ms(interval_s)
-        ),
-        (true, false) => {
-            format!("interval and length of the records, of up to {} states", most(runs))
-        }
-        (false, false) => "interval of the coarsest record, length of the longest".into(),
+    let from = if least > 1.01 * coarsest {
+        let (interval, enough) = (ms(coarsest), ms(interval_s));
+        format!("the coarsest record has a state every {interval} ms; {enough} ms is enough")
+    } else if alike {
+        let most = runs.iter().map(|run| run.states).max().unwrap_or(0);
+        format!("interval and length of the records, of up to {most} states")
+    } else {
+        "interval of the coarsest record, length of the longest".into()
     };
-    let sampling = Sampling { states: states.max(2), interval_s };
-    Some(Proposed::found(sampling, Evidence::Computed(from)))
-}
-
-fn most(runs: &[Times]) -> usize {
-    runs.iter().map(|run| run.states).max().unwrap_or(0)
+    Some(Proposed::found(Sampling { states: states.max(2), interval_s }, Computed, from))
 }
 
 /// The shortest decimal that is off by less than half an interval at the end of the record:
@@ -366,18 +305,14 @@ mod tests {
             ["24t", "20.24t", "812.3kg"]
         );
     }
-}
 
-#[cfg(test)]
-mod sampling_tests {
-    use super::*;
-
-    fn record(interval_s: f64, contact_s: f64, last_s: f64) -> Times {
-        Times { contact_s, last_s, interval_s, states: (last_s / interval_s) as usize + 1 }
+    fn record(interval_s: f64, contact_s: f64, last_s: f64) -> Impact {
+        let states = (last_s / interval_s) as usize + 1;
+        Impact { contact_s, last_s, interval_s, states, ..Impact::default() }
     }
 
-    fn proposed(runs: &[Times]) -> Sampling {
-        *sampling(runs).unwrap().value().unwrap()
+    fn proposed(runs: &[Impact]) -> Sampling {
+        *sampling(&runs.iter().collect::<Vec<_>>()).unwrap().value().unwrap()
     }
 
     #[test]

@@ -3,13 +3,13 @@
 //! Nothing is invented: a value is read, computed from what was read, or the most likely of several,
 //! and says so; unknown values are left to fill in.
 
-mod agree;
 mod describe;
 mod explain;
 mod folders;
 mod measure;
 mod proposal;
 mod propose;
+mod recipe;
 mod record;
 mod scenario;
 mod sources;
@@ -28,22 +28,20 @@ use crate::unit::UnitSystem;
 pub use folders::LeftOut;
 pub use proposal::Proposal;
 pub(crate) use proposal::Proposed;
-pub use propose::{Request, propose};
+pub use propose::propose;
 pub(crate) use scenario::propose_scenario;
 
-/// Refuses a file that exists already.
 pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
-    let is_there = std::fs::symlink_metadata(path)
-        .is_ok_and(|meta| meta.is_file() || meta.is_dir() || meta.is_symlink());
-    if is_there {
-        Err(error!(
+    if std::fs::symlink_metadata(path)
+        .is_ok_and(|meta| meta.is_file() || meta.is_dir() || meta.is_symlink())
+    {
+        return Err(error!(
             Study,
             "{path} exists already and is not overwritten: name another with -o, or remove it",
             path = path.display()
-        ))
-    } else {
-        Ok(())
+        ));
     }
+    Ok(())
 }
 
 /// What the caller already knows; it overrides what is found.
@@ -80,21 +78,17 @@ pub(crate) struct GivenForce {
     pub(crate) component: Option<String>,
 }
 
-/// A text that names no force.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "\"{text}\" is not a force: write FILE:ID[:SIDE][:COMPONENT] with a file of {}, such as rwforc:1 or rcforc:3:surfa:x_force",
-    FORCES.join(", ")
-)]
-pub(crate) struct ForceSpecError {
-    pub(crate) text: String,
-}
-
 impl FromStr for GivenForce {
-    type Err = ForceSpecError;
+    type Err = Error;
 
-    fn from_str(text: &str) -> Result<Self, ForceSpecError> {
-        let wrong = || ForceSpecError { text: text.into() };
+    fn from_str(text: &str) -> Result<Self, Error> {
+        let wrong = || {
+            error!(
+                Usage,
+                "\"{text}\" is not a force: write FILE:ID[:SIDE][:COMPONENT] with a file of {}, such as rwforc:1 or rcforc:3:surfa:x_force",
+                FORCES.join(", ")
+            )
+        };
         let mut parts = text.split(':');
         let file = parts.next().filter(|file| FORCES.contains(file)).ok_or_else(wrong)?;
         let id = parts.next().and_then(|id| id.parse().ok()).ok_or_else(wrong)?;

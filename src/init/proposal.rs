@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use super::agree::Alternative;
 use super::folders::LeftOut;
+use super::recipe::Alternative;
 use crate::curve::recipe::{DeflectionSource, Filter, ForceSource, Sampling};
 use crate::study::StudyKind;
 use crate::unit::UnitSystem;
@@ -15,9 +15,7 @@ use crate::unit::UnitSystem;
 pub struct Proposal {
     /// Group of the curve database, and name of the study.
     pub(crate) group: Proposed<String>,
-    /// Units of the solver files.
     pub(crate) units: Proposed<UnitSystem>,
-    /// Kind of impact.
     pub(crate) kind: Proposed<StudyKind>,
     /// Whether the runs are of one body against the symmetry plane of a pair: only known if the
     /// caller says so.
@@ -28,25 +26,20 @@ pub struct Proposal {
     /// Nodes that could represent the same bodies, a list for each.
     pub(crate) other_nodes: Vec<Vec<Alternative>>,
     pub(crate) force: Proposed<ForceSource>,
-    /// Title of the wall or interface.
     pub(crate) force_title: Option<String>,
     /// Whether the other side of the interface has the same force.
     pub(crate) other_side: bool,
-    /// Forces that could be meant.
     pub(crate) other_forces: Vec<Alternative>,
     pub(crate) filter: Proposed<Filter>,
-    /// Common times of the runs.
     pub(crate) sampling: Proposed<Sampling>,
     /// In order of speed.
     pub(crate) runs: Vec<ProposedRun>,
     pub(crate) left_out: Vec<LeftOut>,
     /// What was chosen on the way.
     pub(crate) notes: Vec<String>,
-    /// What the user should check.
     pub(crate) warnings: Vec<String>,
 }
 
-/// A run of a proposed study.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct ProposedRun {
     pub(crate) folder: PathBuf,
@@ -67,7 +60,6 @@ pub(crate) struct ProposedRun {
     pub(crate) crush_m: Option<f64>,
     /// Whole states that motion and force both have.
     pub(crate) states: usize,
-    /// Notes on its speed.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(crate) notes: Vec<String>,
 }
@@ -75,69 +67,41 @@ pub(crate) struct ProposedRun {
 impl Proposal {
     /// What is left to fill in before the study can be built.
     pub(crate) fn missing(&self) -> Vec<String> {
-        let mut missing = Vec::new();
-        let mut add = |key: String, why: Option<&str>| {
-            if let Some(why) = why {
-                missing.push(format!("{key}: {why}"));
-            }
-        };
-        add("units".into(), why(&self.units));
-        add("deflection".into(), why(&self.deflection));
-        add("force".into(), why(&self.force));
-        add("sampling".into(), why(&self.sampling));
+        let keys = ["units", "deflection", "force", "sampling"].map(String::from);
+        let whys = [self.units.why(), self.deflection.why(), self.force.why(), self.sampling.why()];
+        let mut all: Vec<(String, Option<&str>)> = keys.into_iter().zip(whys).collect();
         for run in &self.runs {
-            add(format!("speed of {}", run.name), why(&run.speed_m_per_s));
-            add(format!("mass of {}", run.name), why(&run.mass_kg));
-            let other = run.other_mass_kg.as_ref().and_then(why);
-            add(format!("other_mass of {}", run.name), other);
+            all.push((format!("speed of {}", run.name), run.speed_m_per_s.why()));
+            all.push((format!("mass of {}", run.name), run.mass_kg.why()));
+            let other = run.other_mass_kg.as_ref().and_then(Proposed::why);
+            all.push((format!("other_mass of {}", run.name), other));
         }
-        missing
+        all.into_iter().filter_map(|(key, why)| Some(format!("{key}: {}", why?))).collect()
     }
 }
 
-fn why<T>(proposed: &Proposed<T>) -> Option<&str> {
-    match proposed {
-        Proposed::Found { .. } => None,
-        Proposed::Missing { missing } => Some(missing),
-    }
-}
-
-/// Where a value is from, with what it was taken or made from.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(tag = "evidence", content = "from", rename_all = "snake_case")]
+/// Where a value is from.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub(crate) enum Evidence {
     /// The caller gave it.
-    UserHints(String),
+    Given,
     /// Found in a file.
-    Read(String),
+    Read,
     /// It follows from what was read.
-    Computed(String),
+    Computed,
     /// It is the likely one of several.
-    Guessed(String),
+    Guessed,
 }
 
 impl Evidence {
-    /// `read`, `computed`, …: its word in a proposal.
-    pub(crate) fn word(&self) -> &'static str {
+    pub(crate) fn word(self) -> &'static str {
         match self {
-            Self::UserHints(_) => "given",
-            Self::Read(_) => "read",
-            Self::Computed(_) => "computed",
-            Self::Guessed(_) => "guessed",
+            Self::Given => "given",
+            Self::Read => "read",
+            Self::Computed => "computed",
+            Self::Guessed => "guessed",
         }
-    }
-
-    /// What the value was taken or made from.
-    pub(crate) fn from(&self) -> &str {
-        let (Self::UserHints(from) | Self::Read(from) | Self::Computed(from) | Self::Guessed(from)) =
-            self;
-        from
-    }
-}
-
-impl std::fmt::Display for Evidence {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}: {}", self.word(), self.from())
     }
 }
 
@@ -147,8 +111,9 @@ impl std::fmt::Display for Evidence {
 pub(crate) enum Proposed<T> {
     Found {
         value: T,
-        #[serde(flatten)]
         evidence: Evidence,
+        /// What it was taken or made from.
+        from: String,
     },
     /// It could not be determined: the user has to fill it in.
     Missing {
@@ -158,6 +123,14 @@ pub(crate) enum Proposed<T> {
 }
 
 impl<T> Proposed<T> {
+    pub(super) fn found(value: T, evidence: Evidence, from: impl Into<String>) -> Self {
+        Self::Found { value, evidence, from: from.into() }
+    }
+
+    pub(super) fn missing(why: impl Into<String>) -> Self {
+        Self::Missing { missing: why.into() }
+    }
+
     pub(crate) fn value(&self) -> Option<&T> {
         match self {
             Self::Found { value, .. } => Some(value),
@@ -165,12 +138,11 @@ impl<T> Proposed<T> {
         }
     }
 
-    pub(super) fn found(value: T, evidence: Evidence) -> Self {
-        Self::Found { value, evidence }
-    }
-
-    pub(super) fn missing(why: impl Into<String>) -> Self {
-        Self::Missing { missing: why.into() }
+    fn why(&self) -> Option<&str> {
+        match self {
+            Self::Found { .. } => None,
+            Self::Missing { missing } => Some(missing),
+        }
     }
 }
 
@@ -178,7 +150,7 @@ impl<T> std::fmt::Display for Proposed<T> {
     /// Where it is from: `read: …`, or `fill in: …`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Found { evidence, .. } => evidence.fmt(f),
+            Self::Found { evidence, from, .. } => write!(f, "{}: {from}", evidence.word()),
             Self::Missing { missing } => write!(f, "fill in: {missing}"),
         }
     }

@@ -7,136 +7,126 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use rayon::iter::Either;
 use rayon::prelude::*;
 
-use super::agree::Agreed;
+use super::describe::{Facts, stated_units};
 use super::folders::{Folders, LeftOut, Reason, names, no_usable_run, seen_from};
-use super::measure::{Measured, SiRun};
-use super::proposal::Proposal;
-use super::record::{Record, Recorded, Surveyed};
+use super::measure::Impact;
+use super::proposal::{Proposal, Proposed};
+use super::recipe::CommonRecipe;
+use super::record::{Record, Run};
 use super::sources::Sources;
 use super::survey::Survey;
-use super::{GivenForce, UserHints, describe, units};
+use super::{GivenForce, UserHints, units};
 use crate::curve::contact::milliseconds;
 use crate::error::{Error, error};
+use crate::file::folder_of;
 use crate::study::extract::is_alike;
 use crate::study::{self, StudyKind};
 use crate::unit::UnitSystem;
 
-/// What a study is to be proposed for.
-#[derive(Clone, Debug)]
-pub struct Request {
-    /// Run folders, or folders above them.
-    pub folders: Vec<PathBuf>,
-    /// Where the study will stand: paths in it begin there.
-    pub study: PathBuf,
-    /// What is known already.
-    pub given: UserHints,
-}
-
-/// Proposes a study for run folders.
+/// Proposes a study, which will stand at `study`, for run folders, or folders above them.
 ///
 /// `progress` is called with the name of each run when it was examined, from any thread.
 ///
 /// # Errors
 /// If there is no run, none can be used, or they are several groups.
-pub fn propose(request: &Request, progress: impl Fn(&str) + Sync) -> Result<Proposal, Error> {
-    let given = &request.given;
-    let folders = Folders::find(&request.folders)?;
-    if given.group.is_none() {
+pub fn propose(
+    folders: &[PathBuf],
+    study: &Path,
+    hints: &UserHints,
+    progress: impl Fn(&str) + Sync,
+) -> Result<Proposal, Error> {
+    let folders = Folders::find(folders)?;
+    if hints.group.is_none() {
         folders.refuse_groups()?;
     }
     let group = folders.group();
     let mut left_out = folders.left_out;
-    let surveyed = survey(&folders.runs, given, &mut left_out, &progress);
-    let surveys: Vec<&Survey> = surveyed.iter().map(|run| &run.survey).collect();
-    let Some(agreed) = Agreed::of(&surveys, given) else {
+    let runs = survey(&folders.runs, hints, &mut left_out, &progress);
+    let surveys: Vec<&Survey> = runs.iter().map(|run| &run.survey).collect();
+    let Some(recipe) = CommonRecipe::of(&surveys, hints) else {
         return Err(no_usable_run(&left_out, &[]));
     };
-    refuse_given(&agreed, &surveys, given)?;
-    let recorded = record(surveyed, &agreed, &mut left_out);
-    let recorded = without_duplicates(recorded, &mut left_out);
-    let (units, recorded, mut warnings) = agree_on_units(recorded, given, &mut left_out);
-    let study = match request.study.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent.to_path_buf(),
-        _ => PathBuf::from("."),
-    };
-    let seen = |path: &PathBuf| seen_from(&study, path);
-    let recorded = with_paths(recorded, &seen, &mut left_out);
-    if recorded.is_empty() {
+    refuse_hints(&recipe, &surveys, hints)?;
+    let records = record(runs, &recipe, &mut left_out);
+    let records = without_duplicates(records, &mut left_out);
+    let (units, records, warnings) = agree_on_units(records, hints, &mut left_out);
+    let folder = folder_of(study);
+    let (mut records, unnamed): (Vec<Record>, Vec<Record>) =
+        records.into_iter().partition(|record| seen_from(folder, &record.run.path).is_some());
+    left_out.extend(unnamed.into_iter().map(|record| {
+        let why = "its path is not UTF-8, which no study can hold: rename the folder".into();
+        LeftOut::new(record.run.path, Reason::Unusable { why })
+    }));
+    if records.is_empty() {
         return Err(no_usable_run(&left_out, &warnings));
     }
-    let runs: Vec<SiRun<'_>> = match units.value() {
-        Some(units) => recorded.iter().map(|run| SiRun::of(run, *units, given)).collect(),
-        None => Vec::new(),
-    };
-    let measured = Measured { agreed: &agreed, recorded: &recorded, runs: &runs, units: &units };
-    let mut proposal = describe::proposal(&measured, given, group, &seen, &mut warnings);
-    proposal.warnings = warnings;
+    if let Some(units) = units.value() {
+        records.par_iter_mut().for_each(|record| {
+            record.impact = Some(Impact::of(record, *units, hints.half_model));
+        });
+    }
+    let facts = Facts { recipe: &recipe, records: &records, units, hints, folder };
+    let mut proposal = facts.proposal(group, warnings);
     proposal.left_out = left_out;
-    describe::entries_of_left_out(&mut proposal, &seen);
-    leave_out_refused(&mut proposal, &request.study)?;
+    leave_out_refused(&mut proposal, study)?;
+    for out in &mut proposal.left_out {
+        out.entry = match out.reason {
+            Reason::Empty | Reason::NoSolverFiles | Reason::OnlyDeck => None,
+            _ => seen_from(folder, &out.path),
+        };
+    }
     Ok(proposal)
 }
 
 /// Looks over every run; what cannot be used, or is there twice, is left out.
 fn survey(
     folders: &[PathBuf],
-    given: &UserHints,
+    hints: &UserHints,
     left_out: &mut Vec<LeftOut>,
     progress: &(impl Fn(&str) + Sync),
-) -> Vec<Surveyed> {
-    let names = names(folders);
+) -> Vec<Run> {
     let sources: Vec<Result<Sources, Reason>> =
         folders.par_iter().map(|folder| Sources::of(folder)).collect();
-    let mut first: BTreeMap<String, PathBuf> = BTreeMap::new();
+    let mut first: BTreeMap<String, &PathBuf> = BTreeMap::new();
     let mut unique = Vec::new();
-    for ((path, name), sources) in folders.iter().zip(names).zip(sources) {
+    for ((path, name), sources) in folders.iter().zip(names(folders)).zip(sources) {
+        let sources = sources.and_then(|sources| match first.get(&sources.hash) {
+            Some(&of) => Err(Reason::SameBytes { of: of.clone() }),
+            None => Ok(sources),
+        });
         match sources {
             Err(reason) => left_out.push(LeftOut::new(path.clone(), reason)),
-            Ok(sources) => match first.get(&sources.hash) {
-                Some(of) => {
-                    let reason = Reason::SameBytes { of: of.clone() };
-                    left_out.push(LeftOut::new(path.clone(), reason));
-                }
-                None => {
-                    first.insert(sources.hash.clone(), path.clone());
-                    unique.push((path.clone(), name, sources));
-                }
-            },
+            Ok(sources) => {
+                first.insert(sources.hash.clone(), path);
+                unique.push((path.clone(), name, sources));
+            }
         }
     }
-    let named = given.force.as_ref().map(|force| (&*force.file, force.id));
-    let looked: Vec<Result<Surveyed, Box<LeftOut>>> = unique
-        .into_par_iter()
-        .map(|(path, name, sources)| {
+    let named = hints.force.as_ref().map(|force| (&*force.file, force.id));
+    let (runs, out): (Vec<Run>, Vec<LeftOut>) =
+        unique.into_par_iter().partition_map(|(path, name, sources)| {
             let survey = Survey::of(&sources, named);
             progress(&name);
             match survey {
-                Ok(survey) => Ok(Surveyed { path, name, sources, survey }),
-                Err(reason) => Err(Box::new(LeftOut::new(path, reason))),
+                Ok(survey) => Either::Left(Run { path, name, sources, survey }),
+                Err(reason) => Either::Right(LeftOut::new(path, reason)),
             }
-        })
-        .collect();
-    usable(looked, left_out)
-}
-
-/// What is usable; the others join those that are left out.
-fn usable<T>(runs: Vec<Result<T, Box<LeftOut>>>, left_out: &mut Vec<LeftOut>) -> Vec<T> {
-    let mut usable = Vec::new();
-    for run in runs {
-        match run {
-            Ok(run) => usable.push(run),
-            Err(out) => left_out.push(*out),
-        }
-    }
-    usable
+        });
+    left_out.extend(out);
+    runs
 }
 
 /// Holds what the caller says of bodies and force against what there is.
-fn refuse_given(agreed: &Agreed, surveys: &[&Survey], given: &UserHints) -> Result<(), Error> {
-    if let Some(GivenForce { file, id, .. }) = &given.force
-        && agreed.force.is_none()
+fn refuse_hints(
+    recipe: &CommonRecipe,
+    surveys: &[&Survey],
+    hints: &UserHints,
+) -> Result<(), Error> {
+    if let Some(GivenForce { file, id, .. }) = &hints.force
+        && recipe.force.is_none()
     {
         let forces = surveys.iter().flat_map(|survey| &survey.forces);
         let known: BTreeSet<String> =
@@ -147,21 +137,20 @@ fn refuse_given(agreed: &Agreed, surveys: &[&Survey], given: &UserHints) -> Resu
         };
         return Err(error!(
             Study,
-            "no run has a force {file} {id} along the motion: there are {known}",
-            id = *id
+            "no run has a force {file} {id} along the motion: there are {known}"
         ));
     }
-    if given.half_model {
-        let alone = UserHints { half_model: false, kind: None, ..given.clone() };
-        let found = Agreed::of(surveys, &alone);
+    if hints.half_model {
+        let alone = UserHints { half_model: false, kind: None, ..hints.clone() };
+        let found = CommonRecipe::of(surveys, &alone);
         if found.is_some_and(|found| found.kind == StudyKind::Pair) {
             return Err(error!(
                 Study,
                 "two bodies move in these runs, and a half model has one: leave out --half-model"
             ));
         }
-    } else if (given.kind == Some(StudyKind::Pair) || given.minus_node.is_some())
-        && agreed.kind != StudyKind::Pair
+    } else if (hints.kind == Some(StudyKind::Pair) || hints.minus_node.is_some())
+        && recipe.kind != StudyKind::Pair
     {
         return Err(error!(
             Study,
@@ -171,122 +160,97 @@ fn refuse_given(agreed: &Agreed, surveys: &[&Survey], given: &UserHints) -> Resu
     Ok(())
 }
 
-/// Reads the histories of the recipe of every run that can take it and reaches the crash's end.
-fn record(surveyed: Vec<Surveyed>, agreed: &Agreed, left_out: &mut Vec<LeftOut>) -> Vec<Recorded> {
-    let read: Vec<Result<Recorded, Box<LeftOut>>> = surveyed
-        .into_par_iter()
-        .zip(agreed.members.par_iter())
-        .map(|(run, member)| {
-            let record = member.clone().and_then(|()| Record::read(&run.sources, agreed));
-            match record {
-                Ok(record) => Ok(Recorded { run, record }),
-                Err(reason) => Err(Box::new(LeftOut::new(run.path, reason))),
+/// Reads the histories of the recipe of every run that can take it.
+fn record(runs: Vec<Run>, recipe: &CommonRecipe, left_out: &mut Vec<LeftOut>) -> Vec<Record> {
+    let members = recipe.members.par_iter();
+    let (records, out): (Vec<Record>, Vec<LeftOut>) =
+        runs.into_par_iter().zip(members).partition_map(|(run, member)| {
+            let path = run.path.clone();
+            let other = |why: &String| Reason::OtherRecipe { why: why.clone() };
+            match member.as_ref().map_err(other).and_then(|()| Record::read(run, recipe)) {
+                Ok(record) => Either::Left(record),
+                Err(reason) => Either::Right(LeftOut::new(path, reason)),
             }
-        })
-        .collect();
-    usable(read, left_out)
+        });
+    left_out.extend(out);
+    records
 }
 
 /// Leaves out runs whose histories are those of another.
-fn without_duplicates(recorded: Vec<Recorded>, left_out: &mut Vec<LeftOut>) -> Vec<Recorded> {
-    let mut unique: Vec<Recorded> = Vec::new();
-    for run in recorded {
-        match unique.iter().find(|known| is_twin(&known.record, &run.record)) {
+fn without_duplicates(records: Vec<Record>, left_out: &mut Vec<LeftOut>) -> Vec<Record> {
+    let is_same = |a: &Record, b: &Record| {
+        is_alike(&a.time, &b.time)
+            && is_alike(&a.travel, &b.travel)
+            && a.velocities.iter().zip(&b.velocities).all(|(a, b)| is_alike(a, b))
+            && is_alike(&a.force, &b.force)
+    };
+    let mut unique: Vec<Record> = Vec::new();
+    for record in records {
+        match unique.iter().find(|known| is_same(known, &record)) {
             Some(known) => {
                 let reason = Reason::SameHistories { of: known.run.path.clone() };
-                left_out.push(LeftOut::new(run.run.path, reason));
+                left_out.push(LeftOut::new(record.run.path, reason));
             }
-            None => unique.push(run),
+            None => unique.push(record),
         }
     }
     unique
 }
 
-fn is_twin(a: &Record, b: &Record) -> bool {
-    let force = |r: &Record| r.force.as_ref().map_or(Vec::new(), |(_, force)| force.clone());
-    is_alike(&a.time, &b.time)
-        && is_alike(&a.travel, &b.travel)
-        && a.velocities.iter().zip(&b.velocities).all(|(a, b)| is_alike(a, b))
-        && is_alike(&force(a), &force(b))
-}
-
-/// Runs whose paths can be in a study.
-fn with_paths(
-    recorded: Vec<Recorded>,
-    seen: &dyn Fn(&PathBuf) -> Option<String>,
-    left_out: &mut Vec<LeftOut>,
-) -> Vec<Recorded> {
-    let (kept, others): (Vec<_>, Vec<_>) =
-        recorded.into_iter().partition(|run| seen(&run.run.path).is_some());
-    left_out.extend(others.into_iter().map(|run| {
-        let why = "its path is not UTF-8, which no study can hold: rename the folder".into();
-        LeftOut::new(run.run.path, Reason::Unusable { why })
-    }));
-    kept
-}
-
 /// The units of the runs, without those that are possible in other units only and those whose
 /// crash the record does not hold.
 fn agree_on_units(
-    recorded: Vec<Recorded>,
-    given: &UserHints,
+    records: Vec<Record>,
+    hints: &UserHints,
     left_out: &mut Vec<LeftOut>,
-) -> (super::Proposed<UnitSystem>, Vec<Recorded>, Vec<String>) {
+) -> (Proposed<UnitSystem>, Vec<Record>, Vec<String>) {
     let mut warnings = Vec::new();
-    let (mut whole, mut ended) = (Vec::new(), Vec::new());
-    for run in recorded {
-        match run.record.loading_end() {
-            Ok(_) => whole.push(run),
-            Err(share) => ended.push((run, share)),
-        }
-    }
-    let of: Vec<units::Magnitudes> = whole.iter().map(|run| run.record.magnitudes()).collect();
-    let stated = describe::stated_units(&whole, &mut warnings);
+    let (whole, ended): (Vec<Record>, Vec<Record>) =
+        records.into_iter().partition(|record| record.loading_end().is_ok());
+    let of: Vec<units::Magnitudes> = whole.iter().map(Record::magnitudes).collect();
+    let stated = stated_units(&whole, &mut warnings);
     let most = units::most_agree(&of);
     let agreeing: Vec<units::Magnitudes> =
         of.iter().zip(&most).filter(|(_, agrees)| **agrees).map(|(m, _)| *m).collect();
-    let units = units::choose(&agreeing, given.units, stated, &mut warnings);
+    let units = units::choose(&agreeing, hints.units, stated, &mut warnings);
     let mut kept = Vec::new();
-    for ((run, magnitudes), agrees) in whole.into_iter().zip(of).zip(most) {
+    for ((record, magnitudes), agrees) in whole.into_iter().zip(of).zip(most) {
         let refused = units.value().and_then(|units| magnitudes.impossible(units));
-        match refused.filter(|_| !agrees && given.units.is_none()) {
+        match refused.filter(|_| !agrees && hints.units.is_none()) {
             Some(why) => {
                 let why = format!("in the others' units it would be {why}");
-                left_out.push(LeftOut::new(run.run.path, Reason::OtherModel { why }));
+                left_out.push(LeftOut::new(record.run.path, Reason::OtherModel { why }));
             }
-            None => kept.push(run),
+            None => kept.push(record),
         }
     }
-    for (run, share) in ended {
-        let end = run.record.time.last().copied().unwrap_or_default();
+    for record in ended {
+        let end = record.time.last().copied().unwrap_or_default();
+        let motion = &record.run.sources.motion;
+        // Its solver may have written more of one file than of the other.
+        let others = match &motion.others[..] {
+            [] => String::new(),
+            others => format!(
+                "; {} holds it too, and is read where there is no {}",
+                others.join(" and "),
+                motion.shown()
+            ),
+        };
         let reason = Reason::EndsWhileLoading {
             end: match units.value() {
                 Some(units) => milliseconds(end * units.time_s),
                 None => format!("{end} in the file's unit of time"),
             },
-            share,
-            damage: run.record.damage() + &also_held(&run.run.sources),
+            share: record.loading_end().err().unwrap_or_default(),
+            damage: record.damage() + &others,
         };
-        left_out.push(LeftOut::new(run.run.path, reason));
+        left_out.push(LeftOut::new(record.run.path, reason));
     }
     (units, kept, warnings)
 }
 
-/// What else holds the motion of a run whose record is too short: its solver may have written more
-/// of one file than of the other.
-fn also_held(sources: &Sources) -> String {
-    match &sources.motion.others[..] {
-        [] => String::new(),
-        others => format!(
-            "; {} holds it too, and is read where there is no {}",
-            others.join(" and "),
-            sources.motion.shown()
-        ),
-    }
-}
-
 /// Extracts every run of a complete proposal, and leaves out those that give no curve.
-pub(super) fn leave_out_refused(proposal: &mut Proposal, path: &Path) -> Result<(), Error> {
+fn leave_out_refused(proposal: &mut Proposal, path: &Path) -> Result<(), Error> {
     if !proposal.missing().is_empty() {
         return Ok(());
     }
@@ -296,21 +260,17 @@ pub(super) fn leave_out_refused(proposal: &mut Proposal, path: &Path) -> Result<
         .par_iter()
         .map(|entry| study.locate(entry).and_then(|run| run.extract()).err())
         .collect();
-    let runs = std::mem::take(&mut proposal.runs);
-    for (run, refused) in runs.into_iter().zip(refused) {
+    for (run, refused) in std::mem::take(&mut proposal.runs).into_iter().zip(refused) {
         match refused {
             None => proposal.runs.push(run),
             Some(error) => {
                 let reason = Reason::Refused { why: error.to_string() };
-                let mut out = LeftOut::new(run.folder, reason);
-                out.entry = Some(run.path);
-                proposal.left_out.push(out);
+                proposal.left_out.push(LeftOut::new(run.folder, reason));
             }
         }
     }
     if proposal.runs.is_empty() {
-        Err(no_usable_run(&proposal.left_out, &proposal.warnings))
-    } else {
-        Ok(())
+        return Err(no_usable_run(&proposal.left_out, &proposal.warnings));
     }
+    Ok(())
 }

@@ -8,10 +8,12 @@ use serde::Serialize;
 
 use super::folders::seen_from;
 use super::measure;
-use super::proposal::{Evidence, Proposed};
+use super::proposal::Evidence::{Guessed, Read};
+use super::proposal::Proposed;
 use super::write::{Text, inline, quoted, speed_text};
 use crate::curve::Parameter;
 use crate::error::{Error, error};
+use crate::file::folder_of;
 use crate::scenario;
 use crate::surrogate::Model;
 use crate::unit::{SpeedKind, km_per_h};
@@ -21,7 +23,6 @@ const VEHICLES: usize = 3;
 /// Parameters that vehicles give by themselves.
 const MASSES: [&str; 2] = ["mass_kg", "other_mass_kg"];
 
-/// A proposed scenario.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct ScenarioProposal {
     /// Between the noses or nose and wall, then that between the vehicles of a train.
@@ -32,47 +33,41 @@ pub(crate) struct ScenarioProposal {
     pub wall: bool,
     /// Length of the run in s.
     pub(crate) duration_s: Proposed<f64>,
-    /// What is left to fill in.
     pub missing: Vec<String>,
 }
 
-/// A curve of a proposed scenario.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct ProposedCurve {
-    /// Its name in the scenario.
     pub name: &'static str,
     /// Model file as the scenario names it.
     pub model: String,
-    /// Group that the model was fitted to.
     pub group: String,
     /// Lowest and highest training speed, in m/s.
     pub range_m_per_s: [f64; 2],
-    /// What the model's speeds are measured against.
     pub speed_kind: SpeedKind,
     /// Values of the model's further parameters: those of one of its runs.
     pub parameters: BTreeMap<String, Parameter>,
 }
 
-/// A train of a proposed scenario.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct ProposedTrain {
-    /// Its name.
     pub name: &'static str,
     pub(crate) speed_m_per_s: Proposed<f64>,
     /// From the nose back.
     pub vehicles: Vec<ProposedVehicle>,
 }
 
-/// A vehicle of a proposed train.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct ProposedVehicle {
-    /// Its name.
     pub name: String,
     pub(crate) mass_kg: Proposed<f64>,
 }
 
-/// Proposes a scenario, which will stand at `path`, for one model or two.
-pub(crate) fn propose_scenario(models: &[PathBuf], path: &Path) -> Result<ScenarioProposal, Error> {
+/// Proposes a scenario, which will stand at `place`, for one model or two.
+pub(crate) fn propose_scenario(
+    models: &[PathBuf],
+    place: &Path,
+) -> Result<ScenarioProposal, Error> {
     if !(1..=2).contains(&models.len()) {
         return Err(error!(
             Usage,
@@ -80,19 +75,14 @@ pub(crate) fn propose_scenario(models: &[PathBuf], path: &Path) -> Result<Scenar
             found = models.len()
         ));
     }
-    let folder = match path.parent() {
-        Some(parent) if !parent.as_os_str().is_empty() => parent,
-        _ => Path::new("."),
-    };
     let read: Vec<Model> =
         models.iter().map(|model| Model::read(model)).collect::<Result<_, _>>()?;
-    let nose = &read[0];
-    let inner = read.get(1);
+    let (nose, inner) = (&read[0], read.get(1));
     if inner.is_some_and(|inner| inner.speed_kind == SpeedKind::Wall) {
         return Err(error!(
             Study,
             "{path}: its speeds are wall speeds, and the curve between the vehicles of a train is one of closing speeds: name such a model second",
-            path = (models[1]).display()
+            path = models[1].display()
         ));
     }
     let mut missing = Vec::new();
@@ -101,7 +91,8 @@ pub(crate) fn propose_scenario(models: &[PathBuf], path: &Path) -> Result<Scenar
         .zip(models)
         .zip(&read)
         .map(|((name, path), model)| {
-            let path = seen_from(folder, path).unwrap_or_else(|| path.display().to_string());
+            let path =
+                seen_from(folder_of(place), path).unwrap_or_else(|| path.display().to_string());
             curve(name, path, model, &mut missing)
         })
         .collect();
@@ -110,13 +101,13 @@ pub(crate) fn propose_scenario(models: &[PathBuf], path: &Path) -> Result<Scenar
     let mut trains = vec![train("A", speed, nose.mass_kg, nose, inner)];
     if !wall {
         let from = "the other train is at rest, so the first one's speed is the closing speed";
-        let stands = Proposed::found(0.0, Evidence::Guessed(from.into()));
+        let stands = Proposed::found(0.0, Guessed, from);
         let mass_kg = nose.other_mass_kg.unwrap_or(nose.mass_kg);
         trains.push(train("B", stands, mass_kg, nose, inner));
     }
     let proposal =
         ScenarioProposal { curves, trains, wall, duration_s: duration(nose, inner), missing };
-    scenario::parse(path, &proposal.to_toml())?;
+    scenario::parse(place, &proposal.to_toml())?;
     Ok(proposal)
 }
 
@@ -129,22 +120,20 @@ fn curve(
     let (low, high) = of.range_m_per_s();
     let case = &of.cases[of.cases.len() / 2];
     let mut parameters = BTreeMap::new();
-    for (feature, value) in of.features.iter().zip(&case.features) {
-        let name = feature.parameter.clone();
-        match &feature.category {
-            _ if MASSES.contains(&&*name) => {}
-            None => {
-                parameters.insert(name, Parameter::Number(*value));
-            }
-            Some(category) if *value == 1.0 => {
-                parameters.insert(name, Parameter::Category(category.clone()));
-            }
-            Some(_) => {}
-        }
+    let all = of.features.iter().zip(&case.features);
+    let further: Vec<_> = all.filter(|(f, _)| !MASSES.contains(&&*f.parameter)).collect();
+    for (feature, value) in &further {
+        let value = match &feature.category {
+            None => Parameter::Number(**value),
+            Some(category) if **value == 1.0 => Parameter::Category(category.clone()),
+            Some(_) => continue,
+        };
+        parameters.insert(feature.parameter.clone(), value);
     }
-    let wanted = of.features.iter().map(|feature| &feature.parameter);
-    let mut left: Vec<&String> = wanted
-        .filter(|name| !MASSES.contains(&name.as_str()) && !parameters.contains_key(*name))
+    let mut left: Vec<&String> = further
+        .iter()
+        .map(|(f, _)| &f.parameter)
+        .filter(|name| !parameters.contains_key(*name))
         .collect();
     left.dedup();
     missing.extend(left.iter().map(|left| format!("parameters of the curve {name}: {left} = …")));
@@ -169,7 +158,7 @@ fn speed(model: &Model) -> Proposed<f64> {
         model.speed_kind.name()
     );
     let speed = model.cases[model.cases.len() / 2].speed_m_per_s;
-    Proposed::found(speed, Evidence::Guessed(from))
+    Proposed::found(speed, Guessed, from)
 }
 
 fn train(
@@ -181,7 +170,7 @@ fn train(
 ) -> ProposedTrain {
     let of = |number: usize, kg: f64, group: &str| ProposedVehicle {
         name: format!("{name}{number}"),
-        mass_kg: Proposed::found(kg, Evidence::Read(format!("mass of the runs of {group}"))),
+        mass_kg: Proposed::found(kg, Read, format!("mass of the runs of {group}")),
     };
     let mut vehicles = vec![of(1, first_kg, &nose.group)];
     if let Some(inner) = inner {
@@ -198,7 +187,7 @@ fn duration(nose: &Model, inner: Option<&Model>) -> Proposed<f64> {
     let all_s = 2.5 * loading_s * (1.0 + 0.5 * (vehicles - 1) as f64);
     let rounded_s = (all_s / 0.05).ceil().max(1.0) * 0.05;
     let from = "a few times the duration of the crush at this speed";
-    Proposed::found(rounded_s, Evidence::Guessed(from.into()))
+    Proposed::found(rounded_s, Guessed, from)
 }
 
 impl ScenarioProposal {

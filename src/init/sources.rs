@@ -1,22 +1,22 @@
 //! Which files of a run hold which histories: the one that a build takes, and the others.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::folders::Reason;
 use crate::curve::recipe::DisplacementComponent;
-use crate::history::History;
+use crate::history::{EntityId, History};
 use crate::signal::{derivative, integral, interpolate};
 use crate::solver::decks::{self, Search};
 use crate::solver::lsdyna::deck::Deck;
-use crate::solver::{self, Entity, Selection, SolverFile, is_named_like_binary, without_job_id};
+use crate::solver::{self, Selection, SolverFile, is_named_like_binary, without_job_id};
 use crate::study::files::{content_hash, is_section_of, is_without_states, shown_name};
 
 /// Histories of nodes, named as a recipe's file is.
 pub(super) const MOTION: &str = "nodout";
 /// Forces that a recipe can name, what acts between bodies before what acts within one.
 pub(super) const FORCES: [&str; 4] = ["rwforc", "rcforc", "secforc", "rbdout"];
-/// Energies of the whole model.
 const ENERGY: &str = "glstat";
 /// What a text says that was made of a T01.
 const MADE_OF_T01: &str = "OpenRadioss";
@@ -29,14 +29,13 @@ pub(super) struct Source {
     pub path: PathBuf,
     /// Section of a binary file; `None` for a text file.
     pub section: Option<String>,
-    pub entities: Vec<Entity>,
+    pub titles: BTreeMap<EntityId, Option<String>>,
     pub components: Vec<Arc<str>>,
     pub states: usize,
     /// Why its forces are means over their output intervals, if they are.
     pub means: Option<String>,
     /// Further files of the folder that hold the same section.
     pub others: Vec<String>,
-    /// The first damage of the file.
     pub damage: Option<String>,
 }
 
@@ -53,28 +52,22 @@ pub(super) struct Sources {
     pub hash: String,
 }
 
-/// A file with its sections, without their histories.
-struct Listed {
-    path: PathBuf,
-    sections: Vec<SolverFile>,
-}
-
 impl Sources {
     /// The files of the run in `folder`.
     pub(super) fn of(folder: &Path) -> Result<Self, Reason> {
-        let unreadable = |why: String| Reason::Unreadable { why };
-        let files = solver::runs::output_files(folder).map_err(|e| unreadable(e.to_string()))?;
+        let unreadable = |error: &dyn ToString| Reason::Unreadable { why: error.to_string() };
+        let files = solver::runs::output_files(folder).map_err(|error| unreadable(&error))?;
         let (mut listed, mut unread) = (Vec::new(), Vec::new());
         let names_only = Selection { audit: false, ..Selection::nothing() };
         for path in files.iter().filter(|path| is_looked_at(path)) {
             match solver::read_sections(path, None, &names_only) {
-                Ok(sections) => listed.push(Listed { path: path.clone(), sections }),
+                Ok(sections) => listed.push((path.clone(), sections)),
                 Err(error) => unread.push(error.to_string()),
             }
         }
         let deck = deck_of(folder);
         if let Some((_, deck)) = &deck {
-            for section in listed.iter_mut().flat_map(|file| &mut file.sections) {
+            for section in listed.iter_mut().flat_map(|(_, sections)| sections) {
                 decks::fill_titles(section, deck);
             }
         }
@@ -86,22 +79,25 @@ impl Sources {
             found.extend(unread.iter().map(|why| format!("({why})")));
             Reason::NoMotion { found: found.join(", ") + &hint }
         })?;
-        let chosen: Vec<Source> =
-            FORCES.iter().filter_map(|name| Source::choose(folder, name, &listed)).collect();
+        let chosen = FORCES.iter().filter_map(|name| Source::choose(folder, name, &listed));
         // LS-DYNA's rigid bodies have motions, those of OpenRadioss forces.
-        let forces = chosen.into_iter().filter(Source::may_have_forces).collect::<Vec<_>>();
+        let forces: Vec<Source> = chosen
+            .filter(|source| {
+                let components = &source.components;
+                components.is_empty() || components.iter().any(|name| name.ends_with("_force"))
+            })
+            .collect();
         let mut parts = motion.parts();
         for part in forces.iter().flat_map(Source::parts) {
             if !parts.contains(&part) {
                 parts.push(part);
             }
         }
-        let (_, hash) = content_hash(&parts).map_err(|e| unreadable(e.to_string()))?;
+        let (_, hash) = content_hash(&parts).map_err(|error| unreadable(&error))?;
         let energy = Source::choose(folder, ENERGY, &listed);
         Ok(Self { motion, forces, energy, deck, unread, hash })
     }
 
-    /// The source that a recipe calls `name`.
     pub(super) fn force(&self, name: &str) -> Option<&Source> {
         self.forces.iter().find(|source| source.name == name)
     }
@@ -120,28 +116,34 @@ fn misnamed(folder: &Path) -> Option<String> {
 
 impl Source {
     /// The file that a build takes for `name`: the text, else the first binary file that has it.
-    fn choose(folder: &Path, name: &'static str, listed: &[Listed]) -> Option<Self> {
-        let is_text = |file: &Listed| without_job_id(&shown_name(&file.path)) == name;
-        let holds = |file: &&Listed| {
-            is_text(file) || file.sections.iter().any(|s| is_section_of(&s.section, name))
-        };
-        let mut holders: Vec<&Listed> = listed.iter().filter(holds).collect();
-        holders.sort_by_key(|file| (!is_text(file), file.path != folder.join(name)));
-        if holders.len() > 1 && is_text(holders[0]) && is_without_states(&holders[0].path) {
+    fn choose(
+        folder: &Path,
+        name: &'static str,
+        listed: &[(PathBuf, Vec<SolverFile>)],
+    ) -> Option<Self> {
+        let is_text = |path: &Path| without_job_id(&shown_name(path)) == name;
+        let mut holders: Vec<(&PathBuf, &SolverFile)> = listed
+            .iter()
+            .filter_map(|(path, sections)| {
+                let is_wanted = |s: &&SolverFile| is_text(path) || is_section_of(&s.section, name);
+                Some((path, sections.iter().find(is_wanted)?))
+            })
+            .collect();
+        holders.sort_by_key(|(path, _)| (!is_text(path), **path != folder.join(name)));
+        if holders.len() > 1 && is_text(holders[0].0) && is_without_states(holders[0].0) {
             holders.remove(0);
         }
-        let (chosen, others) = holders.split_first()?;
-        let is_wanted = |s: &&SolverFile| is_text(chosen) || is_section_of(&s.section, name);
-        let section = chosen.sections.iter().find(is_wanted)?;
+        let (&(path, section), others) = holders.split_first()?;
+        let entities = section.entities.iter();
         Some(Self {
             name,
-            path: chosen.path.clone(),
-            section: (!is_text(chosen)).then(|| section.section.clone()),
-            entities: section.entities.clone(),
+            path: path.clone(),
+            section: (!is_text(path)).then(|| section.section.clone()),
+            titles: entities.map(|entity| (entity.id, entity.title.clone())).collect(),
             components: section.components.clone(),
             states: section.time.len(),
-            means: means(section, is_text(chosen)),
-            others: others.iter().map(|file| shown_name(&file.path)).collect(),
+            means: means(section, is_text(path)),
+            others: others.iter().map(|(path, _)| shown_name(path)).collect(),
             damage: section.problems.first().map(ToString::to_string),
         })
     }
@@ -154,13 +156,8 @@ impl Source {
         }
     }
 
-    /// Whether it has a component.
     pub(super) fn has(&self, component: &str) -> bool {
         self.components.iter().any(|c| **c == *component)
-    }
-
-    fn may_have_forces(&self) -> bool {
-        self.components.is_empty() || self.components.iter().any(|name| name.ends_with("_force"))
     }
 
     /// Reads some of its histories; `ids` of `None` are all.
@@ -233,17 +230,14 @@ pub(super) fn rising(time: &[f64]) -> Vec<usize> {
     (0..time.len()).filter(later).collect()
 }
 
-/// The values of some states.
 pub(super) fn picked(values: &[f64], states: &[usize]) -> Vec<f64> {
     states.iter().map(|&i| values[i]).collect()
 }
 
-/// The histories of a file, entity by entity.
 pub(super) fn by_entity(histories: &[History]) -> impl Iterator<Item = &[History]> {
     histories.chunk_by(|a, b| a.entity == b.entity)
 }
 
-/// A component of one entity.
 pub(super) fn component<'a>(of: &'a [History], name: &str) -> Option<&'a History> {
     of.iter().find(|history| &*history.component == name)
 }

@@ -13,7 +13,7 @@ use super::sources::{
     FORCES, Fit, Source, Sources, by_entity, component, impulse, largest, picked, rising, velocity,
 };
 use crate::curve::recipe::DisplacementComponent;
-use crate::history::{EntityId, History, Side};
+use crate::history::{History, Side};
 use crate::solver::{SolverFile, WantedId};
 
 /// Bodies that still close at more than this share of their first speed have not been stopped.
@@ -54,11 +54,14 @@ pub(super) struct Body {
     pub change: Vec<f64>,
 }
 
-/// A node and how well it follows each force.
+/// A node, how it starts, and how well it follows each force.
 #[derive(Clone, Debug)]
 pub(super) struct NodeCandidate {
     pub id: i64,
     pub title: Option<String>,
+    /// Along x, y and z.
+    first_velocity: [f64; 3],
+    largest_change: [f64; 3],
     /// Way of its velocity up and down over its range: 1 if it only falls.
     pub roughness: f64,
     /// One for each of the survey's forces.
@@ -82,15 +85,6 @@ pub(super) struct ForceCandidate {
     pub covers: usize,
 }
 
-/// A node as it starts.
-struct Start {
-    id: i64,
-    title: Option<String>,
-    first: [f64; 3],
-    /// Largest change of each velocity.
-    change: [f64; 3],
-}
-
 impl Survey {
     /// Looks over a run. A recipe's force may be named, which is then kept however small it is.
     pub(super) fn of(sources: &Sources, named: Option<(&str, i64)>) -> Result<Self, Reason> {
@@ -100,26 +94,25 @@ impl Survey {
         } else {
             DisplacementComponent::ALL.map(DisplacementComponent::name)
         };
-        let mut nodes = HistoryBatches::new(source, components.to_vec());
-        let (starts, time) = starts(&mut nodes, source)?;
+        let mut held = None;
+        let mut each_node =
+            |look: &mut dyn FnMut(&SolverFile)| each_batch(source, &components, &mut held, look);
+        let (starts, time) = starts(source, &mut each_node)?;
         if time.len() < FEWEST_STATES {
-            return Err(few_states(source, time.len()));
+            return Err(Reason::FewStates {
+                file: source.shown(),
+                states: time.len(),
+                damage: bracketed(source.damage.as_deref()),
+            });
         }
         let (direction, aligned) = direction(&starts)?;
         let mut forces = Vec::new();
         for source in &sources.forces {
             forces.extend(force_candidates(source, direction, &time, named)?);
         }
-        let size = |force: &ForceCandidate| force.impulse[largest(&force.impulse)].abs();
-        forces.sort_by(|a, b| size(b).total_cmp(&size(a)).then(rank(a).cmp(&rank(b))));
-        let is_named = |f: &ForceCandidate| named == Some((f.file, f.id));
-        let mut kept = 0;
-        forces.retain(|force| {
-            kept += 1;
-            kept <= KEPT_FORCES || is_named(force)
-        });
-        let mut bodies = bodies(&starts, direction);
-        judge(&mut nodes, &mut bodies, &forces, direction)?;
+        keep_largest(&mut forces, named);
+        let mut bodies = bodies(starts, direction);
+        fit_nodes(&mut each_node, &mut bodies, &forces, direction)?;
         Ok(Self { direction, aligned, bodies, forces })
     }
 
@@ -128,9 +121,17 @@ impl Survey {
     }
 }
 
-fn few_states(source: &Source, states: usize) -> Reason {
-    let damage = bracketed(source.damage.as_deref());
-    Reason::FewStates { file: source.shown(), states, damage }
+impl ForceCandidate {
+    /// Its largest impulse, in the file's units.
+    pub(super) fn size(&self) -> f64 {
+        self.impulse.get(largest(&self.impulse)).map_or(0.0, |impulse| impulse.abs())
+    }
+
+    /// Its place among those of equal size.
+    pub(super) fn rank(&self) -> (usize, i64) {
+        let kind = FORCES.iter().position(|name| *name == self.file);
+        (kind.unwrap_or(FORCES.len()), self.id)
+    }
 }
 
 /// Damage after a sentence.
@@ -138,21 +139,14 @@ pub(super) fn bracketed(damage: Option<&str>) -> String {
     damage.map_or(String::new(), |damage| format!(" ({damage})"))
 }
 
-/// Place of a force among those of equal size.
-fn rank(force: &ForceCandidate) -> (usize, i64) {
-    let kind = FORCES.iter().position(|name| *name == force.file);
-    (kind.unwrap_or(FORCES.len()), force.id)
-}
-
-/// How each node starts, and the times that rise.
+/// How each node starts, and the times that rise. Without nodes that have no velocities, or one that is
+/// not a number: these did not live long.
 fn starts(
-    nodes: &mut HistoryBatches<'_>,
     source: &Source,
-) -> Result<(Vec<Start>, Vec<f64>), Reason> {
-    let titles: HashMap<EntityId, &Option<String>> =
-        source.entities.iter().map(|entity| (entity.id, &entity.title)).collect();
+    each_node: &mut EachBatch<'_>,
+) -> Result<(Vec<NodeCandidate>, Vec<f64>), Reason> {
     let (mut starts, mut times) = (Vec::new(), Vec::new());
-    nodes.each(&mut |piece| {
+    each_node(&mut |piece| {
         let states = rising(&piece.time);
         times = picked(&piece.time, &states);
         if states.len() < 2 {
@@ -160,62 +154,52 @@ fn starts(
         }
         for node in by_entity(&piece.histories) {
             let Some(entity) = node[0].entity else { continue };
-            let title = titles.get(&entity).and_then(|title| (*title).clone());
-            starts.extend(start(entity.id, title, node, &states));
+            let velocities = DisplacementComponent::ALL.map(|along| velocity(node, along, &states));
+            let [Some(x), Some(y), Some(z)] = velocities else { continue };
+            let velocities = [x, y, z];
+            if velocities.iter().flatten().any(|v| !v.is_finite()) {
+                continue;
+            }
+            let change = |v: &Vec<f64>| v.iter().map(|v_i| (v_i - v[0]).abs()).fold(0.0, f64::max);
+            starts.push(NodeCandidate {
+                id: entity.id,
+                title: source.titles.get(&entity).cloned().flatten(),
+                first_velocity: velocities.each_ref().map(|v| v[0]),
+                largest_change: velocities.each_ref().map(change),
+                roughness: f64::INFINITY,
+                fits: Vec::new(),
+            });
         }
     })?;
     Ok((starts, times))
 }
 
-/// `None` for a node without velocities, or with one that is not a number: it did not live long.
-fn start(id: i64, title: Option<String>, node: &[History], states: &[usize]) -> Option<Start> {
-    let (mut first, mut change) = ([0.0; 3], [0.0_f64; 3]);
-    for (k, direction) in DisplacementComponent::ALL.into_iter().enumerate() {
-        let velocity = velocity(node, direction, states)?;
-        if velocity.iter().any(|v| !v.is_finite()) {
-            return None;
-        }
-        first[k] = velocity[0];
-        change[k] = velocity.iter().map(|v| (v - velocity[0]).abs()).fold(0.0, f64::max);
-    }
-    Some(Start { id, title, first, change })
-}
-
 /// The axis along which the bodies start, and how much of their speed lies along it.
-fn direction(starts: &[Start]) -> Result<(DisplacementComponent, f64), Reason> {
-    let speed = |s: &Start| s.first.iter().map(|v| v * v).sum::<f64>().sqrt();
+fn direction(starts: &[NodeCandidate]) -> Result<(DisplacementComponent, f64), Reason> {
+    let speed = |s: &NodeCandidate| s.first_velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
     let fastest = starts.iter().map(speed).fold(0.0, f64::max);
-    let changes = starts.iter().flat_map(|s| s.change);
+    let changes = starts.iter().flat_map(|s| s.largest_change);
     if !(fastest > STANDS * changes.fold(0.0, f64::max) && fastest > 0.0) {
         return Err(Reason::Stands);
     }
     let moving = || starts.iter().filter(|s| speed(s) > 0.5 * fastest);
-    let along = |k: usize| moving().map(|s| s.first[k].abs()).sum::<f64>();
+    let along = |k: usize| moving().map(|s| s.first_velocity[k].abs()).sum::<f64>();
     let k = (0..3).fold(0, |best, k| if along(k) > along(best) { k } else { best });
     Ok((DisplacementComponent::ALL[k], along(k) / moving().map(speed).sum::<f64>()))
 }
 
 /// Nodes that start alike, without those that start at rest and stay there.
-fn bodies(starts: &[Start], direction: DisplacementComponent) -> Vec<Body> {
+fn bodies(mut nodes: Vec<NodeCandidate>, direction: DisplacementComponent) -> Vec<Body> {
     let k = DisplacementComponent::ALL.iter().position(|d| *d == direction).unwrap_or(0);
-    let fastest = starts.iter().map(|s| s.first[k].abs()).fold(0.0, f64::max);
-    let least = SAME_VELOCITY * fastest;
-    let moves = |s: &&Start| s.first[k].abs() > least || s.change[k] > least;
-    let mut moving: Vec<&Start> = starts.iter().filter(moves).collect();
-    moving.sort_by(|a, b| a.first[k].total_cmp(&b.first[k]).then(a.id.cmp(&b.id)));
-    let groups = moving.chunk_by(|a, b| b.first[k] - a.first[k] <= least);
-    let mut bodies: Vec<Body> = groups
+    let first = |node: &NodeCandidate| node.first_velocity[k];
+    let least = SAME_VELOCITY * nodes.iter().map(|n| first(n).abs()).fold(0.0, f64::max);
+    nodes.retain(|n| first(n).abs() > least || n.largest_change[k] > least);
+    nodes.sort_by(|a, b| first(a).total_cmp(&first(b)).then(a.id.cmp(&b.id)));
+    let mut bodies: Vec<Body> = nodes
+        .chunk_by(|a, b| first(b) - first(a) <= least)
         .map(|group| Body {
-            first_velocity: group[group.len() / 2].first[k],
-            nodes: group
-                .iter()
-                .map(|s| NodeCandidate {
-                    id: s.id,
-                    title: s.title.clone(),
-                    roughness: f64::INFINITY,
-                    fits: Vec::new(),
-                })
-                .collect(),
+            first_velocity: first(&group[group.len() / 2]),
+            nodes: group.to_vec(),
             change: Vec::new(),
         })
         .collect();
@@ -238,40 +222,36 @@ fn force_candidates(
     if source.has("normal_force") {
         components.push("normal_force");
     }
-    let titles: HashMap<EntityId, &Option<String>> =
-        source.entities.iter().map(|entity| (entity.id, &entity.title)).collect();
     let mut found: Vec<ForceCandidate> = Vec::new();
-    HistoryBatches::new(source, components).each(&mut |piece| {
+    each_batch(source, &components, &mut None, &mut |piece| {
         for of in by_entity(&piece.histories) {
             let Some(entity) = of[0].entity else { continue };
             let Some((component, impulse)) = along(of, direction, time) else { continue };
             let last = of[0].time.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-            let title = titles.get(&entity).and_then(|title| (*title).clone());
             let candidate = ForceCandidate {
                 file: source.name,
                 id: entity.id,
                 side: entity.side,
                 other_side: false,
                 component,
-                title,
+                title: source.titles.get(&entity).cloned().flatten(),
                 impulse,
                 covers: time.partition_point(|&t| t <= last),
             };
             add(&mut found, candidate);
         }
-        shorten(&mut found, named);
+        keep_largest(&mut found, named);
     })?;
     Ok(found)
 }
 
 /// Keeps the forces with the largest impulses, so that thousands of contacts are not held.
-fn shorten(found: &mut Vec<ForceCandidate>, named: Option<(&str, i64)>) {
-    let size = |force: &ForceCandidate| force.impulse[largest(&force.impulse)].abs();
-    found.sort_by(|a, b| size(b).total_cmp(&size(a)).then(rank(a).cmp(&rank(b))));
-    let mut kept = 0;
-    found.retain(|force| {
-        kept += 1;
-        kept <= KEPT_FORCES || named == Some((force.file, force.id))
+fn keep_largest(forces: &mut Vec<ForceCandidate>, named: Option<(&str, i64)>) {
+    forces.sort_by(|a, b| b.size().total_cmp(&a.size()).then(a.rank().cmp(&b.rank())));
+    let mut rank = 0;
+    forces.retain(|force| {
+        rank += 1;
+        rank <= KEPT_FORCES || named == Some((force.file, force.id))
     });
 }
 
@@ -298,26 +278,24 @@ fn along(
 
 /// Adds a force; of an interface's two sides the one with the larger impulse counts, the first if
 /// they are equal.
-fn add(found: &mut Vec<ForceCandidate>, candidate: ForceCandidate) {
+fn add(found: &mut Vec<ForceCandidate>, mut candidate: ForceCandidate) {
     let Some(known) = found.iter_mut().find(|f| f.id == candidate.id) else {
-        found.push(candidate);
-        return;
+        return found.push(candidate);
     };
     let at = largest(&known.impulse);
     let ratio = candidate.impulse[at].abs() / known.impulse[at].abs();
-    if (ratio - 1.0).abs() < SAME_IMPULSE {
-        known.other_side = true;
-        if candidate.side < known.side {
-            *known = ForceCandidate { other_side: true, ..candidate };
-        }
-    } else if ratio > 1.0 {
+    let is_same = (ratio - 1.0).abs() < SAME_IMPULSE;
+    candidate.other_side = is_same;
+    known.other_side |= is_same;
+    let is_better = if is_same { candidate.side < known.side } else { ratio > 1.0 };
+    if is_better {
         *known = candidate;
     }
 }
 
 /// How well each node of the bodies follows each force, and how each body moves.
-fn judge(
-    nodes: &mut HistoryBatches<'_>,
+fn fit_nodes(
+    each_node: &mut EachBatch<'_>,
     bodies: &mut [Body],
     forces: &[ForceCandidate],
     direction: DisplacementComponent,
@@ -328,7 +306,7 @@ fn judge(
     for (k, body) in bodies.iter_mut().enumerate() {
         candidates.extend(body.nodes.iter_mut().map(|node| (node.id, (k, node))));
     }
-    nodes.each(&mut |piece| {
+    each_node(&mut |piece| {
         let states = rising(&piece.time);
         for node in by_entity(&piece.histories) {
             let candidate = node[0].entity.and_then(|entity| candidates.get_mut(&entity.id));
@@ -368,49 +346,33 @@ fn roughness(velocity: &[f64]) -> f64 {
     if highest > lowest { way / (highest - lowest) } else { f64::INFINITY }
 }
 
+/// Shows all nodes of a run, a batch at a time.
+type EachBatch<'a> = dyn FnMut(&mut dyn FnMut(&SolverFile)) -> Result<(), Reason> + 'a;
+
 /// Values that are held at once: 128 MB.
-const MOST_VALUES: usize = 16_000_000;
+const MAX_VALUES: usize = 16_000_000;
 
-/// A source's histories, a bounded number of entities at a time.
-pub(super) struct HistoryBatches<'a> {
-    source: &'a Source,
-    components: Vec<&'a str>,
-    /// Ids of each piece; one piece of `None` is the whole.
-    ids: Vec<Option<Vec<WantedId>>>,
-    /// The whole, where it is one piece: read once.
-    held: Option<SolverFile>,
-}
-
-impl<'a> HistoryBatches<'a> {
-    pub(super) fn new(source: &'a Source, components: Vec<&'a str>) -> Self {
-        let values_of_one = (source.states * components.len()).max(1);
-        let at_once = (MOST_VALUES / values_of_one).max(1);
-        let mut all: Vec<i64> = source.entities.iter().map(|entity| entity.id.id).collect();
-        all.sort_unstable();
-        all.dedup();
-        let ids = if all.len() <= at_once {
-            vec![None]
-        } else {
-            all.chunks(at_once)
-                .map(|ids| Some(ids.iter().map(|&id| WantedId { id, side: None }).collect()))
-                .collect()
-        };
-        Self { source, components, ids, held: None }
-    }
-
-    /// Shows every piece to `look`, in the order of the ids.
-    pub(super) fn each(&mut self, look: &mut dyn FnMut(&SolverFile)) -> Result<(), Reason> {
-        if let Some(held) = &self.held {
-            look(held);
-            return Ok(());
+/// Shows a source's histories to `look`, a bounded number of entities at a time in the order of their
+/// ids; all of them, where they are few, are read once and `held`.
+fn each_batch(
+    source: &Source,
+    components: &[&str],
+    held: &mut Option<SolverFile>,
+    look: &mut dyn FnMut(&SolverFile),
+) -> Result<(), Reason> {
+    let mut ids: Vec<i64> = source.titles.keys().map(|entity| entity.id).collect();
+    ids.dedup();
+    let at_once = (MAX_VALUES / (source.states * components.len()).max(1)).max(1);
+    if ids.len() > at_once {
+        for ids in ids.chunks(at_once) {
+            let ids = ids.iter().map(|&id| WantedId { id, side: None }).collect();
+            look(&source.read(Some(ids), components)?);
         }
-        for ids in &self.ids {
-            let piece = self.source.read(ids.clone(), &self.components)?;
-            look(&piece);
-            if ids.is_none() {
-                self.held = Some(piece);
-            }
-        }
-        Ok(())
+        return Ok(());
     }
+    if held.is_none() {
+        *held = Some(source.read(None, components)?);
+    }
+    held.iter().for_each(look);
+    Ok(())
 }

@@ -4,6 +4,7 @@
 //! has a speed, a crush, a time to the maximum crush, a mean deceleration and a mass that vehicles
 //! have.
 
+use super::proposal::Evidence::{Computed, Given, Guessed, Read};
 use super::proposal::{Evidence, Proposed};
 use crate::unit::{UnitSystem, km_per_h};
 
@@ -97,59 +98,51 @@ pub(super) fn choose(
     let refused = |units: &UnitSystem| runs.iter().find_map(|run| run.impossible(units));
     if let Some(units) = given {
         if let Some(why) = refused(&units) {
+            let better = match guessed(runs) {
+                Some((guess, ..)) => format!("{guess} would fit"),
+                None => "no usual system fits better".into(),
+            };
             warnings.push(format!(
-                "units: {units} as given would make {why}, which is not a crash; {}",
-                match guessed(runs) {
-                    Some((guess, _)) => format!("{guess} would fit"),
-                    None => "no usual system fits better".into(),
-                }
+                "units: {units} as given would make {why}, which is not a crash; {better}"
             ));
         }
-        return Proposed::found(units, Evidence::UserHints("by --units".into()));
+        return Proposed::found(units, Given, "by --units");
     }
     if let Some((units, place)) = stated {
-        match refused(&units) {
-            None => {
-                let from = match guessed(runs) {
-                    Some((guess, evidence)) if guess == units => {
-                        format!("{place}; and {}", evidence.from())
-                    }
-                    _ => place,
-                };
-                return Proposed::found(units, Evidence::Read(from));
-            }
-            Some(why) => warnings.push(format!(
-                "units: {place} states {units}, which would make {why}; it is not used"
-            )),
-        }
+        let Some(why) = refused(&units) else {
+            let from = match guessed(runs) {
+                Some((guess, _, from)) if guess == units => format!("{place}; and {from}"),
+                _ => place,
+            };
+            return Proposed::found(units, Read, from);
+        };
+        warnings
+            .push(format!("units: {place} states {units}, which would make {why}; it is not used"));
     }
-    match guessed(runs) {
-        Some((units, evidence)) => Proposed::found(units, evidence),
-        None => Proposed::missing(match runs.first() {
-            Some(first) => format!(
-                "in none of the usual systems ({}) is this an impact: speed {}, crush {}, time to it {} in the file's units",
-                UnitSystem::USUAL.join(", "),
-                digits(first.speed),
-                digits(first.crush),
-                digits(first.loading_time)
-            ),
-            None => "no run determines them".into(),
-        }),
+    match (guessed(runs), runs.first()) {
+        (Some((units, evidence, from)), _) => Proposed::found(units, evidence, from),
+        (None, Some(first)) => Proposed::missing(format!(
+            "in none of the usual systems ({}) is this an impact: speed {}, crush {}, time to it {} in the file's units",
+            UnitSystem::USUAL.join(", "),
+            digits(first.speed),
+            digits(first.crush),
+            digits(first.loading_time)
+        )),
+        (None, None) => Proposed::missing("no run determines them"),
     }
+}
+
+fn usual_systems() -> impl Iterator<Item = UnitSystem> {
+    UnitSystem::USUAL.into_iter().filter_map(|name| UnitSystem::parse(name).ok())
 }
 
 /// For each run whether it is possible in the usual system in which most runs are.
 pub(super) fn most_agree(runs: &[Magnitudes]) -> Vec<bool> {
-    let systems = UnitSystem::USUAL.into_iter().filter_map(|name| UnitSystem::parse(name).ok());
-    let agreeing = systems.map(|units| {
+    let agreeing = usual_systems().map(|units| {
         let agree: Vec<bool> = runs.iter().map(|run| run.impossible(&units).is_none()).collect();
-        let unusual: f64 = runs
-            .iter()
-            .zip(&agree)
-            .filter(|(_, agrees)| **agrees)
-            .map(|(run, _)| run.unusual(&units).0)
-            .sum();
-        (agree.iter().filter(|agrees| **agrees).count(), unusual, agree)
+        let agreeing = runs.iter().zip(&agree).filter(|(_, agrees)| **agrees);
+        let unusual: Vec<f64> = agreeing.map(|(run, _)| run.unusual(&units).0).collect();
+        (unusual.len(), unusual.iter().sum::<f64>(), agree)
     });
     let best =
         agreeing.reduce(|a, b| if b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).is_gt() { b } else { a });
@@ -159,35 +152,33 @@ pub(super) fn most_agree(runs: &[Magnitudes]) -> Vec<bool> {
     }
 }
 
-/// The usual system in which all runs are possible; of several the most usual one.
-fn guessed(runs: &[Magnitudes]) -> Option<(UnitSystem, Evidence)> {
-    let systems = UnitSystem::USUAL.into_iter().filter_map(|name| UnitSystem::parse(name).ok());
+/// The usual system in which all runs are possible, and why it is that one; of several the most
+/// usual one.
+fn guessed(runs: &[Magnitudes]) -> Option<(UnitSystem, Evidence, String)> {
+    let first = runs.first()?;
     let (mut possible, mut others) = (Vec::new(), Vec::new());
-    for units in systems {
+    for units in usual_systems() {
         match runs.iter().find_map(|run| run.impossible(&units)) {
             Some(why) => others.push(format!("{units} would make {why}")),
             None => {
-                let mean = runs.iter().map(|run| run.unusual(&units).0).sum::<f64>();
-                possible.push((mean, units));
+                let unusual = runs.iter().map(|run| run.unusual(&units).0).sum::<f64>();
+                possible.push((unusual, units));
             }
         }
     }
     possible.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (_, units) = possible.first().copied().filter(|_| !runs.is_empty())?;
+    let ((_, units), less) = possible.split_first()?;
     let others = others.join(", ");
-    if possible.len() == 1 {
+    if less.is_empty() {
         let from = format!("the only usual system in which these impacts are possible: {others}");
-        return Some((units, Evidence::Computed(from)));
+        return Some((*units, Computed, from));
     }
-    let less: Vec<String> = possible[1..]
-        .iter()
-        .map(|(_, units)| format!("{units} ({})", runs[0].unusual(units).1))
-        .collect();
+    let less = less.iter().map(|(_, units)| format!("{units} ({})", first.unusual(units).1));
     let from = format!(
         "the impacts are the most usual ones in it; also possible, but less usual: {}; impossible: {others}",
-        less.join(", ")
+        less.collect::<Vec<_>>().join(", ")
     );
-    Some((units, Evidence::Guessed(from)))
+    Some((*units, Guessed, from))
 }
 
 fn shown_speed(m_per_s: f64) -> String {

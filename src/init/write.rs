@@ -48,19 +48,15 @@ impl Proposal {
         }
         text.value("units", &self.units, |units| quoted(&units.to_string()));
         text.value("kind", &self.kind, |kind| quoted(kind.name()));
-        match self.half_model {
-            true => {
-                text.comment(
-                    "given: by --half-model. Closing speed and deflection are twice the run's.",
-                );
-                text.line("half_model = true");
-            }
-            false if self.node_titles.len() < 2 => {
-                text.comment("CANNOT BE DETERMINED: is this one body of a pair, cut at the symmetry plane between the two? Then take the two lines below instead of kind = \"wall\", and write the closing speeds, twice the speeds below (crumple init --half-model does both).");
-                text.line("# kind = \"pair\"");
-                text.line("# half_model = true");
-            }
-            false => {}
+        if self.half_model {
+            text.comment(
+                "given: by --half-model. Closing speed and deflection are twice the run's.",
+            );
+            text.line("half_model = true");
+        } else if self.node_titles.len() < 2 {
+            text.comment("CANNOT BE DETERMINED: is this one body of a pair, cut at the symmetry plane between the two? Then take the two lines below instead of kind = \"wall\", and write the closing speeds, twice the speeds below (crumple init --half-model does both).");
+            text.line("# kind = \"pair\"");
+            text.line("# half_model = true");
         }
     }
 
@@ -82,50 +78,37 @@ impl Proposal {
         for other in &self.other_forces {
             text.item(&format!("or {}: {}", other.id, other.about));
         }
-        if let Some(side) = self.side_not_taken() {
-            text.item(&format!("or side = \"{}\", which has the same force", side.name()));
+        if self.other_side
+            && let Some(ForceSource::Contact { side: Some(side), .. }) = self.force.value()
+        {
+            let other = if *side == Side::SurfA { Side::SurfB } else { Side::SurfA };
+            text.item(&format!("or side = \"{}\", which has the same force", other.name()));
         }
         text.value("force", &self.force, inline);
         text.value("filter", &self.filter, |filter| quoted(&String::from(*filter)));
         text.value("sampling", &self.sampling, inline);
     }
 
-    /// The other side of the force's interface, where it has the same force.
-    fn side_not_taken(&self) -> Option<Side> {
-        match self.force.value()? {
-            ForceSource::Contact { side: Some(Side::SurfA), .. } if self.other_side => {
-                Some(Side::SurfB)
-            }
-            ForceSource::Contact { side: Some(Side::SurfB), .. } if self.other_side => {
-                Some(Side::SurfA)
-            }
-            _ => None,
-        }
-    }
-
     /// What applies to all runs is stated once, above them.
     fn shared(&self, text: &mut Text) -> Vec<String> {
-        let first = self.runs.first();
-        let masses = first.map(|run| ("mass", run.mass_kg.to_string()));
-        let others =
-            first.and_then(|run| Some(("other_mass", run.other_mass_kg.as_ref()?.to_string())));
-        let is_shared = |key: &str, from: &String| {
-            self.runs.iter().all(|run| match key {
-                "mass" => run.mass_kg.to_string() == *from,
-                _ => run.other_mass_kg.as_ref().is_some_and(|mass| mass.to_string() == *from),
-            })
+        let of = |run: &ProposedRun, key: &str| match key {
+            "mass" => Some(run.mass_kg.to_string()),
+            _ => run.other_mass_kg.as_ref().map(Proposed::to_string),
         };
-        let shared = [masses, others].into_iter().flatten();
-        let shared: Vec<(&str, String)> =
-            shared.filter(|(key, from)| is_shared(key, from)).collect();
-        if !shared.is_empty() && self.runs.len() > 1 {
-            text.blank();
-            shared.iter().for_each(|(key, from)| text.comment(&format!("{key}: {from}")));
+        let mut shared = Vec::new();
+        for key in ["mass", "other_mass"] {
+            if let [first, _, ..] = &self.runs[..]
+                && let Some(from) = of(first, key)
+                && self.runs.iter().all(|run| of(run, key).as_ref() == Some(&from))
+            {
+                if shared.is_empty() {
+                    text.blank();
+                }
+                text.comment(&format!("{key}: {from}"));
+                shared.push(from);
+            }
         }
-        match self.runs.len() {
-            0 | 1 => Vec::new(),
-            _ => shared.into_iter().map(|(_, from)| from).collect(),
-        }
+        shared
     }
 
     fn run(&self, text: &mut Text, run: &ProposedRun, shared: &[String]) {
@@ -138,7 +121,7 @@ impl Proposal {
         run.notes.iter().for_each(|note| text.comment(&format!("LOOK: {note}")));
         text.value("speed", &run.speed_m_per_s, |speed| quoted(&speed_text(*speed)));
         let mut mass = |key: &str, mass: &Proposed<f64>| match mass {
-            Proposed::Found { value, evidence } if shared.contains(&mass.to_string()) => {
+            Proposed::Found { value, evidence, .. } if shared.contains(&mass.to_string()) => {
                 let text_of = quoted(&measure::text(*value));
                 text.line(&format!("{key} = {text_of}    # {}", evidence.word()));
             }

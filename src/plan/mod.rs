@@ -157,7 +157,6 @@ pub enum What {
 }
 
 impl What {
-    /// Its name in a plan.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Speed => "speed",
@@ -267,15 +266,15 @@ impl Spread {
 /// The variables of a checked plan, and how many items they make.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Design {
-    spreads: Vec<Spread>,
+    /// The values of each variable.
+    pub(crate) spreads: Vec<Spread>,
     samples: u64,
-    items: u64,
+    pub(crate) items: u64,
     seed: u64,
     sampling: Sampling,
 }
 
 impl Plan {
-    /// The design of these spreads, one per variable.
     pub(crate) fn design(&self, spreads: Vec<Spread>) -> Result<Design, Error> {
         let drawn = spreads.iter().any(|s| matches!(s, Spread::Drawn(_)));
         let samples = match (self.samples, drawn) {
@@ -284,24 +283,24 @@ impl Plan {
             }
             (Some(samples), true) => samples,
             (None, true) => {
-                return Err(
-                    error!(Sweep at "samples", "a variable has a distribution: add samples = … to [sweep], the draws at each point of the grid"
-                    ),
-                );
+                return Err(error!(
+                    Sweep at "samples",
+                    "a variable has a distribution: add samples = … to [sweep], the draws at each point of the grid"
+                ));
             }
             (Some(_), false) => {
-                return Err(
-                    error!(Sweep at "samples", "sweep.samples is given, but no variable has a distribution: remove samples"
-                    ),
-                );
+                return Err(error!(
+                    Sweep at "samples",
+                    "sweep.samples is given, but no variable has a distribution: remove samples"
+                ));
             }
             (None, false) => 1,
         };
         if self.sampling == Sampling::LatinHypercube && !drawn {
-            return Err(
-                error!(Sweep at "sampling", "sweep.sampling = \"latin_hypercube\" is given, but no variable has a distribution"
-                ),
-            );
+            return Err(error!(
+                Sweep at "sampling",
+                "sweep.sampling = \"latin_hypercube\" is given, but no variable has a distribution"
+            ));
         }
         let items = spreads
             .iter()
@@ -311,11 +310,11 @@ impl Plan {
             let factors = [samples].into_iter().chain(spreads.iter().map(Spread::len));
             let factors: Vec<String> = factors.filter(|n| *n > 1).map(|n| n.to_string()).collect();
             let key = if self.samples.is_some() { "samples" } else { "vary" };
-            return Err(
-                error!(Sweep at key, "the sweep has {} items: {MAX_ITEMS} at most; shorten values, steps or samples",
+            return Err(error!(
+                Sweep at key,
+                "the sweep has {} items: {MAX_ITEMS} at most; shorten values, steps or samples",
                     factors.join(" × ")
-                ),
-            );
+            ));
         };
         let (seed, sampling) = (self.seed, self.sampling);
         Ok(Design { spreads, samples, items, seed, sampling })
@@ -323,16 +322,6 @@ impl Plan {
 }
 
 impl Design {
-    /// Number of items.
-    pub(crate) fn items(&self) -> u64 {
-        self.items
-    }
-
-    /// The values of each variable.
-    pub(crate) fn spreads(&self) -> &[Spread] {
-        &self.spreads
-    }
-
     /// Values of item `item` (`item < items`), one per variable in SI; of names the index.
     ///
     /// They depend on nothing but the plan and `item`.
@@ -378,7 +367,6 @@ impl Design {
 }
 
 impl Vary {
-    /// Its values or distribution.
     pub(crate) fn spread(&self) -> Result<Spread, Error> {
         if let Some(name) = self.distribution {
             self.refuse("distribution", &["values", "steps"])?;
@@ -472,7 +460,6 @@ impl Vary {
         }
     }
 
-    /// SI value of an entry.
     fn number(&self, key: &'static str, entry: &Entry) -> Result<f64, Error> {
         let text = &entry.0;
         let dimension = match (self.what, self.factor) {
@@ -536,7 +523,7 @@ mod tests {
              { what = \"gap\", from = \"0mm\", to = \"30mm\", steps = 3 } ]",
         )
         .unwrap();
-        assert_eq!(design.items(), 6);
+        assert_eq!(design.items, 6);
         let all: Vec<Vec<f64>> = (0..6).map(|k| values(&design, k)).collect();
         assert_eq!(
             all,
@@ -554,7 +541,7 @@ mod tests {
              { what = \"force\", distribution = \"uniform\", from = 0, to = 1 } ]",
         )
         .unwrap();
-        assert_eq!(design.items(), 200);
+        assert_eq!(design.items, 200);
         let mut orders = Vec::new();
         for point in 0..2 {
             for variable in [1, 2] {

@@ -107,7 +107,7 @@ pub(crate) fn find(folder: &Path) -> io::Result<Search> {
 
 /// The only deck next to the file at `path`, or the one that includes the others, if it can be read.
 pub(crate) fn deck_next_to(path: &Path) -> Option<(PathBuf, Deck)> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = crate::file::folder_of(path);
     match find(folder) {
         Ok(Search::One(path)) => read_deck(&path).ok().map(|deck| (path, deck)),
         _ => None,

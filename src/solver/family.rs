@@ -24,7 +24,7 @@ pub(crate) fn family(path: &Path) -> Result<Vec<PathBuf>, Error> {
         return Ok(parts);
     }
     let Some((job, number)) = process_number(&name) else { return Ok(parts) };
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = crate::file::folder_of(path);
     let mut others: Vec<(u32, PathBuf)> = Vec::new();
     let io = |source| Error::io(folder, source);
     for entry in folder.read_dir().map_err(io)? {

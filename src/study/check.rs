@@ -81,7 +81,6 @@ fn check_contact(recipe: &Recipe) -> Result<(), Error> {
     }
 }
 
-/// The key that gives a run's case its name.
 fn name_key(entry: &RunEntry) -> &'static str {
     if entry.name.is_some() { "name" } else { "path" }
 }

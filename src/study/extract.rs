@@ -1,7 +1,6 @@
 //! Extraction of a run's case: units, histories, curve, notes and warnings.
 
-use super::absolute;
-use super::files::{Located, shown_name};
+use super::files::shown_name;
 use super::locate::{LocatedRun, RunDeck};
 use super::read::{ReadFile, RunFiles};
 use crate::curve::contact::THRESHOLD;
@@ -9,16 +8,15 @@ use crate::curve::extract::{DeckSpeed, ExtractError, Extracted, Notes, Setup, ex
 use crate::curve::recipe::ForceSource;
 use crate::curve::{Case, CaseId, Conditions, Origin, Provenance, Quality, SourceFile};
 use crate::error::{Error, ErrorCode, KeyPath, error};
-use crate::file::is_file;
+use crate::file::{absolute, is_file};
 use crate::history::History;
 use crate::solver::{self, Selection, SolverFile, WantedId};
 use crate::unit::{Shown, UnitSystem};
 
 impl LocatedRun<'_> {
-    /// Reads the selected histories and extracts the case.
     pub(crate) fn extract(&self) -> Result<Case, Error> {
         let mut remarks = Notes { notes: self.deck_notes.clone(), ..Notes::default() };
-        let units = remarks.take(self.units()?);
+        let units = self.units(&mut remarks)?;
         let files = RunFiles::read(self, &self.study.manifest.recipe)?;
         let extracted = self.curve(&files, units)?;
         if self.study.manifest.study.units.is_none() || extracted.speed_is_decks {
@@ -27,51 +25,45 @@ impl LocatedRun<'_> {
         }
         remarks.notes.extend_from_slice(&extracted.quality.notes);
         remarks.warnings.extend_from_slice(&extracted.quality.warnings);
-        remarks.append(self.of_files(&files)?);
+        self.remark_on_files(&files, &mut remarks)?;
         remarks.warnings.extend(self.mass_by_energy(&files, units)?);
         self.case(&files, units, extracted, remarks)
     }
 
     /// The manifest's units, or those that the deck states.
-    fn units(&self) -> Result<(UnitSystem, Notes), Error> {
-        let mut remarks = Notes::default();
+    fn units(&self, remarks: &mut Notes) -> Result<UnitSystem, Error> {
         let stated = self.deck.as_ref().and_then(|deck| {
             let units = deck.deck.units.as_ref()?;
             Some((shown_name(&deck.file.path), units, units.system?))
         });
-        let units = match (self.study.manifest.study.units, stated) {
-            (Some(units), Some((name, stated, system))) if system != units => {
+        if let Some(units) = self.study.manifest.study.units {
+            if let Some((name, stated, _)) = stated.filter(|(.., system)| *system != units) {
                 remarks.warn(format!(
                     "units: the deck {name} states \"{}\", the manifest has others; the manifest's are used",
                     stated.text.trim()
                 ));
-                units
             }
-            (Some(units), _) => units,
-            (None, Some((name, stated, system))) => {
-                remarks.note(format!(
-                    "units: \"{}\" taken from the deck {name}, line {}",
-                    stated.text.trim(),
-                    stated.at.line
-                ));
-                system
-            }
-            (None, None) => {
-                let deck = match &self.deck {
-                    Some(deck) => format!("the deck {} states none", deck.file.path.display()),
-                    None => "the run has no deck that could state them".into(),
-                };
-                return Err(error!(
-                    Run,
-                    "the manifest gives no units and {deck}: add units = \"mm-t-s\" (or the actual ones) to [study]"
-                )
-                .at(KeyPath::of("study")));
-            }
+            return Ok(units);
+        }
+        if let Some((name, stated, system)) = stated {
+            remarks.note(format!(
+                "units: \"{}\" taken from the deck {name}, line {}",
+                stated.text.trim(),
+                stated.at.line
+            ));
+            return Ok(system);
+        }
+        let deck = match &self.deck {
+            Some(deck) => format!("the deck {} states none", deck.file.path.display()),
+            None => "the run has no deck that could state them".into(),
         };
-        Ok((units, remarks))
+        Err(error!(
+            Run,
+            "the manifest gives no units and {deck}: add units = \"mm-t-s\" (or the actual ones) to [study]"
+        )
+        .at(KeyPath::of("study")))
     }
 
-    /// The curve from the histories that were read.
     fn curve(&self, files: &RunFiles<'_>, units: UnitSystem) -> Result<Extracted, Error> {
         let (study, entry) = (self.study, self.entry);
         let others: Vec<(String, f64)> = study
@@ -159,9 +151,8 @@ impl LocatedRun<'_> {
         deck.problems.iter().map(|p| format!("deck {name}: {p}")).collect()
     }
 
-    /// Notes on the files: the side that was chosen, twins and damage.
-    fn of_files(&self, files: &RunFiles<'_>) -> Result<Notes, Error> {
-        let mut remarks = Notes::default();
+    /// Notes on the files: the side that was chosen, binary files beside texts, and damage.
+    fn remark_on_files(&self, files: &RunFiles<'_>, remarks: &mut Notes) -> Result<(), Error> {
         if let ForceSource::Contact { id, side: None, .. } = self.study.manifest.recipe.force
             && let Some(side) = files.force_history()?.entity.and_then(|e| e.side)
         {
@@ -170,17 +161,15 @@ impl LocatedRun<'_> {
                 side.name()
             ));
         }
-        let ReadFile { located, file } = &files.motion;
-        remarks.append(compare_twin(located, file)?);
+        compare_text_with_binary(&files.motion, remarks)?;
         if self.files.len() > 1 {
-            let ReadFile { located, file } = &files.force;
-            remarks.append(compare_twin(located, file)?);
+            compare_text_with_binary(&files.force, remarks)?;
         }
         for ReadFile { located, file } in files.each() {
             remarks.notes.extend(file.notes.iter().map(|n| format!("{}: {n}", located.file)));
             remarks.warnings.extend(file.problems.iter().map(|p| format!("{}: {p}", located.file)));
         }
-        Ok(remarks)
+        Ok(())
     }
 
     fn case(
@@ -212,7 +201,9 @@ impl LocatedRun<'_> {
             provenance: Provenance {
                 recipe: self.recipe_in(units),
                 fingerprint: self.fingerprint.clone(),
-                sources: read.chain(self.deck.iter().map(|deck| self.deck_source(deck))).collect(),
+                sources: read
+                    .chain(self.deck.iter().map(|deck| self.source_of_deck(deck)))
+                    .collect(),
                 solver_wall_time_s: self.solver_wall_time_s()?,
                 origin: Some(Origin {
                     manifest: self.study.path(),
@@ -224,7 +215,6 @@ impl LocatedRun<'_> {
         })
     }
 
-    /// The recipe with the units that were found for it.
     fn recipe_in(&self, units: UnitSystem) -> String {
         let Ok(mut recipe) = serde_json::from_str::<serde_json::Value>(&self.recipe) else {
             return self.recipe.clone();
@@ -244,17 +234,14 @@ impl LocatedRun<'_> {
         })
     }
 
-    fn deck_source(&self, RunDeck { file: located, deck }: &RunDeck) -> SourceFile {
+    fn source_of_deck(&self, RunDeck { file, deck }: &RunDeck) -> SourceFile {
+        let path = &file.path;
+        let below = path.strip_prefix(&self.study.folder).unwrap_or(path);
         SourceFile {
-            path: located
-                .path
-                .strip_prefix(&self.study.folder)
-                .unwrap_or(&located.path)
-                .display()
-                .to_string(),
-            absolute_path: Some(absolute(&located.path)),
-            size_bytes: located.size_bytes,
-            blake3: located.blake3.clone(),
+            path: below.display().to_string(),
+            absolute_path: Some(absolute(path)),
+            size_bytes: file.size_bytes,
+            blake3: file.blake3.clone(),
             format: "keyword".into(),
             solver: Some("LS-DYNA".into()),
             version: None,
@@ -265,14 +252,7 @@ impl LocatedRun<'_> {
 
     fn source(&self, ReadFile { located, file }: &ReadFile<'_>) -> SourceFile {
         SourceFile {
-            path: format!(
-                "{}/{}",
-                self.entry.path,
-                located
-                    .path
-                    .file_name()
-                    .map_or(String::new(), |n| n.to_string_lossy().into_owned())
-            ),
+            path: format!("{}/{}", self.entry.path, shown_name(&located.path)),
             absolute_path: Some(absolute(&located.path)),
             size_bytes: located.size_bytes,
             blake3: located.blake3.clone(),
@@ -291,45 +271,43 @@ const SAME_ENERGY: f64 = 0.05;
 /// Text and binary of one run agree up to the text's digits.
 const SAME_VALUE: f64 = 1e-5;
 
-/// Which of text file and binout was read, and whether they differ.
-pub(super) fn compare_twin(file: &Located, read: &SolverFile) -> Result<Notes, Error> {
-    let mut remarks = Notes::default();
-    let name = &file.file;
-    if let Some(section) = &file.section {
-        remarks.note(format!("{name}: read from section {section} of {}", shown_name(&file.path)));
+/// Which of text file and binary file was read, and whether they differ.
+fn compare_text_with_binary(read: &ReadFile<'_>, remarks: &mut Notes) -> Result<(), Error> {
+    let ReadFile { located, file } = read;
+    let name = &located.file;
+    if let Some(section) = &located.section {
+        let path = shown_name(&located.path);
+        remarks.note(format!("{name}: read from section {section} of {path}"));
     }
-    let Some((path, section)) = &file.twin else { return Ok(remarks) };
-    let selection = same_histories(read, section);
+    let Some((path, section)) = &located.binary_beside else { return Ok(()) };
+    let ids = file.histories.iter().filter_map(|h| h.entity);
+    let selection = Selection {
+        ids: Some(ids.map(|e| WantedId { id: e.id, side: e.side }).collect()),
+        components: Some(file.histories.iter().map(|h| h.component.to_string()).collect()),
+        section: Some(section.clone()),
+        ..Selection::all()
+    };
+    let shown = shown_name(path);
     match solver::read(path, None, &selection) {
-        Ok(twin) if is_same(read, &twin) => remarks
-            .note(format!("{name}: section {section} of {} agrees with it", shown_name(path))),
+        Ok(binary) if is_same(file, &binary) => {
+            remarks.note(format!("{name}: section {section} of {shown} agrees with it"));
+        }
         Ok(_) => remarks.warn(format!(
-            "{name} and section {section} of {} differ; the text file was used",
-            shown_name(path)
+            "{name} and section {section} of {shown} differ; the text file was used"
         )),
         Err(fault) if fault.code() == ErrorCode::Io => return Err(fault),
         Err(error) => {
             remarks.warn(format!("{name}: the binary file beside it cannot be compared: {error}"));
         }
     }
-    Ok(remarks)
+    Ok(())
 }
 
-fn same_histories(read: &SolverFile, section: &str) -> Selection {
-    let ids = read.histories.iter().filter_map(|h| h.entity);
-    Selection {
-        ids: Some(ids.map(|e| WantedId { id: e.id, side: e.side }).collect()),
-        components: Some(read.histories.iter().map(|h| h.component.to_string()).collect()),
-        section: Some(section.into()),
-        ..Selection::all()
-    }
-}
-
-fn is_same(read: &SolverFile, twin: &SolverFile) -> bool {
+fn is_same(text: &SolverFile, binary: &SolverFile) -> bool {
     let has = |a: &History| {
-        twin.history(a.entity, &a.component).is_some_and(|b| is_alike(&a.values, &b.values))
+        binary.history(a.entity, &a.component).is_some_and(|b| is_alike(&a.values, &b.values))
     };
-    is_alike(&read.time, &twin.time) && read.histories.iter().all(has)
+    is_alike(&text.time, &binary.time) && text.histories.iter().all(has)
 }
 
 /// Whether two columns are the same up to the digits of text files.

@@ -18,12 +18,11 @@ pub(super) struct Located {
     /// Section of a binary file; `None` for a text file.
     pub section: Option<String>,
     /// A binary file next to the text file that has the same section.
-    pub twin: Option<(PathBuf, String)>,
+    pub binary_beside: Option<(PathBuf, String)>,
     pub size_bytes: u64,
     pub blake3: String,
 }
 
-/// The file of a force, as the recipe names it.
 pub(super) fn force_file(force: &ForceSource) -> &str {
     match force {
         ForceSource::Contact { file, .. } | ForceSource::Body { file, .. } => file,
@@ -63,10 +62,10 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
             break;
         }
     }
-    let (path, section, twin) = match (is_text, binout) {
+    let (path, section, binary_beside) = match (is_text, binout) {
         // A solver that was requested the binary file alone may leave the header of the text.
         (true, Some((path, section))) if is_without_states(&text) => (path, Some(section), None),
-        (true, twin) => (text, None, twin),
+        (true, binout) => (text, None, binout),
         (false, Some((path, section))) => (path, Some(section), None),
         (false, None) => {
             let mut found = if names.is_empty() { "no files".into() } else { names.join(", ") };
@@ -86,7 +85,7 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
         Some(_) => solver::family(&path)?,
         None => vec![path.clone()],
     };
-    Ok(Located { section, twin, ..hashed_family(name, path, &parts)? })
+    Ok(Located { section, binary_beside, ..hashed_family(name, path, &parts)? })
 }
 
 /// The text file that a recipe calls `name`: the one of that name, or with a job id before it.
@@ -129,7 +128,7 @@ pub(super) fn hashed_family(
     parts: &[PathBuf],
 ) -> Result<Located, Error> {
     let (size_bytes, blake3) = content_hash(parts)?;
-    Ok(Located { file: name.into(), size_bytes, blake3, path, section: None, twin: None })
+    Ok(Located { file: name.into(), size_bytes, blake3, path, section: None, binary_beside: None })
 }
 
 /// Size and BLAKE3 of files one after the other.
@@ -152,7 +151,6 @@ pub(crate) fn is_section_of(section: &str, name: &str) -> bool {
     section == name || section.strip_prefix(name).is_some_and(|rest| rest == "/forces")
 }
 
-/// Names in a run's folder, in order.
 fn file_names(folder: &Path) -> Result<Vec<String>, Error> {
     let names = folder.read_dir().and_then(|entries| {
         let name = |e: DirEntry| e.file_name().to_string_lossy().into_owned();

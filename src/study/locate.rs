@@ -18,7 +18,6 @@ const EXTRACTION_VERSION: u32 = 4;
 /// Maximum number of bytes of a run's case.json, which has some hundred.
 const MAX_CASE_BYTES: u64 = 1 << 20;
 
-/// The keyword deck of a run.
 pub(super) struct RunDeck {
     pub file: Located,
     pub deck: Deck,
@@ -39,7 +38,6 @@ pub(crate) struct LocatedRun<'a> {
 }
 
 impl Study {
-    /// Finds and hashes the files of a run.
     pub(crate) fn locate<'a>(&'a self, entry: &'a RunEntry) -> Result<LocatedRun<'a>, Error> {
         let folder = self.folder.join(&entry.path);
         let there = file::if_there(fs::metadata(&folder)).map_err(|e| Error::io(&folder, e))?;
@@ -137,7 +135,7 @@ impl Study {
                 "gap_m": entry.gap.map(|g| g.0),
                 "offset_m": entry.offset.map(|o| o.0),
                 "truncate_s": entry.truncate.map(|t| t.0),
-                "sign": entry.sign.map(|s| s.0),
+                "sign": entry.sign,
                 "accept_energy": self.accepts_energy(entry),
             },
         })
@@ -178,7 +176,6 @@ impl LocatedRun<'_> {
         Ok(text.map_err(|e| Error::io(&path, e))?.and_then(stated))
     }
 
-    /// The located file of a recipe's file name.
     pub(super) fn file(&self, name: &str) -> &Located {
         // `locate` found every one.
         self.files.iter().find(|f| f.file == name).unwrap_or(&self.files[0])

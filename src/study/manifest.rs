@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::curve::Parameter;
 use crate::curve::recipe::Recipe;
@@ -58,7 +59,6 @@ pub(crate) enum StudyKind {
 }
 
 impl StudyKind {
-    /// As in a manifest: `wall` or `pair`.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Wall => "wall",
@@ -97,7 +97,9 @@ pub(crate) struct RunEntry {
     pub truncate: Option<InstantText>,
     /// 1 or -1: the factor that makes the file's force positive in compression; found from its
     /// impulse if absent.
-    pub sign: Option<Sign>,
+    #[serde(default, deserialize_with = "sign")]
+    #[schemars(with = "Option<i64>", extend("enum" = [1, -1]))]
+    pub sign: Option<i64>,
     /// As in the study's head, for this run.
     pub accept_energy: Option<bool>,
     /// Further parameters of the case, the same names in every run: numbers whose names carry
@@ -106,33 +108,14 @@ pub(crate) struct RunEntry {
     pub parameters: BTreeMap<String, Parameter>,
 }
 
-/// A factor of 1 or −1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(try_from = "i64")]
-#[schemars(with = "i64", extend("enum" = [1, -1]))]
-pub struct Sign(pub(super) i64);
-
-/// A sign that is neither 1 nor −1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("sign = {found}: expected 1 or -1")]
-pub struct SignError {
-    /// As written.
-    pub found: i64,
-}
-
-impl TryFrom<i64> for Sign {
-    type Error = SignError;
-
-    fn try_from(sign: i64) -> Result<Self, SignError> {
-        match sign {
-            1 | -1 => Ok(Self(sign)),
-            found => Err(SignError { found }),
-        }
+fn sign<'de, D: Deserializer<'de>>(value: D) -> Result<Option<i64>, D::Error> {
+    match i64::deserialize(value)? {
+        sign @ (1 | -1) => Ok(Some(sign)),
+        found => Err(D::Error::custom(format!("sign = {found}: expected 1 or -1"))),
     }
 }
 
 impl RunEntry {
-    /// Name of the run's case in the database.
     pub(crate) fn case_name(&self) -> String {
         let name = self.name.as_deref().unwrap_or(&self.path);
         name.trim_start_matches("./").trim_matches('/').replace('/', "_")

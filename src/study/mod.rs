@@ -15,10 +15,11 @@ use std::path::{Path, PathBuf};
 use crate::curve::Masses;
 use crate::curve::extract::{Stated, StatedContact};
 use crate::error::{Document, Error, KeyPath};
+use crate::file::absolute;
 use crate::manifest as toml_file;
 use crate::unit::SpeedKind;
 pub(crate) use locate::LocatedRun;
-pub use manifest::{Manifest, Sign, SignError};
+pub use manifest::Manifest;
 pub(crate) use manifest::{RunEntry, StudyKind};
 
 /// A manifest that makes sense, and where it stands.
@@ -31,7 +32,6 @@ pub struct Study {
     document: Document,
 }
 
-/// Loads and checks a study manifest.
 pub(crate) fn load(path: &Path) -> Result<Study, Error> {
     parse(path, &toml_file::read_text(path)?)
 }
@@ -49,7 +49,6 @@ pub fn parse(path: &Path, text: &str) -> Result<Study, Error> {
 }
 
 impl Study {
-    /// The key of a run's entry.
     fn run_key(&self, entry: &RunEntry) -> KeyPath {
         let at = self.runs().iter().position(|run| std::ptr::eq(run, entry));
         KeyPath::of("run").item(at.unwrap_or_default())
@@ -64,7 +63,6 @@ impl Study {
         &self.manifest.study.name
     }
 
-    /// Group of the curve database that its cases go to.
     pub(crate) fn group(&self) -> &str {
         &self.manifest.study.group
     }
@@ -74,7 +72,6 @@ impl Study {
         absolute(&self.path)
     }
 
-    /// Its runs, in the order of the manifest.
     pub(crate) fn runs(&self) -> &[RunEntry] {
         &self.manifest.run
     }
@@ -97,7 +94,7 @@ impl Study {
             contact: time.or(entry.gap.map(|g| StatedContact::Gap { m: g.0 })),
             offset_m: entry.offset.map_or(0.0, |o| o.0),
             truncate_s: entry.truncate.map(|t| t.0),
-            force_sign: entry.sign.map(|s| s.0 as f64),
+            force_sign: entry.sign.map(|sign| sign as f64),
             accept_energy: self.accepts_energy(entry),
         }
     }
@@ -110,9 +107,4 @@ impl Study {
         };
         Masses { body_kg, other_kg }
     }
-}
-
-/// A path from the root on, as given: links are not followed.
-fn absolute(path: &Path) -> String {
-    std::path::absolute(path).unwrap_or_else(|_| path.into()).display().to_string()
 }

@@ -46,7 +46,6 @@ impl<'a> RunFiles<'a> {
         })
     }
 
-    /// The histories for an extraction.
     pub(crate) fn measured(&self, units: UnitSystem) -> Result<Measured<'_>, Error> {
         let DeflectionSource { node, minus_node, component, .. } = self.recipe.deflection;
         let motion =
@@ -129,24 +128,27 @@ fn force_component(force: &ForceSource) -> &str {
     }
 }
 
-/// Displacements and, where the file has them, velocities of the recipe's nodes.
-fn read_motion(file: &Located, source: &DeflectionSource) -> Result<SolverFile, Error> {
-    let wanted = |id| WantedId { id, side: None };
-    let ids: Vec<WantedId> =
-        [Some(source.node), source.minus_node].into_iter().flatten().map(wanted).collect();
-    let component = source.component;
-    let select = |components: Vec<String>| Selection {
-        ids: Some(ids.clone()),
-        components: Some(components),
+fn read(file: &Located, ids: Vec<WantedId>, components: &[&str]) -> Result<SolverFile, Error> {
+    let selection = Selection {
+        ids: Some(ids),
+        components: Some(components.iter().map(ToString::to_string).collect()),
         section: file.section.clone(),
         ..Selection::all()
     };
-    let both = select(vec![component.name().into(), component.velocity().into()]);
-    match solver::read(&file.path, None, &both) {
+    solver::read(&file.path, None, &selection)
+}
+
+/// Displacements and, where the file has them, velocities of the recipe's nodes.
+fn read_motion(file: &Located, source: &DeflectionSource) -> Result<SolverFile, Error> {
+    let ids: Vec<WantedId> = [Some(source.node), source.minus_node]
+        .into_iter()
+        .flatten()
+        .map(|id| WantedId { id, side: None })
+        .collect();
+    let component = source.component;
+    match read(file, ids.clone(), &[component.name(), component.velocity()]) {
         // Without velocities, displacements alone; if these are missing, the error is about them.
-        Err(error) if error.is_about("component") => {
-            solver::read(&file.path, None, &select(vec![component.name().into()]))
-        }
+        Err(error) if error.is_about("component") => read(file, ids, &[component.name()]),
         result => result,
     }
 }
@@ -156,14 +158,7 @@ fn read_force(file: &Located, source: &ForceSource) -> Result<SolverFile, Error>
         ForceSource::Contact { id, side, .. } => WantedId { id, side },
         ForceSource::Body { node, .. } => WantedId { id: node, side: None },
     };
-    let component = force_component(source).to_string();
-    let selection = Selection {
-        ids: Some(vec![id]),
-        components: Some(vec![component]),
-        section: file.section.clone(),
-        ..Selection::all()
-    };
-    solver::read(&file.path, None, &selection)
+    read(file, vec![id], &[force_component(source)])
 }
 
 /// The history of a wall or of one side of an interface; without a side named, SURFA's.

@@ -74,28 +74,28 @@ pub fn write(
         // Left if a kill came just before their removal; they hold nothing more.
         let _ = fs::remove_file(&part);
         let _ = fs::remove_file(&sums);
-        tally.resumed = tally.done;
+        tally.report.resumed = tally.report.done;
         return Ok(tally.close());
     }
     let (mut file, mut of_rows) = resume(&part, &sums, &head, &mut tally)?;
-    tally.resumed = tally.done;
+    tally.report.resumed = tally.report.done;
     let write_failed = failed(output);
-    let mut flow = progress(tally.done);
+    let mut flow = progress(tally.report.done);
     if flow.is_continue() {
-        let rows = head.rows().start + tally.done..head.rows().end;
+        let rows = head.rows().start + tally.report.done..head.rows().end;
         run::rows(sweep, rows, options.chunk, |chunk| {
-            let bytes: Vec<u8> = chunk.iter().flat_map(|w| w.line.iter().copied()).collect();
+            let bytes: Vec<u8> = chunk.iter().flat_map(|(_, line)| line.iter().copied()).collect();
             file.write_all(&bytes).map_err(&write_failed)?;
-            let sums: String = chunk.iter().map(|w| sum(&w.line)).collect();
+            let sums: String = chunk.iter().map(|(_, line)| sum(line)).collect();
             of_rows.write_all(sums.as_bytes()).map_err(&write_failed)?;
-            chunk.iter().for_each(|written| tally.see(written));
-            flow = progress(tally.done);
+            chunk.iter().for_each(|(row, _)| tally.see_row(row));
+            flow = progress(tally.report.done);
             Ok(flow)
         })?;
     }
     file.sync_all().map_err(&write_failed)?;
     drop(file);
-    if tally.done == tally.rows {
+    if tally.report.is_complete() {
         if is_hdf5(output) {
             let finished = ShardFile { path: part.clone(), head: head.clone() };
             to_hdf5::convert(&[finished], &head, output)?;
@@ -125,11 +125,11 @@ pub fn write_rows(
     let mut tally = Tally::new(&head);
     out.write_all(head.text().as_bytes()).map_err(failed(name))?;
     run::rows(sweep, head.rows(), options.chunk, |chunk| {
-        for written in chunk {
-            out.write_all(&written.line).map_err(failed(name))?;
-            tally.see(written);
+        for (row, line) in chunk {
+            out.write_all(line).map_err(failed(name))?;
+            tally.see_row(row);
         }
-        Ok(progress(tally.done))
+        Ok(progress(tally.report.done))
     })?;
     out.flush().map_err(failed(name))?;
     Ok(tally.close())
@@ -199,7 +199,7 @@ fn resume(
     if end == 0 {
         file.write_all(wanted.as_bytes()).map_err(failed(part))?;
     }
-    let end = tally.done * SUM as u64;
+    let end = tally.report.done * SUM as u64;
     let at_end = of_rows.set_len(end).and_then(|()| of_rows.seek(SeekFrom::Start(end)));
     at_end.map_err(failed(sums))?;
     Ok((file, of_rows))
@@ -210,8 +210,7 @@ fn complete(output: &Path, head: &ShardHeader, tally: &mut Tally) -> Result<(), 
     if is_hdf5(output) {
         return to_hdf5::complete(output, head, tally);
     }
-    let found = ShardFile::read_head(output)?;
-    let found = found.ok_or_else(|| foreign(output))?;
+    let found = ShardFile::read_head(output)?.ok_or_else(|| foreign(output))?;
     found.head.check_same(output, head)?;
-    found.rows(|line| tally.see_line(line).then_some(()))
+    found.rows(|line| Ok(tally.see_line(line)))
 }

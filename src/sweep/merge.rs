@@ -1,6 +1,7 @@
 //! Files of shards: their headers, and how they are joined.
 
 use std::collections::BTreeSet;
+use std::fs::File;
 use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -9,7 +10,7 @@ use super::statistics::Tally;
 use super::to_hdf5::{self, is_hdf5};
 use super::{Report, Shard};
 use crate::error::{Error, error};
-use crate::file::{self, WriterLock, write_at};
+use crate::file::{self, WriterLock, not_written, write_by_path};
 
 /// Missing shards that a message lists.
 const LISTED: usize = 10;
@@ -27,38 +28,24 @@ pub fn merge(inputs: &[PathBuf], output: &Path) -> Result<Report, Error> {
     let mut tally = Tally::new(&whole);
     if is_hdf5(output) {
         for file in &files {
-            file.rows(|line| tally.see_line(line).then_some(()))?;
+            file.rows(|line| Ok(tally.see_line(line)))?;
         }
         to_hdf5::convert(&files, &whole, output)?;
         return Ok(tally.close());
     }
-    let mut failure = None;
-    let written = write_at(output, |target| {
-        let mut out = BufWriter::new(target);
-        out.write_all(whole.text().as_bytes())?;
+    let failed = |source| not_written(output, source);
+    write_by_path(output, |draft| -> Result<(), Error> {
+        let mut out = BufWriter::new(File::create(draft).map_err(failed)?);
+        out.write_all(whole.text().as_bytes()).map_err(failed)?;
         for file in &files {
-            let mut trouble = Ok(());
-            let read = file.rows(|line| {
-                if !tally.see_line(line) {
-                    return None;
-                }
-                trouble = out.write_all(line);
-                trouble.is_ok().then_some(())
-            });
-            trouble?;
-            if let Err(error) = read {
-                failure = Some(error);
-                return Ok(None);
-            }
+            file.rows(|line| {
+                out.write_all(line).map_err(failed)?;
+                Ok(tally.see_line(line))
+            })?;
         }
-        out.flush()?;
-        target.sync_all().map(Some)
-    });
-    match (failure, written) {
-        (Some(error), _) => Err(error),
-        (None, Err(error)) => Err(error),
-        (None, Ok(_)) => Ok(tally.close()),
-    }
+        out.flush().map_err(failed)
+    })?;
+    Ok(tally.close())
 }
 
 /// First bytes of an HDF5 file.

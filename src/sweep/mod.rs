@@ -35,7 +35,7 @@ use crate::error::{Document, Error, KeyPath, error};
 use crate::file;
 use crate::manifest;
 use crate::multibody::Chain;
-use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName};
+use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName, Spread};
 use crate::scenario::{self, CheckedScenario, Prepared, Scenario, Sources};
 pub use journal::{WriteOptions, write, write_rows};
 pub use merge::merge;
@@ -172,7 +172,7 @@ impl Sweep {
 
     /// Items of the whole sweep.
     pub fn items(&self) -> u64 {
-        self.design.items()
+        self.design.items
     }
 
     /// Identifies the sweep: BLAKE3 of plan, scenario, the files it names and
@@ -197,7 +197,12 @@ impl Sweep {
 
     /// The variables: columns and how many values they have.
     pub fn variables(&self) -> Vec<VariableSummary> {
-        self.variables.iter().zip(self.design.spreads()).map(|(v, s)| v.summary(s)).collect()
+        let variables = self.variables.iter().zip(&self.design.spreads);
+        let summary = |(variable, spread): (&Variable, &Spread)| VariableSummary {
+            column: variable.column.clone(),
+            values: (!matches!(spread, Spread::Drawn(_))).then(|| spread.len()),
+        };
+        variables.map(summary).collect()
     }
 
     /// The varied values of an item, as they are in its row.
@@ -205,7 +210,7 @@ impl Sweep {
         let mut values = Vec::new();
         self.design.values(item, &mut values);
         let texts = values.iter().enumerate();
-        texts.map(|(k, value)| row::text(*value, self.variables[k].names())).collect()
+        texts.map(|(k, value)| row::text(*value, &self.variables[k].names)).collect()
     }
 }
 

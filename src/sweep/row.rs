@@ -35,11 +35,9 @@ impl Status {
 /// One item's row.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Row {
-    /// The item.
     pub item: u64,
     /// Varied values, then results, in SI; NaN where there is none.
     pub values: Vec<f64>,
-    /// How it ended.
     pub status: Status,
     /// Why it failed, or its warnings; one line.
     pub message: String,
@@ -129,15 +127,11 @@ impl<'a> Line<'a> {
 /// What is above the rows: which sweep and which part of it they are.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ShardHeader {
-    /// Version of the program that wrote it.
     pub version: String,
     /// Identifies the sweep, see [`Sweep::hash`].
     pub hash: String,
-    /// Items of the whole sweep.
     pub items: u64,
-    /// Which part of them follows.
     pub shard: Shard,
-    /// Names of the columns.
     pub columns: Vec<String>,
 }
 
@@ -145,7 +139,6 @@ pub(crate) struct ShardHeader {
 pub(crate) const MAX_HEAD_BYTES: usize = 1 << 24;
 
 impl ShardHeader {
-    /// The head of a shard of `sweep`.
     pub(crate) fn of(sweep: &Sweep, shard: Shard) -> Self {
         Self {
             version: env!("CARGO_PKG_VERSION").into(),
@@ -156,12 +149,20 @@ impl ShardHeader {
         }
     }
 
-    /// Items whose rows follow.
     pub(crate) fn rows(&self) -> std::ops::Range<u64> {
         self.shard.items(self.items)
     }
 
-    /// Whether the values of a column are text.
+    pub(crate) fn count(&self) -> u64 {
+        let rows = self.rows();
+        rows.end - rows.start
+    }
+
+    /// The columns of numbers after the items.
+    pub(crate) fn number_columns(&self) -> impl Iterator<Item = usize> {
+        (1..self.columns.len()).filter(|&column| !self.is_text(column))
+    }
+
     pub(crate) fn is_text(&self, column: usize) -> bool {
         let name = &self.columns[column];
         name.starts_with("curve[") || column + 2 >= self.columns.len()
@@ -170,28 +171,27 @@ impl ShardHeader {
     /// The head as it is above the rows.
     pub(crate) fn text(&self) -> String {
         let Shard { index, count } = self.shard;
-        let rows = self.rows();
         format!(
             "# {FORMAT}, layout {LAYOUT}\n# written_by: crumple {}\n# hash: {}\n# items: {}\n# shard: {index}/{count}\n# first_item: {}\n# rows: {}\n{}\n",
             self.version,
             self.hash,
             self.items,
-            rows.start,
-            rows.end - rows.start,
+            self.rows().start,
+            self.count(),
             self.columns.join(",")
         )
     }
 
     /// Reads a head; gives it back with its length in bytes. `None` if this program has not
     /// written it, or not to its end.
-    pub(crate) fn read(input: &mut impl std::io::BufRead) -> std::io::Result<Option<(Self, u64)>> {
+    pub(crate) fn read(input: &mut impl BufRead) -> io::Result<Option<(Self, u64)>> {
         let mut text = String::new();
-        let mut input = std::io::Read::take(input, MAX_HEAD_BYTES as u64);
+        let mut input = io::Read::take(input, MAX_HEAD_BYTES as u64);
         for _ in 0..8 {
-            match std::io::BufRead::read_line(&mut input, &mut text) {
+            match input.read_line(&mut text) {
                 Ok(_) => {}
                 // Not even text.
-                Err(e) if e.kind() == std::io::ErrorKind::InvalidData => return Ok(None),
+                Err(e) if e.kind() == io::ErrorKind::InvalidData => return Ok(None),
                 Err(e) => return Err(e),
             }
         }
@@ -252,7 +252,6 @@ impl ShardHeader {
     }
 }
 
-/// The error of a row that cannot be read.
 pub(crate) fn bad_row(path: &Path, item: u64) -> Error {
     damaged(
         path,
@@ -277,14 +276,36 @@ impl ShardFile {
         Ok(head.map(|(head, _)| Self { path: path.into(), head }))
     }
 
-    /// Hands on every row with its line feed, in order; `see` gives `None` for one that is not
-    /// whole.
-    pub(crate) fn rows(&self, see: impl FnMut(&[u8]) -> Option<()>) -> Result<(), Error> {
-        let io = |source| Error::io(&self.path, source);
-        let file = file::open(&self.path).map_err(io)?;
+    /// Hands on every row with its line feed, in order; `see` says whether it is whole.
+    pub(crate) fn rows(
+        &self,
+        mut see: impl FnMut(&[u8]) -> Result<bool, Error>,
+    ) -> Result<(), Error> {
+        let path = &self.path;
+        let io = |source| Error::io(path, source);
+        let file = file::open(path).map_err(io)?;
         let mut reader = BufReader::with_capacity(1 << 16, file);
         ShardHeader::read(&mut reader).map_err(io)?;
-        each_line(&self.path, &mut reader, see, &self.head)
+        let mut line = Vec::new();
+        for item in self.head.rows() {
+            if read_line(&mut reader, &mut line).map_err(io)? == 0 {
+                let last = self.head.rows().end - 1;
+                let what = format!(
+                    "its rows end before item {item}, they should go on to {last}: let its sweep run to the end"
+                );
+                return Err(damaged(path, &what));
+            }
+            if !see(&line)? {
+                return Err(bad_row(path, item));
+            }
+        }
+        match read_line(&mut reader, &mut line).map_err(io)? {
+            0 => Ok(()),
+            _ => Err(damaged(
+                path,
+                "there is unexpected data after the last row: run its sweep again with --restart",
+            )),
+        }
     }
 }
 
@@ -295,34 +316,6 @@ const MAX_LINE_BYTES: u64 = MAX_HEAD_BYTES as u64;
 pub(super) fn read_line(reader: &mut impl BufRead, line: &mut Vec<u8>) -> io::Result<usize> {
     line.clear();
     io::Read::take(reader, MAX_LINE_BYTES).read_until(b'\n', line)
-}
-
-/// Hands on every row after the head.
-fn each_line(
-    path: &Path,
-    reader: &mut impl BufRead,
-    mut see: impl FnMut(&[u8]) -> Option<()>,
-    head: &ShardHeader,
-) -> Result<(), Error> {
-    let io = |source| Error::io(path, source);
-    let mut line = Vec::new();
-    for item in head.rows() {
-        if read_line(reader, &mut line).map_err(io)? == 0 {
-            let last = head.rows().end - 1;
-            let what = format!(
-                "its rows end before item {item}, they should go on to {last}: let its sweep run to the end"
-            );
-            return Err(damaged(path, &what));
-        }
-        see(&line).ok_or_else(|| bad_row(path, item))?;
-    }
-    match read_line(reader, &mut line).map_err(io)? {
-        0 => Ok(()),
-        _ => Err(damaged(
-            path,
-            "there is unexpected data after the last row: run its sweep again with --restart",
-        )),
-    }
 }
 
 #[cfg(test)]

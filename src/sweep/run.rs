@@ -33,23 +33,17 @@ const MOST_ITEMS: u64 = 8192;
 /// Items that a thread takes at once, at most; of few items fewer, so that all threads work.
 const BLOCK: usize = 8;
 const BLOCKS_PER_THREAD: usize = 4;
-/// Chains that a worker keeps.
 const KEPT_CHAINS: usize = 16;
 
-/// A row with its line.
-pub(crate) struct Written {
-    pub row: Row,
-    pub line: Vec<u8>,
-}
-
-/// Runs the items in pieces and hands on the rows of each piece in order, until `give` breaks.
+/// Runs the items in pieces and hands on the rows of each piece in order with their lines, until `give`
+/// breaks.
 pub(crate) fn rows(
     sweep: &Sweep,
     items: Range<u64>,
     chunk: Chunk,
-    mut give: impl FnMut(&[Written]) -> Result<ControlFlow<()>, Error>,
+    mut give: impl FnMut(&[(Row, Vec<u8>)]) -> Result<ControlFlow<()>, Error>,
 ) -> Result<(), Error> {
-    let names: Vec<Vec<String>> = sweep.variables.iter().map(|v| v.names().to_vec()).collect();
+    let names: Vec<Vec<String>> = sweep.variables.iter().map(|v| v.names.clone()).collect();
     let workers = Mutex::new(Vec::new());
     let threads = rayon::current_num_threads();
     let least = (2 * threads) as u64;
@@ -63,17 +57,23 @@ pub(crate) fn rows(
         let begun = Instant::now();
         let piece: Vec<u64> = (at..end).collect();
         let block = (piece.len() / (BLOCKS_PER_THREAD * threads)).clamp(1, BLOCK);
-        let blocks: Vec<Vec<Written>> = piece
+        let blocks: Vec<Vec<(Row, Vec<u8>)>> = piece
             .par_chunks(block)
             .map(|block| {
                 let held = || workers.lock().unwrap_or_else(PoisonError::into_inner);
                 let mut worker = held().pop().unwrap_or_else(|| Worker::new(sweep));
-                let written = block.iter().map(|&item| worker.written(item, &names)).collect();
+                let line_of = |&item: &u64| {
+                    let row = worker.row(item);
+                    let mut line = Vec::with_capacity(24 * (row.values.len() + 2));
+                    row.write(&names, &mut line);
+                    (row, line)
+                };
+                let written = block.iter().map(line_of).collect();
                 held().push(worker);
                 written
             })
             .collect();
-        let rows: Vec<Written> = blocks.into_iter().flatten().collect();
+        let rows: Vec<(Row, Vec<u8>)> = blocks.into_iter().flatten().collect();
         if give(&rows)?.is_break() {
             return Ok(());
         }
@@ -90,10 +90,8 @@ pub(crate) fn rows(
     Ok(())
 }
 
-/// What one thread works with.
 struct Worker<'a> {
     sweep: &'a Sweep,
-    scenario: Scenario,
     values: Vec<f64>,
     /// Which variables decide the force laws.
     shaping: Vec<bool>,
@@ -104,30 +102,19 @@ struct Worker<'a> {
 impl<'a> Worker<'a> {
     fn new(sweep: &'a Sweep) -> Self {
         let shaping = sweep.variables.iter().map(|v| v.shapes_laws(&sweep.scenario)).collect();
-        let (scenario, values) = (Scenario::clone(&sweep.scenario), Vec::new());
-        Self { sweep, scenario, values, shaping, chains: Vec::new() }
-    }
-
-    fn written(&mut self, item: u64, names: &[Vec<String>]) -> Written {
-        let row = self.row(item);
-        let mut line = Vec::with_capacity(24 * (row.values.len() + 2));
-        row.write(names, &mut line);
-        Written { row, line }
+        Self { sweep, values: Vec::new(), shaping, chains: Vec::new() }
     }
 
     fn row(&mut self, item: u64) -> Row {
         let sweep = self.sweep;
-        let Self { scenario, values, .. } = self;
-        sweep.design.values(item, values);
-        for variable in &sweep.variables {
-            variable.reset(scenario, &sweep.scenario);
+        sweep.design.values(item, &mut self.values);
+        let mut scenario = Scenario::clone(&sweep.scenario);
+        for (variable, value) in sweep.variables.iter().zip(&self.values) {
+            variable.apply(&mut scenario, &sweep.scenario, *value);
         }
-        for (variable, value) in sweep.variables.iter().zip(&*values) {
-            variable.apply(scenario, &sweep.scenario, *value);
-        }
-        let mut row =
-            Row { item, values: values.clone(), status: Status::Ok, message: String::new() };
-        let messages = match self.results(&mut row.values) {
+        let (values, message) = (self.values.clone(), String::new());
+        let mut row = Row { item, values, status: Status::Ok, message };
+        let messages = match self.results(&scenario, &mut row.values) {
             Ok(warnings) if warnings.is_empty() => return row,
             Ok(warnings) => {
                 row.status = Status::Warned;
@@ -148,9 +135,13 @@ impl<'a> Worker<'a> {
     }
 
     /// Appends the results of the scenario as it stands; returns warnings, or why it failed.
-    fn results(&mut self, values: &mut Vec<f64>) -> Result<Vec<String>, Error> {
+    fn results(
+        &mut self,
+        scenario: &Scenario,
+        values: &mut Vec<f64>,
+    ) -> Result<Vec<String>, Error> {
         let sweep = self.sweep;
-        let prepared = self.prepared()?;
+        let prepared = self.prepared(scenario)?;
         // A row needs the summary only.
         let settings = RunSettings { record: Record::Summary, ..prepared.settings };
         let run = simulate(&prepared.chain, &settings)
@@ -171,8 +162,8 @@ impl<'a> Worker<'a> {
     }
 
     /// The chain of the scenario as it stands; laws that do not change are not made again.
-    fn prepared(&mut self) -> Result<&Prepared, Error> {
-        let Self { sweep, scenario, values, shaping, chains } = self;
+    fn prepared(&mut self, scenario: &Scenario) -> Result<&Prepared, Error> {
+        let Self { sweep, values, shaping, chains } = self;
         let scenario = &sweep.scenario.vary(scenario)?;
         let shaping = values.iter().zip(&*shaping).filter(|(_, shapes)| **shapes);
         let key: Vec<u64> = shaping.map(|(value, _)| value.to_bits()).collect();

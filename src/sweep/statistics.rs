@@ -3,8 +3,7 @@
 use serde::Serialize;
 
 use super::Report;
-use super::row::{Line, ShardHeader, Status};
-use super::run::Written;
+use super::row::{Line, Row, ShardHeader, Status};
 use crate::stream::mix;
 
 /// Quantiles come from all rows of a sweep up to this size; of a larger one from about as many
@@ -35,15 +34,6 @@ pub struct ColumnStatistics {
     pub quantiles_from: u64,
 }
 
-/// Follows columns of numbers.
-#[derive(Clone, Debug)]
-pub(crate) struct Statistics {
-    columns: Vec<Column>,
-    /// An item is in the sample if its hash is not above this.
-    threshold: u64,
-}
-
-#[derive(Clone, Debug)]
 struct Column {
     name: String,
     count: u64,
@@ -51,45 +41,6 @@ struct Column {
     min: f64,
     max: f64,
     sample: Vec<f64>,
-}
-
-impl Statistics {
-    /// Of these columns, over `rows` rows.
-    pub(crate) fn new(columns: &[String], rows: u64) -> Self {
-        let column = |name: &String| Column {
-            name: name.clone(),
-            count: 0,
-            sum: 0.0,
-            min: f64::INFINITY,
-            max: f64::NEG_INFINITY,
-            sample: Vec::new(),
-        };
-        let threshold =
-            if rows <= SAMPLE { u64::MAX } else { (u64::MAX / rows).saturating_mul(SAMPLE) };
-        Self { columns: columns.iter().map(column).collect(), threshold }
-    }
-
-    /// Takes the numbers of a row, in order of the columns; NaN is left out.
-    pub(crate) fn see(&mut self, item: u64, values: impl Iterator<Item = f64>) {
-        let sampled = mix(item) <= self.threshold;
-        for (column, value) in self.columns.iter_mut().zip(values) {
-            if value.is_nan() {
-                continue;
-            }
-            column.count += 1;
-            column.sum += value;
-            column.min = column.min.min(value);
-            column.max = column.max.max(value);
-            if sampled {
-                column.sample.push(value);
-            }
-        }
-    }
-
-    /// The statistics so far.
-    pub(crate) fn close(self) -> Vec<ColumnStatistics> {
-        self.columns.into_iter().map(Column::close).collect()
-    }
 }
 
 impl Column {
@@ -118,110 +69,124 @@ impl Column {
     }
 }
 
-/// What a report needs, row by row.
+/// A report, row by row.
 pub(super) struct Tally {
     head: ShardHeader,
-    statistics: Statistics,
-    pub rows: u64,
-    pub done: u64,
-    pub resumed: u64,
-    failed: u64,
-    warned: u64,
-    messages: Vec<(u64, String)>,
+    pub report: Report,
+    columns: Vec<Column>,
+    /// An item is in the sample if its hash is not above this.
+    threshold: u64,
 }
 
-/// Messages of failed rows that a report repeats.
 const MESSAGES: usize = 3;
 
 impl Tally {
     pub(crate) fn new(head: &ShardHeader) -> Self {
-        let rows = head.rows().end - head.rows().start;
-        let numbers: Vec<String> = (1..head.columns.len())
-            .filter(|&c| !head.is_text(c))
-            .map(|c| head.columns[c].clone())
-            .collect();
+        let rows = head.count();
+        let column = |c: usize| Column {
+            name: head.columns[c].clone(),
+            count: 0,
+            sum: 0.0,
+            min: f64::INFINITY,
+            max: f64::NEG_INFINITY,
+            sample: Vec::new(),
+        };
+        let threshold =
+            if rows <= SAMPLE { u64::MAX } else { (u64::MAX / rows).saturating_mul(SAMPLE) };
         Self {
+            report: Report {
+                items: head.items,
+                shard: head.shard,
+                rows,
+                resumed: 0,
+                done: 0,
+                failed: 0,
+                warned: 0,
+                messages: Vec::new(),
+                columns: Vec::new(),
+            },
+            columns: head.number_columns().map(column).collect(),
             head: head.clone(),
-            statistics: Statistics::new(&numbers, rows),
-            rows,
-            done: 0,
-            resumed: 0,
-            failed: 0,
-            warned: 0,
-            messages: Vec::new(),
+            threshold,
         }
     }
 
-    /// Takes a row that has just been run.
-    pub(crate) fn see(&mut self, Written { row, .. }: &Written) {
-        let head = &self.head;
-        let numbers = row.values.iter().enumerate().filter(|(k, _)| !head.is_text(k + 1));
-        self.statistics.see(row.item, numbers.map(|(_, value)| *value));
-        self.count(row.item, row.status, &row.message);
-    }
-
-    /// Takes the numbers of a row that is counted by itself.
-    pub(crate) fn statistics_see(&mut self, item: u64, values: impl Iterator<Item = f64>) {
-        self.statistics.see(item, values);
-    }
-
-    pub(crate) fn count(&mut self, item: u64, status: Status, message: &str) {
-        self.done += 1;
-        match status {
-            Status::Ok => {}
-            Status::Warned => self.warned += 1,
-            Status::Failed => {
-                self.failed += 1;
-                if self.messages.len() < MESSAGES {
-                    self.messages.push((item, message.into()));
-                }
+    /// Takes a row with its numbers, in order of the columns; NaN is left out.
+    pub(crate) fn see(
+        &mut self,
+        item: u64,
+        numbers: impl Iterator<Item = f64>,
+        status: Status,
+        message: &str,
+    ) {
+        let sampled = mix(item) <= self.threshold;
+        for (column, value) in self.columns.iter_mut().zip(numbers) {
+            if value.is_nan() {
+                continue;
+            }
+            column.count += 1;
+            column.sum += value;
+            column.min = column.min.min(value);
+            column.max = column.max.max(value);
+            if sampled {
+                column.sample.push(value);
             }
         }
+        let report = &mut self.report;
+        report.done += 1;
+        report.warned += u64::from(status == Status::Warned);
+        report.failed += u64::from(status == Status::Failed);
+        if status == Status::Failed && report.messages.len() < MESSAGES {
+            report.messages.push((item, message.into()));
+        }
+    }
+
+    pub(crate) fn see_row(&mut self, row: &Row) {
+        let columns: Vec<usize> = self.head.number_columns().collect();
+        let numbers = columns.into_iter().map(|c| row.values[c - 1]);
+        self.see(row.item, numbers, row.status, &row.message);
     }
 
     /// Takes a line that ought to be the next one; false if it is not, or is not whole.
     pub(crate) fn see_line(&mut self, line: &[u8]) -> bool {
         let head = &self.head;
-        let next = head.rows().start + self.done;
+        let next = head.rows().start + self.report.done;
         let parsed = Line::parse(line, head.columns.len())
             .filter(|line| line.item == next && next < head.rows().end);
         let Some(line) = parsed else { return false };
-        let numbers = line.values.iter().enumerate().filter(|(k, _)| !head.is_text(k + 1));
-        let numbers: Option<Vec<f64>> = numbers.map(|(_, field)| Line::number(field)).collect();
-        let Some(numbers) = numbers else { return false };
-        self.statistics.see(next, numbers.into_iter());
-        self.count(next, line.status, &line.message);
+        let numbers = head.number_columns().map(|c| Line::number(line.values.get(c - 1)?));
+        let Some(numbers) = numbers.collect::<Option<Vec<f64>>>() else { return false };
+        self.see(next, numbers.into_iter(), line.status, &line.message);
         true
     }
 
-    pub(crate) fn close(self) -> Report {
-        Report {
-            items: self.head.items,
-            shard: self.head.shard,
-            rows: self.rows,
-            resumed: self.resumed,
-            done: self.done,
-            failed: self.failed,
-            warned: self.warned,
-            messages: self.messages,
-            columns: self.statistics.close(),
-        }
+    pub(crate) fn close(mut self) -> Report {
+        self.report.columns = self.columns.into_iter().map(Column::close).collect();
+        self.report
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::Shard;
     use super::*;
 
     #[test]
     fn of_small_and_large_sweeps() {
         for rows in [101u64, 200_001] {
-            let mut statistics = Statistics::new(&["x".into(), "y".into()], rows);
+            let head = ShardHeader {
+                version: String::new(),
+                hash: String::new(),
+                items: rows,
+                shard: Shard::WHOLE,
+                columns: ["item", "x", "y", "status", "message"].map(String::from).to_vec(),
+            };
+            let mut tally = Tally::new(&head);
             for item in 0..rows {
                 let x = item as f64 / (rows - 1) as f64;
-                statistics.see(item, [x, f64::NAN].into_iter());
+                tally.see(item, [x, f64::NAN].into_iter(), Status::Ok, "");
             }
-            let [x, y] = &statistics.close()[..] else { panic!() };
+            let [x, y] = &tally.close().columns[..] else { panic!() };
             assert_eq!((x.count, x.min, x.max), (rows, Some(0.0), Some(1.0)));
             assert!((x.mean.unwrap() - 0.5).abs() < 1e-12);
             let tolerance = if rows == 101 { 1e-12 } else { 0.01 };

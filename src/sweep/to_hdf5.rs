@@ -7,9 +7,9 @@ use super::row::{FORMAT, LAYOUT, Line, ShardFile, ShardHeader, Status, bad_row};
 use super::statistics::Tally;
 use super::{Shard, damaged, foreign};
 use crate::error::{Error, ErrorCode};
+use crate::file::not_written;
 use crate::hdf5::table::{Attribute, Column, Put, Table, Values, write_table};
 
-/// Whether a path is to become HDF5.
 pub(super) fn is_hdf5(path: &Path) -> bool {
     path.extension().is_some_and(|e| e == "h5" || e == "hdf5")
 }
@@ -20,37 +20,20 @@ const MESSAGE: &str = "message";
 /// Rows that are held at once.
 const ROWS: u64 = 4096;
 
-/// What is known about the text columns before the file is laid out.
-struct Widths {
-    columns: Vec<usize>,
-    message: usize,
-    messages: u64,
-}
-
-impl Widths {
-    fn new(columns: usize) -> Self {
-        Self { columns: vec![1; columns], message: 1, messages: 1 }
-    }
-
-    /// The datasets of a file of `head`.
-    fn datasets(&self, head: &ShardHeader) -> Vec<Column> {
-        let rows = head.rows().end - head.rows().start;
-        let own = head.columns.len() - 1;
-        let mut datasets: Vec<Column> = (0..own)
-            .map(|c| {
-                let values = match (c, head.is_text(c)) {
-                    (0, _) => Values::Integer,
-                    (_, true) => Values::Text { width: self.columns[c] },
-                    (_, false) => Values::Real,
-                };
-                Column { name: head.columns[c].clone(), values, rows }
-            })
-            .collect();
-        datasets.push(Column { name: MESSAGE_NUMBER.into(), values: Values::Integer, rows });
-        let values = Values::Text { width: self.message };
-        datasets.push(Column { name: MESSAGE.into(), values, rows: self.messages });
-        datasets
-    }
+/// The datasets of a file of `head`; `widths`: bytes of the texts of each column, the messages' last.
+fn datasets(head: &ShardHeader, widths: &[usize], messages: u64) -> Vec<Column> {
+    let (rows, message) = (head.count(), head.columns.len() - 1);
+    let own = (0..message).map(|c| {
+        let values = match (c, head.is_text(c)) {
+            (0, _) => Values::Integer,
+            (_, true) => Values::Text { width: widths[c] },
+            (_, false) => Values::Real,
+        };
+        Column { name: head.columns[c].clone(), values, rows }
+    });
+    let number = Column { name: MESSAGE_NUMBER.into(), values: Values::Integer, rows };
+    let values = Values::Text { width: widths[message] };
+    own.chain([number, Column { name: MESSAGE.into(), values, rows: messages }]).collect()
 }
 
 fn attributes(head: &ShardHeader) -> [(&'static str, Attribute); 6] {
@@ -69,48 +52,38 @@ fn attributes(head: &ShardHeader) -> [(&'static str, Attribute); 6] {
 /// been written by this program and are read twice.
 pub(super) fn convert(files: &[ShardFile], head: &ShardHeader, output: &Path) -> Result<(), Error> {
     let columns = head.columns.len();
-    let mut widths = Widths::new(columns);
-    let each = |see: &mut dyn FnMut(&Line<'_>) -> Option<()>| -> Result<(), Error> {
+    let (mut widths, mut messages) = (vec![1; columns], 1);
+    let each = |see: &mut dyn FnMut(&Line<'_>) -> Result<bool, Error>| -> Result<(), Error> {
         for file in files {
             let mut item = file.head.rows().start;
             file.rows(|bytes| {
-                let line = Line::parse(bytes, columns).filter(|line| line.item == item)?;
+                let line = Line::parse(bytes, columns).filter(|line| line.item == item);
                 item += 1;
-                see(&line)
+                line.map_or(Ok(false), |line| see(&line))
             })?;
         }
         Ok(())
     };
     each(&mut |line| {
-        for (k, value) in line.values.iter().enumerate() {
-            widths.columns[k + 1] = widths.columns[k + 1].max(value.len());
+        let texts = line.values.iter().copied().chain([line.status.name(), &line.message]);
+        for (width, text) in widths[1..].iter_mut().zip(texts) {
+            *width = text.len().max(*width);
         }
-        widths.columns[columns - 2] = widths.columns[columns - 2].max(line.status.name().len());
-        if !line.message.is_empty() {
-            widths.messages += 1;
-            widths.message = widths.message.max(line.message.len());
-        }
-        Some(())
+        messages += u64::from(!line.message.is_empty());
+        Ok(true)
     })?;
-    let datasets = widths.datasets(head);
+    let datasets = datasets(head, &widths, messages);
     let mut failure = None;
     let written = write_table(output, &attributes(head), &datasets, |put| {
         let mut block = Block::new(&datasets, put);
-        let mut trouble = None;
-        let read = each(&mut |line| match block.take(line, head) {
-            Ok(taken) => taken,
+        let taken =
+            each(&mut |line| block.take(line, head).map_err(|source| not_written(output, source)));
+        match taken {
+            Ok(()) => block.flush(),
             Err(error) => {
-                trouble = Some(error);
-                None
-            }
-        });
-        match (trouble, read) {
-            (Some(error), _) => Err(error),
-            (None, Err(error)) => {
                 failure = Some(error);
                 Err(io::Error::other("the rows cannot be read"))
             }
-            (None, Ok(())) => block.flush(),
         }
     });
     match failure {
@@ -132,24 +105,18 @@ struct Block<'a, 'p> {
 impl<'a, 'p> Block<'a, 'p> {
     fn new(datasets: &'a [Column], put: &'a mut Put<'p>) -> Self {
         // Message 0 is empty, as the file is before anything is put.
-        Self {
-            datasets,
-            put,
-            held: vec![Vec::new(); datasets.len()],
-            first: 0,
-            rows: 0,
-            messages: 1,
-        }
+        let held = vec![Vec::new(); datasets.len()];
+        Self { datasets, put, held, first: 0, rows: 0, messages: 1 }
     }
 
-    /// Takes a row; `None` if a field is not a number.
-    fn take(&mut self, line: &Line<'_>, head: &ShardHeader) -> io::Result<Option<()>> {
+    /// Takes a row; false if a field is not a number.
+    fn take(&mut self, line: &Line<'_>, head: &ShardHeader) -> io::Result<bool> {
         self.held[0].extend((line.item as i64).to_le_bytes());
         for (k, field) in line.values.iter().enumerate() {
             match self.datasets[k + 1].values {
                 Values::Text { width } => pad(&mut self.held[k + 1], field, width),
                 _ => {
-                    let Some(number) = Line::number(field) else { return Ok(None) };
+                    let Some(number) = Line::number(field) else { return Ok(false) };
                     self.held[k + 1].extend(number.to_le_bytes());
                 }
             }
@@ -170,7 +137,7 @@ impl<'a, 'p> Block<'a, 'p> {
         if self.rows == ROWS {
             self.flush()?;
         }
-        Ok(Some(()))
+        Ok(true)
     }
 
     fn flush(&mut self) -> io::Result<()> {
@@ -192,7 +159,6 @@ fn pad(out: &mut Vec<u8>, text: &str, width: usize) {
     out.resize(end, 0);
 }
 
-/// A finished HDF5 file.
 struct FinishedTable {
     path: PathBuf,
     table: Table,
@@ -200,13 +166,12 @@ struct FinishedTable {
 }
 
 impl FinishedTable {
-    /// Opens a finished file.
     fn open(path: &Path) -> Result<Self, Error> {
         let table = Table::open(path, FORMAT).map_err(|e| e.coded(ErrorCode::Sweep))?;
         let head = head(&table)?.ok_or_else(|| {
             damaged(path, "its attributes are not those of a sweep of this layout")
         })?;
-        let rows = head.rows().end - head.rows().start;
+        let rows = head.count();
         let messages = table.columns.len() - 1;
         if let Some(short) = table.columns[..messages].iter().find(|c| c.rows != rows) {
             let what = format!("{} has {} rows, expected {rows}", short.name, short.rows);
@@ -214,7 +179,7 @@ impl FinishedTable {
         }
         // Widths of texts are the file's own, everything else is what this program writes.
         let is_text = |c: &Column| matches!(c.values, Values::Text { .. });
-        let expected = Widths::new(head.columns.len()).datasets(&head);
+        let expected = datasets(&head, &vec![1; head.columns.len()], 1);
         let is_other = |(found, wanted): &(&Column, &Column)| {
             is_text(found) != is_text(wanted) || !is_text(found) && found.values != wanted.values
         };
@@ -225,59 +190,33 @@ impl FinishedTable {
         Ok(Self { path: path.into(), table, head })
     }
 
-    fn rows(&self) -> u64 {
-        self.head.rows().end - self.head.rows().start
-    }
-
-    /// Rows by blocks: first row, rows, and the bytes of every column but the messages.
-    fn blocks(
-        &self,
-        mut see: impl FnMut(u64, u64, &mut [Vec<u8>]) -> Result<(), Error>,
-    ) -> Result<(), Error> {
-        let messages = self.table.columns.len() - 1;
-        let mut first = 0;
-        while first < self.rows() {
-            let rows = ROWS.min(self.rows() - first);
-            let columns: Result<Vec<Vec<u8>>, Error> =
-                (0..messages).map(|c| self.table.read(c, first, rows)).collect();
-            let mut columns = columns?;
-            for (k, item) in columns[0].chunks_exact(8).enumerate() {
-                let expected = self.head.rows().start + first + k as u64;
-                if integer(item) != expected as i64 {
-                    return Err(bad_row(&self.path, expected));
-                }
-            }
-            see(first, rows, &mut columns)?;
-            first += rows;
-        }
-        Ok(())
-    }
-
-    /// Counts all rows.
     fn tally(&self, tally: &mut Tally) -> Result<(), Error> {
-        let numbers: Vec<usize> =
-            (1..self.head.columns.len()).filter(|&c| !self.head.is_text(c)).collect();
-        let status = self.head.columns.len() - 2;
-        self.blocks(|first, rows, columns| {
-            for k in 0..rows as usize {
-                let item = self.head.rows().start + first + k as u64;
+        let numbers: Vec<usize> = self.head.number_columns().collect();
+        let (items, status) = (self.head.rows(), self.head.columns.len() - 2);
+        for first in items.clone().step_by(ROWS as usize) {
+            let (row, rows) = (first - items.start, ROWS.min(items.end - first));
+            // The bytes of every column but the messages.
+            let columns: Vec<Vec<u8>> = (0..self.table.columns.len() - 1)
+                .map(|c| self.table.read(c, row, rows))
+                .collect::<Result<_, _>>()?;
+            for (k, item) in (first..first + rows).enumerate() {
                 let bytes = |c: usize| {
                     let size = self.table.columns[c].values.size();
                     &columns[c][k * size..(k + 1) * size]
                 };
-                let number = |&c: &usize| f64::from_le_bytes(eight(bytes(c)));
-                tally.statistics_see(item, numbers.iter().map(number));
                 let found = text(bytes(status));
                 let found = Status::ALL.into_iter().find(|s| s.name() == found);
+                let found = found.filter(|_| integer(bytes(0)) == item as i64);
                 let found = found.ok_or_else(|| bad_row(&self.path, item))?;
                 let message = match integer(bytes(status + 1)) {
                     0 => String::new(),
                     number => text(&self.table.read(status + 2, number as u64, 1)?).into_owned(),
                 };
-                tally.count(item, found, &message);
+                let number = |&c: &usize| f64::from_le_bytes(eight(bytes(c)));
+                tally.see(item, numbers.iter().map(number), found, &message);
             }
-            Ok(())
-        })
+        }
+        Ok(())
     }
 }
 

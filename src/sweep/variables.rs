@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::error::{Error, KeyPath, error};
-use crate::plan::{Design, Plan, Spread, Vary, Vehicles, What};
+use crate::plan::{Design, Plan, Vary, Vehicles, What};
 use crate::scenario::{InterfaceSpeed, Scenario};
 use crate::unit::{LengthText, MassText, SignedSpeedText};
 
@@ -13,10 +13,10 @@ pub(crate) struct Variable {
     target: Target,
     /// Values multiply what is there.
     factor: bool,
-    names: Vec<String>,
+    /// Names that its values are indices of; none if they are numbers.
+    pub names: Vec<String>,
 }
 
-/// What a variable changes.
 enum Target {
     /// Train by number.
     Speed(usize),
@@ -93,10 +93,10 @@ impl Binder<'_> {
                 let table = &self.scenario.curves[curve];
                 let is_json = |p: &std::path::PathBuf| p.extension().is_some_and(|e| e == "json");
                 if table.model.is_none() && !table.file.as_ref().is_some_and(is_json) {
-                    return Err(
-                        error!(Sweep at "curve", "curve \"{curve}\" has no band: only a model and a predicted curve (.json) have one"
-                        ),
-                    );
+                    return Err(error!(
+                        Sweep at "curve",
+                        "curve \"{curve}\" has no band: only a model and a predicted curve (.json) have one"
+                    ));
                 }
                 self.one("band", "band", curve, Target::Band(curve.into()))
             }
@@ -115,7 +115,6 @@ impl Binder<'_> {
         }
     }
 
-    /// The gap of a curve or of the contact.
     fn gaps(&self) -> Result<Vec<Variable>, Error> {
         let vary = self.vary;
         match (&vary.curve, vary.interface.as_deref()) {
@@ -123,16 +122,16 @@ impl Binder<'_> {
                 self.check_curve(curve)?;
                 let mut vehicles = self.scenario.train.iter().flat_map(|t| &t.vehicles);
                 if vehicles.any(|v| v.zones().any(|zone| zone.curve == *curve)) {
-                    return Err(
-                        error!(Sweep at "curve", "curve \"{curve}\" joins a crush zone to its body, where there is no gap"
-                        ),
-                    );
+                    return Err(error!(
+                        Sweep at "curve",
+                        "curve \"{curve}\" joins a crush zone to its body, where there is no gap"
+                    ));
                 }
                 if vary.factor && self.scenario.curves[curve].gap.is_none() {
-                    return Err(
-                        error!(Sweep at "factor", "curve \"{curve}\" has no gap that a factor could change"
-                        ),
-                    );
+                    return Err(error!(
+                        Sweep at "factor",
+                        "curve \"{curve}\" has no gap that a factor could change"
+                    ));
                 }
                 if self.scenario.contact.gap.is_some()
                     && !self
@@ -143,26 +142,26 @@ impl Binder<'_> {
                         .skip(usize::from(self.scenario.contact.curve.is_some()))
                         .any(|name| name == curve)
                 {
-                    return Err(
-                        error!(Sweep at "curve", "the contact has its own gap, so that of curve \"{curve}\" has no effect: write interface = \"contact\""
-                        ),
-                    );
+                    return Err(error!(
+                        Sweep at "curve",
+                        "the contact has its own gap, so that of curve \"{curve}\" has no effect: write interface = \"contact\""
+                    ));
                 }
                 self.one("gap_m", "gap_factor", curve, Target::CurveGap(curve.clone()))
             }
             (None, Some("contact")) => {
                 if vary.factor && self.scenario.contact.gap.is_none() {
-                    return Err(
-                        error!(Sweep at "factor", "the contact has no gap that a factor could change"
-                        ),
-                    );
+                    return Err(error!(
+                        Sweep at "factor",
+                        "the contact has no gap that a factor could change"
+                    ));
                 }
                 self.one("gap_m", "gap_factor", "contact", Target::ContactGap)
             }
-            (None, Some(other)) => Err(
-                error!(Sweep at "interface", "interface = \"{other}\": expected \"contact\"; gaps inside a train are those of its curve"
-                ),
-            ),
+            (None, Some(other)) => Err(error!(
+                Sweep at "interface",
+                "interface = \"{other}\": expected \"contact\"; gaps inside a train are those of its curve"
+            )),
             _ => Err(error!(Sweep, "give curve = \"…\" or interface = \"contact\"")),
         }
     }
@@ -212,10 +211,10 @@ impl Binder<'_> {
                 vehicles().map(|(place, name)| (name, place)).collect()
             }
             (None, Some(Vehicles::Word(word))) => {
-                return Err(
-                    error!(Sweep at "vehicles", "vehicles = \"{word}\": expected a list, or \"all\""
-                    ),
-                );
+                return Err(error!(
+                    Sweep at "vehicles",
+                    "vehicles = \"{word}\": expected a list, or \"all\""
+                ));
             }
             (None, Some(Vehicles::List(names))) if !names.is_empty() => {
                 let places: Result<Vec<_>, Error> =
@@ -275,12 +274,9 @@ impl Binder<'_> {
     }
 
     fn known_curve(&self, key: &str, curve: &str) -> Result<(), Error> {
-        if self.scenario.curves.contains_key(curve) {
-            Ok(())
-        } else {
-            let known = self.scenario.curves.keys().map(String::as_str);
-            Err(unknown(key, "curve", curve, known))
-        }
+        let known = self.scenario.curves.keys().map(String::as_str);
+        let is_known = self.scenario.curves.contains_key(curve);
+        if is_known { Ok(()) } else { Err(unknown(key, "curve", curve, known)) }
     }
 
     /// A curve that is there, and that some item uses.
@@ -295,10 +291,10 @@ impl Binder<'_> {
         if used {
             Ok(())
         } else {
-            Err(
-                error!(Sweep at "curve", "no interface has curve \"{curve}\", so varying it has no effect"
-                ),
-            )
+            Err(error!(
+                Sweep at "curve",
+                "no interface has curve \"{curve}\", so varying it has no effect"
+            ))
         }
     }
 }
@@ -311,27 +307,17 @@ fn unknown<'a>(key: &str, what: &str, name: &str, known: impl Iterator<Item = &'
 fn check_name(key: &str, name: &str) -> Result<(), Error> {
     let breaks = |c: char| c.is_control() || [',', '|', '[', ']', '"', '#'].contains(&c);
     if name.is_empty() || name.contains(breaks) {
-        Err(
-            error!(Sweep at key, "the name \"{}\" appears in the result and may not be empty or contain , | [ ] # or quotes",
+        Err(error!(
+            Sweep at key,
+            "the name \"{}\" appears in the result and may not be empty or contain , | [ ] # or quotes",
                 name.escape_debug()
-            ),
-        )
+        ))
     } else {
         Ok(())
     }
 }
 
 impl Variable {
-    /// Names that its values are indices of; none if they are numbers.
-    pub(crate) fn names(&self) -> &[String] {
-        &self.names
-    }
-
-    pub(crate) fn summary(&self, spread: &Spread) -> VariableSummary {
-        let values = (!matches!(spread, Spread::Drawn(_))).then(|| spread.len());
-        VariableSummary { column: self.column.clone(), values }
-    }
-
     /// Whether force laws depend on it. Those of a model's curve depend on masses and speeds.
     pub(crate) fn shapes_laws(&self, scenario: &Scenario) -> bool {
         match self.target {
@@ -343,33 +329,6 @@ impl Variable {
             Target::ContactGap | Target::CurveGap(_) => {
                 scenario.run.interface_speed == InterfaceSpeed::Local
                     && scenario.curves.values().any(|c| c.model.is_some())
-            }
-        }
-    }
-
-    /// Undoes what [`Variable::apply`] did: `scenario` has here what `base` has.
-    pub(crate) fn reset(&self, scenario: &mut Scenario, base: &Scenario) {
-        match &self.target {
-            Target::Speed(train) => scenario.train[*train].speed = base.train[*train].speed,
-            Target::Mass(vehicles) => {
-                for &(t, v) in vehicles {
-                    scenario.train[t].vehicles[v].mass = base.train[t].vehicles[v].mass;
-                }
-            }
-            Target::ContactGap => scenario.contact.gap = base.contact.gap,
-            Target::CurveGap(curve) | Target::Band(curve) | Target::Force(curve) => {
-                if let (Some(table), Some(base)) =
-                    (scenario.curves.get_mut(curve), base.curves.get(curve))
-                {
-                    (table.gap, table.band, table.scale) = (base.gap, base.band, base.scale);
-                }
-            }
-            Target::Curve(_) => {
-                let mut base = base.clone();
-                let written = base.curve_names_mut();
-                for (name, written) in scenario.curve_names_mut().into_iter().zip(written) {
-                    name.clone_from(written);
-                }
             }
         }
     }

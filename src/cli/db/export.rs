@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::curate::{self, Tables};
+use crate::curate;
 use crate::curve::Case;
 use crate::database::Database;
 
@@ -28,8 +28,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let database = Database::read(&args.database)?;
     let selection = args.chosen.selection();
     let cases: Vec<&Case> = selection.find(&args.database, &database)?;
-    let tables = if args.originals { Tables::WithOriginals } else { Tables::Sampled };
-    let files = curate::write_tables(&cases, &args.output, tables)?;
+    let files = curate::write_tables(&cases, &args.output, args.originals)?;
     let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     let database = args.database.display().to_string();
     let document = document! { database: database, cases: cases.len(), files: &files };

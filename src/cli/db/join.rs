@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crate::curate::{self, Effect, Joined, OnConflict, Target};
+use crate::curate::{self, Joined, OnConflict};
 use crate::database::CasePath;
 use crate::plural::counted;
 use serde::Serialize;
@@ -34,10 +34,6 @@ impl JoinOptions {
             _ => OnConflict::Refuse,
         }
     }
-
-    fn effect(&self) -> Effect {
-        if self.dry_run { Effect::DryRun } else { Effect::Written }
-    }
 }
 
 /// Databases, and where they are joined.
@@ -55,7 +51,7 @@ pub(super) struct MergeArgs {
 
 pub(super) fn merge(args: &MergeArgs, options: GlobalOptions) -> CommandResult {
     let joined =
-        curate::merge(&args.databases, &args.output, args.how.on_conflict(), args.how.effect())?;
+        curate::merge(&args.databases, &args.output, args.how.on_conflict(), args.how.dry_run)?;
     report(&joined, &args.output, args.how.dry_run, options)
 }
 
@@ -81,9 +77,9 @@ pub(super) fn copy(args: &CopyArgs, options: GlobalOptions) -> CommandResult {
         return usage("name the destination with --to-group, --to (another database) or both");
     }
     let selection = args.chosen.some("copied")?;
-    let target = Target { database: args.to.clone(), group: args.to_group.clone() };
-    let (on_conflict, effect) = (args.how.on_conflict(), args.how.effect());
-    let joined = curate::copy(&args.database, &selection, &target, on_conflict, effect)?;
+    let target = (args.to.as_deref(), args.to_group.as_deref());
+    let (on_conflict, dry_run) = (args.how.on_conflict(), args.how.dry_run);
+    let joined = curate::copy(&args.database, &selection, target, on_conflict, dry_run)?;
     let output = args.to.as_deref().unwrap_or(&args.database);
     report(&joined, output, args.how.dry_run, options)
 }

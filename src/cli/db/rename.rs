@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::curate::{self, Effect};
+use crate::curate;
 use crate::plural::counted;
 
 use super::chosen::Chosen;
@@ -24,8 +24,7 @@ pub(super) struct RemoveArgs {
 
 pub(super) fn remove(args: &RemoveArgs, options: GlobalOptions) -> CommandResult {
     let selection = args.chosen.some("removed")?;
-    let effect = if args.dry_run { Effect::DryRun } else { Effect::Written };
-    let cases = curate::remove(&args.database, &selection, effect)?;
+    let cases = curate::remove(&args.database, &selection, args.dry_run)?;
     let database = args.database.display().to_string();
     let removed = cases.iter().map(|case| {
         document! { group: &case.id.group, #[serde(flatten)] row: case_row(case) }

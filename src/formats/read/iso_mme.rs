@@ -186,7 +186,7 @@ fn channel_files(path: &Path) -> Result<Vec<PathBuf>, Error> {
         let digits = |e: &std::ffi::OsStr| e.to_string_lossy().bytes().all(|b| b.is_ascii_digit());
         p.extension().is_some_and(digits) && p.is_file()
     };
-    let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let parent = crate::file::folder_of(path);
     let is_folder = path.is_dir();
     if !is_folder && !has_extension(path, "mme") {
         let same = |p: &PathBuf| p.file_stem() == path.file_stem() && is_channel(p);

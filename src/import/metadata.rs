@@ -3,57 +3,43 @@
 use super::{Item, Settings};
 use crate::curve::{Case, ForceKind, Masses};
 use crate::error::{Error, error};
-use crate::formats::read::{Metadata, ReadCurve};
+use crate::formats::read::Metadata;
 use crate::unit::{Shown, Speed, SpeedKind, km_per_h};
-
-/// The impact of a curve, and which force it is.
-pub(super) struct Said {
-    pub speed: Speed,
-    pub masses: Masses,
-    pub force: ForceKind,
-    pub notes: Vec<String>,
-    pub warnings: Vec<String>,
-}
-
-impl Said {
-    /// Given values take precedence, and a warning says where the file differs. `group`: a case that is
-    /// there, whose kind of speed is the default.
-    pub(super) fn of(
-        item: &Item,
-        settings: &Settings,
-        curve: &ReadCurve,
-        group: Option<&Case>,
-    ) -> Result<Self, Error> {
-        let mut both = StatedAndFound {
-            item,
-            settings,
-            facts: &curve.facts,
-            notes: Vec::new(),
-            warnings: Vec::new(),
-        };
-        let kind = both.kind(group)?;
-        let m_per_s = both.speed()?;
-        let masses = both.masses(kind)?;
-        let force = both.force()?;
-        both.unloading()?;
-        let (notes, warnings) = (both.notes, both.warnings);
-        Ok(Self { speed: Speed { m_per_s, kind }, masses, force, notes, warnings })
-    }
-}
 
 /// Two values this close are one.
 const SAME: f64 = 0.01;
 
-/// Both sides, and notes on them.
-struct StatedAndFound<'a> {
-    item: &'a Item,
-    settings: &'a Settings,
-    facts: &'a Metadata,
-    notes: Vec<String>,
-    warnings: Vec<String>,
+/// What is stated of a file and what was found in it: stated values take precedence, and a warning
+/// says where the file differs.
+pub(super) struct StatedAndFound<'a> {
+    pub item: &'a Item,
+    pub settings: &'a Settings,
+    pub facts: &'a Metadata,
+    pub notes: Vec<String>,
+    pub warnings: Vec<String>,
 }
 
 impl StatedAndFound<'_> {
+    /// The impact of the curve, and which force it is. `group`: a case that is there, whose kind of
+    /// speed is the default.
+    pub(super) fn impact(
+        &mut self,
+        group: Option<&Case>,
+    ) -> Result<(Speed, Masses, ForceKind), Error> {
+        let kind = self.kind(group)?;
+        let speeds = (self.item.speed_m_per_s, self.facts.speed_m_per_s);
+        let m_per_s = self.either("speed", speeds, km_per_h)?;
+        let m_per_s =
+            m_per_s.ok_or_else(|| self.missing("its speed", "--speed, such as --speed 36km/h"))?;
+        let masses = self.masses(kind)?;
+        let force = self.force()?;
+        // Reports a stated unloading stiffness that differs from the file's; the choice is made elsewhere.
+        let stated = self.settings.unloading_stiffness_n_per_m;
+        let both = (stated, stated.and(self.facts.unloading_stiffness_n_per_m));
+        self.either("unloading stiffness", both, Shown::one_stiffness)?;
+        Ok((Speed { m_per_s, kind }, masses, force))
+    }
+
     fn missing(&self, what: &'static str, option: &'static str) -> Error {
         error!(
             Usage,
@@ -107,12 +93,6 @@ impl StatedAndFound<'_> {
         }
     }
 
-    fn speed(&mut self) -> Result<f64, Error> {
-        let both = (self.item.speed_m_per_s, self.facts.speed_m_per_s);
-        let speed = self.either("speed", both, km_per_h)?;
-        speed.ok_or_else(|| self.missing("its speed", "--speed, such as --speed 36km/h"))
-    }
-
     fn masses(&mut self, kind: SpeedKind) -> Result<Masses, Error> {
         let shown = |kg: f64| {
             if kg < 1e3 { format!("{kg} kg") } else { format!("{} t", kg / 1e3) }
@@ -138,13 +118,6 @@ impl StatedAndFound<'_> {
             }
         };
         Ok(Masses { body_kg, other_kg })
-    }
-
-    /// Reports a stated unloading stiffness that differs from the file's; the choice is made elsewhere.
-    fn unloading(&mut self) -> Result<(), Error> {
-        let stated = self.settings.unloading_stiffness_n_per_m;
-        let both = (stated, stated.and(self.facts.unloading_stiffness_n_per_m));
-        self.either("unloading stiffness", both, Shown::one_stiffness).map(|_| ())
     }
 
     fn force(&mut self) -> Result<ForceKind, Error> {

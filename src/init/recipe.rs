@@ -1,0 +1,394 @@
+//! The recipe that most runs agree on: kind, direction, force and nodes; runs that need another
+//! one are distinguished, never merged.
+
+use std::collections::BTreeMap;
+
+use super::UserHints;
+use super::explain::{self, Explanation, FOLLOWS, RELATED};
+use super::survey::{ForceCandidate, NodeCandidate, Survey};
+use crate::curve::recipe::DisplacementComponent;
+use crate::study::StudyKind;
+
+/// A node represents its body if it leaves at most this much more of the impulse than the best
+/// one: as a factor and as a share of the impulse.
+const AS_GOOD: (f64, f64) = (1.5, 0.01);
+/// The same for a node whose title says that it is the centre of gravity.
+const CENTRE_AS_GOOD: f64 = 0.05;
+/// Steps of the roughness below which velocities are equally smooth, for each whole.
+const EVEN: f64 = 10.0;
+const NAMED: usize = 5;
+
+#[derive(Clone, Debug)]
+pub(super) struct CommonRecipe {
+    pub kind: StudyKind,
+    pub direction: DisplacementComponent,
+    pub nodes: Vec<ChosenNode>,
+    /// `None` if no force moves the bodies: then mass times acceleration is used.
+    pub force: Option<ForceCandidate>,
+    pub other_forces: Vec<Alternative>,
+    /// What the chosen nodes leave of the impulse in the run where they follow it worst.
+    pub residual: f64,
+    /// The same for what one body of a pair leaves of the other's change of velocity, if no force
+    /// moves them.
+    pub opposed: Option<f64>,
+    /// Bodies that move in the run with most of them.
+    pub bodies: usize,
+    /// For each run whether it can take the recipe, or why not.
+    pub members: Vec<Result<(), String>>,
+}
+
+/// A node and those that could represent the same body.
+#[derive(Clone, Debug)]
+pub(super) struct ChosenNode {
+    pub id: i64,
+    pub title: Option<String>,
+    pub residual: f64,
+    pub others: Vec<Alternative>,
+}
+
+/// What else could be meant, and how well it would do.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub(crate) struct Alternative {
+    /// As a recipe would name it.
+    pub(crate) id: String,
+    /// Title and how well it does.
+    pub(crate) about: String,
+}
+
+/// What runs must share to have one recipe.
+type Key = (StudyKind, DisplacementComponent, Option<(&'static str, i64)>);
+
+/// A run's survey with what explains it best.
+struct RunView<'a> {
+    survey: &'a Survey,
+    best: Option<Explanation>,
+    /// Whether it counts: the record covers the crash up to its end, or no run's does.
+    counts: bool,
+    /// What the agreed force explains of it, or why it needs a different recipe.
+    explained: Result<Option<Explanation>, String>,
+}
+
+impl CommonRecipe {
+    /// The recipe of most of the runs; `None` if there are no runs.
+    pub(super) fn of(surveys: &[&Survey], hints: &UserHints) -> Option<Self> {
+        // A node of the other body means two.
+        let two = hints.minus_node.map(|_| StudyKind::Pair);
+        let kind = if hints.half_model { Some(StudyKind::Wall) } else { hints.kind.or(two) };
+        let mut views = RunView::all(surveys, hints, kind);
+        let mut votes: Vec<(Key, Vec<usize>)> = Vec::new();
+        for (k, view) in views.iter().enumerate().filter(|(_, view)| view.counts) {
+            let key = view.key();
+            match votes.iter_mut().find(|(known, _)| *known == key) {
+                Some((_, voters)) => voters.push(k),
+                None => votes.push((key, vec![k])),
+            }
+        }
+        // Of equally many votes the force that explains more, then the first run's.
+        let left = |runs: &[usize]| -> f64 { runs.iter().map(|&k| views[k].residual()).sum() };
+        let (key, _) = votes.into_iter().min_by(|(_, a), (_, b)| {
+            let by_votes = b.len().cmp(&a.len());
+            by_votes.then(left(a).total_cmp(&left(b))).then(a[0].cmp(&b[0]))
+        })?;
+        for view in &mut views {
+            view.explained = view.takes(&key, kind, hints);
+        }
+        let (kind, direction, force) = key;
+        let (force, other_forces) = force.and_then(|_| chosen_force(&views)).unzip();
+        let explained = views.iter().filter_map(|view| view.explained.as_ref().ok()?.as_ref());
+        let opposed = explained.map(|explained| explained.residual).fold(0.0, f64::max);
+        let given = [hints.node, hints.minus_node];
+        let nodes: Vec<ChosenNode> = (0..if kind == StudyKind::Pair { 2 } else { 1 })
+            .filter_map(|slot| choose(&views, slot, given[slot], force.is_some()))
+            .collect();
+        let are_given = hints.node.is_some() || hints.force.is_some();
+        Some(Self {
+            kind,
+            direction,
+            opposed: (force.is_none() && kind == StudyKind::Pair).then_some(opposed),
+            force,
+            other_forces: other_forces.unwrap_or_default(),
+            residual: nodes.iter().map(|node| node.residual).fold(0.0, f64::max),
+            bodies: surveys.iter().map(|survey| survey.bodies.len()).max().unwrap_or(0),
+            members: views.iter().map(|view| view.check_nodes(&nodes, are_given)).collect(),
+            nodes,
+        })
+    }
+}
+
+impl<'a> RunView<'a> {
+    /// All runs, each with what explains it best: the force that the caller names if he does.
+    fn all(surveys: &[&'a Survey], hints: &UserHints, kind: Option<StudyKind>) -> Vec<Self> {
+        let best = |survey: &Survey| match &hints.force {
+            Some(named) => explain::of_force(survey, survey.force(&named.file, named.id)?, kind),
+            None => explain::best_of(survey, kind).or_else(|| explain::without_force(survey, kind)),
+        };
+        let view = |survey: &&'a Survey| {
+            let best = best(survey);
+            let counts = best.as_ref().is_some_and(|best| explain::reaches_the_end(survey, best));
+            Self { survey: *survey, best, counts, explained: Ok(None) }
+        };
+        let mut views: Vec<Self> = surveys.iter().map(view).collect();
+        if !views.iter().any(|view| view.counts) {
+            views.iter_mut().for_each(|view| view.counts = true);
+        }
+        views
+    }
+
+    fn key(&self) -> Key {
+        let best = self.best.as_ref();
+        let force = best.and_then(|best| self.moved_by(best)).map(|force| (force.file, force.id));
+        (best.map_or(StudyKind::Wall, |best| best.kind), self.survey.direction, force)
+    }
+
+    fn residual(&self) -> f64 {
+        let by_force = self.best.as_ref().filter(|best| best.force.is_some());
+        by_force.map_or(1.0, |best| best.residual)
+    }
+
+    fn moved_by(&self, explanation: &Explanation) -> Option<&'a ForceCandidate> {
+        explanation.force.map(|force| &self.survey.forces[force])
+    }
+
+    /// Whether as many bodies move in it as in the others.
+    fn check_kind(&self, others: StudyKind) -> Result<(), String> {
+        match &self.best {
+            Some(best) if best.kind != others && self.counts => Err(match others {
+                StudyKind::Pair => "one body moves in it, two bodies do in the others",
+                StudyKind::Wall => "two bodies move in it, one does in the others",
+            }
+            .into()),
+            _ => Ok(()),
+        }
+    }
+
+    /// What the recipe's force explains of the run, or why the run needs a different recipe.
+    fn takes(
+        &self,
+        (of_others, direction, force): &Key,
+        kind: Option<StudyKind>,
+        hints: &UserHints,
+    ) -> Result<Option<Explanation>, String> {
+        if self.survey.direction != *direction {
+            return Err(format!("it moves along {}", self.survey.direction.axis()));
+        }
+        let explained = if let Some((file, id)) = *force {
+            let wanted = kind.unwrap_or(*of_others);
+            let force = self.survey.force(file, id);
+            let found = force.and_then(|force| explain::of_force(self.survey, force, Some(wanted)));
+            let is_related =
+                |e: &Explanation| e.residual < RELATED || hints.force.is_some() || !self.counts;
+            let own = self.best.as_ref().and_then(|best| self.moved_by(best));
+            Some(found.filter(is_related).ok_or_else(|| match (own, force) {
+                (Some(own), _) => {
+                    format!("{file} {id} does not move its bodies, {} {} does", own.file, own.id)
+                }
+                (None, Some(_)) => format!("{file} {id} does not move its bodies"),
+                (None, None) => format!("it has no {file} {id} along the motion"),
+            })?)
+        } else if self.best.as_ref().is_some_and(|best| best.force.is_some()) {
+            return Err("it has a contact force, the others have none".into());
+        } else {
+            self.best.clone()
+        };
+        self.check_kind(*of_others)?;
+        // The body of the node that the caller names comes first.
+        Ok(explained.map(|mut explained| {
+            let has = |body: &usize| {
+                self.survey.bodies[*body].nodes.iter().any(|node| Some(node.id) == hints.node)
+            };
+            if let Some(slot) = explained.bodies.iter().position(has) {
+                explained.bodies.swap(0, slot);
+            }
+            explained
+        }))
+    }
+
+    /// The nodes of one of the bodies that the force explains, each with what it leaves of the
+    /// impulse; without a force those of the body in that place.
+    fn nodes_of(&self, slot: usize) -> Vec<(&'a NodeCandidate, f64)> {
+        let (body, force) = match &self.explained {
+            Ok(Some(explained)) => (explained.bodies.get(slot).copied(), explained.force),
+            Ok(None) => (Some(slot), None),
+            Err(_) => (None, None),
+        };
+        let body = body.and_then(|body| self.survey.bodies.get(body));
+        let nodes = body.map(|body| &body.nodes[..]).unwrap_or_default();
+        let residual = |node: &NodeCandidate| force.map_or(0.0, |f| node.fits[f].residual);
+        nodes.iter().map(|node| (node, residual(node))).collect()
+    }
+
+    /// Whether the run has the recipe's nodes, and they follow the force.
+    fn check_nodes(&self, nodes: &[ChosenNode], are_given: bool) -> Result<(), String> {
+        self.explained.as_ref().map_err(String::clone)?;
+        for (slot, ChosenNode { id, .. }) in nodes.iter().enumerate() {
+            let all = self.nodes_of(slot);
+            let best = all.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map(|(node, _)| {
+                let title = node.title.as_ref();
+                let title = title.map_or(String::new(), |title| format!(" \"{title}\""));
+                format!("; there {}{title} would be taken", node.id)
+            });
+            let best = best.unwrap_or_default();
+            match all.iter().find(|(node, _)| node.id == *id) {
+                None => return Err(format!("it has no moving node {id}{best}")),
+                Some((_, residual)) if self.counts && !are_given && *residual >= RELATED => {
+                    return Err(format!("node {id} does not follow the force{best}"));
+                }
+                Some(_) => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The verdicts of all runs on a node.
+struct NodeTally<'a> {
+    node: &'a NodeCandidate,
+    is_centre: bool,
+    /// In which it can represent the body.
+    runs: usize,
+    /// The largest of all runs.
+    residual: f64,
+    /// Of all runs together, and how many that are.
+    roughness: f64,
+    seen: f64,
+}
+
+/// The node that can represent the body in most runs: a centre of gravity first, then the one
+/// with the smoothest velocity.
+fn choose(
+    views: &[RunView<'_>],
+    slot: usize,
+    given: Option<i64>,
+    by_force: bool,
+) -> Option<ChosenNode> {
+    let mut tallies: BTreeMap<i64, NodeTally<'_>> = BTreeMap::new();
+    for run in views.iter().filter(|view| view.counts).map(|view| view.nodes_of(slot)) {
+        let best = run.iter().map(|(_, residual)| *residual).fold(f64::INFINITY, f64::min);
+        for (node, residual) in run {
+            let is_centre = names_centre_of_gravity(node.title.as_deref());
+            let limit =
+                if is_centre { best + CENTRE_AS_GOOD } else { AS_GOOD.0 * best + AS_GOOD.1 };
+            let (runs, roughness, seen) = (0, 0.0, 0.0);
+            let empty = NodeTally { node, is_centre, runs, residual: 0.0, roughness, seen };
+            let tally = tallies.entry(node.id).or_insert(empty);
+            tally.runs += usize::from(residual <= limit);
+            tally.residual = tally.residual.max(residual);
+            tally.roughness += node.roughness;
+            tally.seen += 1.0;
+        }
+    }
+    // Of equally smooth ones, such as the nodes of a rigid body, the one that follows best.
+    let roughness = |tally: &NodeTally<'_>| (tally.roughness / tally.seen * EVEN).round();
+    let mut tallies: Vec<NodeTally<'_>> = tallies.into_values().collect();
+    tallies.sort_by(|a, b| {
+        (Some(b.node.id) == given)
+            .cmp(&(Some(a.node.id) == given))
+            .then(b.runs.cmp(&a.runs))
+            .then(b.is_centre.cmp(&a.is_centre))
+            .then(roughness(a).total_cmp(&roughness(b)))
+            .then(a.residual.total_cmp(&b.residual))
+            .then(a.node.id.cmp(&b.node.id))
+    });
+    if let Some(id) = given
+        && tallies.first().is_none_or(|first| first.node.id != id)
+    {
+        // Told of each run that does not have it.
+        return Some(ChosenNode { id, title: None, residual: 1.0, others: Vec::new() });
+    }
+    let (first, others) = tallies.split_first()?;
+    let about = |tally: &NodeTally<'_>| {
+        let title = title_before(&tally.node.title);
+        if by_force {
+            format!("{title}follows the impulse within {} %", percent(tally.residual))
+        } else {
+            format!("{title}starts at the same velocity")
+        }
+    };
+    let others = others
+        .iter()
+        .filter(|tally| tally.residual <= FOLLOWS.max(2.0 * first.residual))
+        .take(NAMED)
+        .map(|tally| Alternative { id: tally.node.id.to_string(), about: about(tally) })
+        .collect();
+    let title = first.node.title.clone();
+    Some(ChosenNode { id: first.node.id, title, residual: first.residual, others })
+}
+
+/// The force that the members share, as the recipe names it, and those that could be meant; `None`
+/// if none moves them.
+fn chosen_force(views: &[RunView<'_>]) -> Option<(ForceCandidate, Vec<Alternative>)> {
+    let of_members: Vec<(&Survey, &ForceCandidate)> = views
+        .iter()
+        .filter_map(|view| {
+            let explained = view.explained.as_ref().ok()?.as_ref()?;
+            Some((view.survey, view.moved_by(explained)?))
+        })
+        .collect();
+    let (first, force) = *of_members.first()?;
+    let others = first.forces.iter().enumerate();
+    let others = others
+        .filter(|(_, other)| (other.file, other.id) != (force.file, force.id))
+        .filter_map(|(k, other)| Some((other, explain::of_force(first, k, None)?.residual)))
+        .filter(|(_, residual)| *residual < RELATED)
+        .take(NAMED)
+        .map(|(other, residual)| Alternative {
+            id: format!("{} {}", other.file, other.id),
+            about: format!(
+                "{}bodies follow it within {} %; its impulse is {} % of the chosen one's",
+                title_before(&other.title),
+                percent(residual),
+                percent(other.size() / force.size())
+            ),
+        })
+        .collect();
+    // Where a wall's normal force is not that along the motion in one run, the latter is taken.
+    let mut components = of_members.iter().map(|(_, force)| force.component);
+    let component = components.find(|c| *c != "normal_force").unwrap_or(force.component);
+    let other_side = of_members.iter().all(|(_, force)| force.other_side);
+    Some((ForceCandidate { component, other_side, ..force.clone() }, others))
+}
+
+fn title_before(title: &Option<String>) -> String {
+    title.as_ref().map_or(String::new(), |title| format!("\"{title}\", "))
+}
+
+/// A share in percent, with one digit below ten.
+pub(super) fn percent(share: f64) -> String {
+    let percent = share * 100.0;
+    if percent < 9.95 { format!("{percent:.1}") } else { format!("{percent:.0}") }
+}
+
+/// Whether a title names a body's centre of gravity.
+pub(super) fn names_centre_of_gravity(title: Option<&str>) -> bool {
+    let Some(title) = title.map(str::to_lowercase) else { return false };
+    let word = |wanted: &str| title.split(|c: char| !c.is_alphanumeric()).any(|w| w == wanted);
+    let centre = ["centre", "center"].iter().any(|c| title.contains(c));
+    let of_mass = ["gravity", "mass"].iter().any(|c| title.contains(c));
+    word("cog")
+        || word("cg")
+        || title.contains("c.g.")
+        || title.contains("c.o.g")
+        || centre && of_mass
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn centres_of_gravity_are_known_by_their_titles() {
+        fn t(title: &str, expected: bool) {
+            assert_eq!(names_centre_of_gravity(Some(title)), expected, "{title}");
+        }
+        t("COG of the rigid body of car A", true);
+        t("N900001_COG", true);
+        t("vehicle CG", true);
+        t("c.g. of car body", true);
+        t("Centre of gravity", true);
+        t("center of mass", true);
+        t("centre of the nose plate of car A", false);
+        t("cogwheel", false);
+        t("mass of equipment", false);
+        assert!(!names_centre_of_gravity(None));
+    }
+}
