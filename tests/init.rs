@@ -978,7 +978,7 @@ fn damaged_files_give_a_study_or_a_reason() {
             }),
         }
         fs::write(&path, bytes).unwrap();
-        match propose(&[run.clone()], &study, &hints, |_| {}) {
+        match propose(std::slice::from_ref(&run), &study, &hints, |_| {}) {
             Ok(proposal) => {
                 studies += 1;
                 proposal.to_toml().parse::<Table>().unwrap();

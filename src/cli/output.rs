@@ -315,10 +315,8 @@ pub(super) fn formats(
         document! { name: name, extensions: extensions, description: description }
     });
     let joined = |extensions: &[&str]| format!(".{}", extensions.join(" ."));
-    let widest = |length: &dyn Fn(&(&str, &[&str], &str)) -> usize| {
-        formats.iter().map(|format| length(format)).max().unwrap_or(0)
-    };
-    let (name, endings) = (widest(&|format| format.0.len()), widest(&|f| joined(f.1).len()));
+    let name = formats.iter().map(|format| format.0.len()).max().unwrap_or(0);
+    let endings = formats.iter().map(|format| joined(format.1).len()).max().unwrap_or(0);
     options.show(&document! { formats: listed.collect::<Vec<_>>() }, |out| {
         formats.iter().try_for_each(|(own, extensions, description)| {
             writeln!(out, "{own:<name$}  {:<endings$}  {description}", joined(extensions))

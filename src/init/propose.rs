@@ -154,7 +154,7 @@ fn refuse_hints(
     {
         return Err(error!(
             Study,
-            "only one body moves in these runs: if it stands for a pair, cut at its symmetry plane, say --half-model; if it meets a wall, leave out --kind pair and --minus-node"
+            "only one body moves in these runs: if it represents a pair, cut at its symmetry plane, use --half-model; if it hits a wall, leave out --kind pair and --minus-node"
         ));
     }
     Ok(())

@@ -27,7 +27,8 @@ pub(crate) fn case_columns<'c, T>(
         let truncated = if c.is_truncated() { " (truncated)" } else { "" };
         format!("{:.4} m{truncated}", c.max_deflection_m())
     };
-    let columns: [(&str, &dyn Fn(&Case) -> String); 6] = [
+    type Cell<'a> = &'a dyn Fn(&Case) -> String;
+    let columns: [(&str, Cell<'_>); 6] = [
         ("speed", &speed),
         ("mass", &|c| mass.text(c.conditions.masses.body_kg)),
         ("peak force", &|c| force.text(c.peak_force_n())),

@@ -4,7 +4,7 @@
 //! In `bndout` the blocks of a state are prescribed motions, pressures and discrete forces. Rigid
 //! bodies (`mat#`), pressures and discrete forces have only been seen in the source of LSTC's
 //! converter `l2a`. In `nodfor` they are groups of nodes, numbered by their order, not by the ids of
-//! their node sets; it was never seen with data and is read as the source of `l2a` writes it.
+//! their node sets; it is read as the source of `l2a` writes it.
 
 use super::ascii::{self, Body};
 use super::label_values::{Label, fields};
