@@ -623,6 +623,19 @@ fn curves_of_one_model_go_on_alike() {
     let edge = push("model = \"lead.model\", force = \"body\", band = 1.0");
     assert!(edge.0 < crush_m);
     alike("file = \"lead50.json\", force = \"body\", band = 1.0", edge);
+    // A continuation that does not belong to its curve is refused.
+    let whole: Value = json(&std::fs::read_to_string(here.join("lead50.json")).unwrap());
+    for (key, value, said) in [
+        ("data_end_m", Value::from(-1.0), "beyond.data_end_m is -1"),
+        ("body_force_N", Value::Null, "and 0 of body_force_N"),
+        ("force_N", serde_json::json!([1e6]), "1 values of force_N"),
+    ] {
+        let mut curve = whole.clone();
+        curve["beyond"][key] = value;
+        std::fs::write(here.join("odd.json"), curve.to_string()).unwrap();
+        let error = crumple_fails(here, 1, &["export", "odd.json", "-o", "odd.csv"]);
+        assert!(error.contains(said), "{error}");
+    }
     // Plots say from where on the runs' data have ended.
     let fast = ["predict", "lead.model", "--speed", "76km/h", "--extrapolate", "-o", "fast.json"];
     crumple_ok(here, &fast);

@@ -102,8 +102,8 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
 /// Pulses: states above the threshold; those less than `pause_s` apart are one.
 fn spells(time_s: &[f64], force_n: &[f64], threshold_n: f64, pause_s: f64) -> Vec<Spell> {
     let mut spells: Vec<Spell> = Vec::new();
-    let last = time_s.len() - 1;
-    for i in (0..=last).filter(|&i| force_n[i] > threshold_n) {
+    let last = time_s.len().saturating_sub(1);
+    for i in (0..time_s.len()).filter(|&i| force_n[i] > threshold_n) {
         let width_s = 0.5 * (time_s[(i + 1).min(last)] - time_s[i.saturating_sub(1)]);
         let impulse_ns = force_n[i] * width_s;
         match spells.last_mut() {

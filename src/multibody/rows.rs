@@ -49,7 +49,7 @@ impl Layout {
     /// Of as many bodies, and of a last one that never moves.
     pub(crate) fn new(bodies: usize) -> Self {
         let rows = bodies.div_ceil(LANES);
-        // Without a body that is only a pad, the last one stands behind the end.
+        // Without a body that is only a pad, the last one lies after the end.
         let slot = |i: usize| {
             if i < rows * LANES {
                 LaneIndex::new(i % rows, i / rows)

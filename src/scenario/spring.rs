@@ -92,18 +92,13 @@ pub(super) fn spring(
         curve = curve.scaled(factor).map_err(envelope_error)?;
     }
     // A file or a device says itself how far it goes; the curve of one impact only how far that went.
+    let is_whole = matches!(source, CurveSource::Curve(..) | CurveSource::Stages(_));
+    if !is_whole || table.end == Some(EnvelopeEnd::Bottom) {
+        return Spring { curve, end: EnvelopeEnd::Bottom, warnings }.continued(table);
+    }
     let goes_on = curve.data_end_m.is_some_and(|m| m < curve.loading.end_m());
-    let end = match (source, table.end) {
-        (CurveSource::Curve(..) | CurveSource::Stages(_), None) if goes_on => EnvelopeEnd::Slope,
-        (CurveSource::Curve(..) | CurveSource::Stages(_), None) => EnvelopeEnd::Hold,
-        (CurveSource::Curve(..) | CurveSource::Stages(_), Some(end))
-            if end != EnvelopeEnd::Bottom =>
-        {
-            end
-        }
-        _ => return Spring { curve, end: EnvelopeEnd::Bottom, warnings }.continued(table),
-    };
-    Ok(Spring { curve, end, warnings })
+    let usual = if goes_on { EnvelopeEnd::Slope } else { EnvelopeEnd::Hold };
+    Ok(Spring { curve, end: table.end.unwrap_or(usual), warnings })
 }
 
 /// The curve of a model, with its warnings.

@@ -48,8 +48,8 @@ impl<'a> Blend<'a> {
         for (run, nearness) in [(low, (1.0 - share).powi(2)), (high, share.powi(2))] {
             if run >= first && nearness > 0.0 {
                 weights[run] += nearness;
-                let told = smooth(all[run]);
-                weights[first..].iter_mut().zip(told).for_each(|(w, told)| *w -= nearness * told);
+                let slow = smooth(all[run]);
+                weights[first..].iter_mut().zip(slow).for_each(|(w, slow)| *w -= nearness * slow);
             }
         }
         weights

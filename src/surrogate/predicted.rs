@@ -175,6 +175,25 @@ pub struct Provenance {
 }
 
 impl Beyond {
+    /// Whether it has a number for each point, and the forces that its curve has.
+    fn check(&self, has_body_force: bool) -> Result<(), Error> {
+        let end_m = self.data_end_m;
+        if !(end_m > 0.0 && end_m.is_finite()) {
+            return Err(error!(Prediction, "beyond.data_end_m is {end_m}: expected more than 0"));
+        }
+        let points = self.deflection_m.len();
+        let body = self.body_force_n.as_ref().map(Vec::len);
+        if self.force_n.len() != points || body != has_body_force.then_some(points) {
+            return Err(error!(
+                Prediction,
+                "beyond has {points} deflections, {} values of force_N and {} of body_force_N: expected one for each force of the curve",
+                self.force_n.len(),
+                body.unwrap_or(0)
+            ));
+        }
+        Ok(())
+    }
+
     fn envelope(&self, force_n: &[f64]) -> Result<Envelope, Error> {
         let from_origin = |values: &[f64]| std::iter::once(&0.0).chain(values).copied().collect();
         Envelope::new(from_origin(&self.deflection_m), from_origin(force_n))
@@ -248,6 +267,9 @@ impl PredictedCurve {
                     self.force_n.len()
                 ));
             }
+        }
+        if let Some(beyond) = self.own_beyond() {
+            beyond.check(self.body_force_n.is_some())?;
         }
         let envelope = envelope(self.deflection_m.clone(), self.force_n.clone())?;
         pushing("force_N", envelope)
