@@ -183,7 +183,9 @@ impl Beyond {
         }
         let points = self.deflection_m.len();
         let body = self.body_force_n.as_ref().map(Vec::len);
-        if self.force_n.len() != points || body != has_body_force.then_some(points) {
+        // A curve whose body force was removed has no use for what is left of it here.
+        let suits = body.map_or(!has_body_force, |body| body == points);
+        if self.force_n.len() != points || !suits {
             return Err(error!(
                 Prediction,
                 "beyond has {points} deflections, {} values of force_N and {} of body_force_N: expected one for each force of the curve",
