@@ -34,8 +34,7 @@ fn kind(name: &str) -> ModelKind {
     ModelKind::named(name, 0).expect("a model of that name")
 }
 
-const MODELS: [&str; 7] =
-    ["nearest", "linear", "rate", "crush-law", "registered", "forest", "extra"];
+const MODELS: [&str; 6] = ["nearest", "linear", "rate", "crush-law", "forest", "extra"];
 
 #[divan::bench(args = MODELS, sample_count = 5)]
 fn fit(bencher: Bencher, name: &str) {

@@ -460,7 +460,6 @@ fn a_saved_model_predicts_the_same_bits() {
         ModelKind::nearest(),
         ModelKind::linear(),
         ModelKind::rate(),
-        ModelKind::registered(),
         ModelKind::extra(ForestOptions { trees: 20, ..ForestOptions::extra() }),
         ModelKind::forest(ForestOptions::default()),
     ] {

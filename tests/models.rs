@@ -813,7 +813,7 @@ fn jumps_of_the_collapse_are_warned_of() {
     let cases: Vec<Case> = [11.0, 12.0, 13.0, 14.0, 16.0, 17.0]
         .map(|v| case(&format!("{v}"), v, 40e3, &humps(v)))
         .to_vec();
-    let model = train("made", &cases, Choice::Kind(ModelKind::registered())).unwrap();
+    let model = train("made", &cases, Choice::Kind(ModelKind::rate())).unwrap();
     let codes =
         |v: f64| -> Vec<&str> { curve(&model, v).warnings.iter().map(|w| w.code.name()).collect() };
     assert!(codes(15.0).contains(&"mode_switch"), "{:?}", model.mode_switches_m_per_s);

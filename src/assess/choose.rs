@@ -1,21 +1,24 @@
 //! The choice among models that were validated, and the run that would help most.
 //!
-//! `auto` considers the models that are at or below `nearest`, `linear` and `forest` in mean force error and in mean
-//! velocity error. Of these it takes the simplest one within 10 % of the smallest force error. Speeds inside the range and
-//! its two ends are reported separately. The errors of the chosen model are optimistic, so `--nested` repeats the choice without each
-//! left-out speed. For trains the ends count as much as the inner speeds, and among the best models those are preferred
-//! whose force follows the closing speed.
+//! Two to five left-out speeds decide little: the model with the smallest mean is often the luckiest one. `auto` therefore starts
+//! from the model with the most physics in it that the runs allow (`crush-law`, else `rate`), and leaves it only for one that is better beyond
+//! chance at the speeds left out: in force, velocity, acceleration and crush together. `validate --subsets` shows what that costs
+//! against the best model in hindsight. The errors of the chosen model are a little optimistic, so `--nested` repeats the choice without
+//! each left-out speed. For trains the ends of the range count as much as the inner speeds.
 
 use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::dataset::TrainingSet;
-use crate::surrogate::MODELS;
-use crate::surrogate::leave_one_out::{Means, Validation};
+use crate::plural::counted;
+use crate::surrogate::leave_one_out::{LeftOut, Means, Validation};
+use crate::surrogate::{MODELS, Model, ModelKind};
 use crate::unit::km_per_h;
 
-/// Mean errors that differ by less are a tie: three to five speeds resolve no more.
-const TIE: f64 = 0.10;
+/// Fewest left-out speeds whose scatter says something.
+const LEAST_SPEEDS: usize = 3;
+/// With fewer, another model must come below this share of the error of the default at each of them.
+const GROSSLY_BETTER: f64 = 2.0 / 3.0;
 
 /// Where the queries of a model will lie.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,49 +39,94 @@ pub enum Selection<'a> {
     Named(&'a str),
 }
 
-/// The chosen model and why; `None` without means.
+/// The chosen model and why, by its errors `of` the speeds that count for the purpose; `None` without any model.
 ///
-/// Of the models that are, in the mean over the speeds that count, at or below every baseline in
-/// force and in velocity error, those within 10 % of the smallest force error tie, and the
-/// simplest of them is taken; for trains first those whose force follows the closing speed. If none
-/// keeps to all baselines, the one whose worst ratio to them is smallest.
-pub(crate) fn choose(means: &[Means], purpose: Purpose) -> Option<(String, String)> {
-    let entry = |m: &Means| MODELS.iter().find(|entry| entry.name == m.model);
-    let baselines = || means.iter().filter(|m| entry(m).is_some_and(|e| e.baseline));
-    let least = |of: fn(&Means) -> f64| baselines().map(of).fold(f64::INFINITY, f64::min);
-    let (force, velocity) = (least(|m| m.force_l1), least(|m| m.velocity_l1));
-    let keeps = |m: &&Means| m.force_l1 <= force && m.velocity_l1 <= velocity;
-    let rank = |m: &Means| {
-        let follows = entry(m).is_some_and(|e| e.follows_closing);
-        (purpose == Purpose::Train && !follows, entry(m).map_or(u8::MAX, |e| e.complexity))
+/// The default is the simplest model whose force follows the closing speed, without such a one that with the smallest mean error.
+/// Another takes its place if the mean of the paired differences is larger than their standard deviation, from three speeds on; or, of
+/// fewer, if it is grossly better at each.
+pub(crate) fn choose(of: &[(&str, Vec<f64>)]) -> Option<(String, String)> {
+    let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
+    let follows = |name: &str| {
+        let entry = MODELS.iter().find(|entry| entry.name == name)?;
+        entry.follows_closing.then_some(entry.complexity)
     };
-    let (over, preferred) = match purpose {
-        Purpose::Vehicle => ("", "the simplest"),
-        Purpose::Train => (
-            ", ends of the range included,",
-            "the simplest, with a force that follows the closing speed,",
-        ),
+    let best = of.iter().min_by(|a, b| mean(&a.1).total_cmp(&mean(&b.1)))?;
+    let default = of
+        .iter()
+        .filter_map(|model| Some((follows(model.0)?, model)))
+        .min_by_key(|(complexity, _)| *complexity)
+        .map_or(best, |(_, model)| model);
+    let is_better = |(_, errors): &&(&str, Vec<f64>)| {
+        let gains: Vec<f64> =
+            default.1.iter().zip(errors).map(|(own, other)| own - other).collect();
+        let gain = mean(&gains);
+        let squares: f64 = gains.iter().map(|g| (g - gain).powi(2)).sum();
+        if gains.len() >= LEAST_SPEEDS {
+            gain > (squares / (gains.len() - 1) as f64).sqrt()
+        } else {
+            let grossly = |(own, other): (&f64, &f64)| *other < GROSSLY_BETTER * own;
+            gains.len() > 1 && default.1.iter().zip(errors).all(grossly)
+        }
     };
-    let best = means.iter().filter(keeps).map(|m| m.force_l1).fold(f64::INFINITY, f64::min);
-    let tied = means.iter().filter(keeps).filter(|m| m.force_l1 <= (1.0 + TIE) * best);
-    if let Some(chosen) = tied.min_by_key(|m| rank(m)) {
+    let rivals = of.iter().filter(|model| model.0 != default.0);
+    let better = rivals.clone().filter(is_better).min_by(|a, b| mean(&a.1).total_cmp(&mean(&b.1)));
+    let speeds = counted(default.1.len(), "speed");
+    let share = |other: &[f64]| 100.0 * (mean(other) / mean(&default.1) - 1.0);
+    if let Some((name, errors)) = better {
+        let less = -share(errors);
         let reason = format!(
-            "{preferred} of the models whose mean force error{over} is within 10 % of the smallest (its own {:.2} %, smallest {:.2} %)",
-            chosen.force_l1 * 100.0,
-            best * 100.0
+            "its errors at {speeds} left out are {less:.0} % smaller than those of {}, beyond their scatter",
+            default.0
         );
-        return Some((chosen.model.clone(), reason));
+        return Some(((*name).into(), reason));
     }
-    let worst = |m: &Means| (m.force_l1 / force).max(m.velocity_l1 / velocity);
-    let chosen = means.iter().min_by(|a, b| worst(a).total_cmp(&worst(b)))?;
-    let compared: Vec<&str> = baselines().map(|m| m.model.as_str()).collect();
-    let reason = format!(
-        "no model is at least as good as each of {} in both force and velocity; this one comes closest (force {:.2} %, velocity {:.2} %)",
-        compared.join(", "),
-        chosen.force_l1 * 100.0,
-        chosen.velocity_l1 * 100.0
-    );
-    Some((chosen.model.clone(), reason))
+    let next = rivals.min_by(|a, b| mean(&a.1).total_cmp(&mean(&b.1)));
+    let reason = match next {
+        Some((name, errors)) if follows(default.0).is_some() => {
+            let more = share(errors);
+            let direction = if more < 0.0 { "smaller" } else { "larger" };
+            let within = if more < 0.0 { ", within their scatter" } else { "" };
+            format!(
+                "the default; the errors of the next best, {name}, at {speeds} left out are {:.0} % {direction}{within}",
+                more.abs()
+            )
+        }
+        Some(_) => format!("it has the smallest errors at {speeds} left out"),
+        None => "no other model fits these runs".into(),
+    };
+    Some((default.0.into(), reason))
+}
+
+/// Errors of each model that has means, at the speeds left out that count for a purpose: force, velocity, acceleration and crush, each
+/// relative to what the models have in the median, and averaged.
+pub(crate) fn scores<'a>(
+    means: &'a [Means],
+    rows: &[LeftOut],
+    purpose: Purpose,
+) -> Vec<(&'a str, Vec<f64>)> {
+    let measures = |row: &LeftOut| {
+        [row.force_l1, row.velocity_l1, row.acceleration_l1, row.max_crush_error.abs()]
+    };
+    let counts = |row: &&LeftOut| row.inner || purpose == Purpose::Train;
+    let of = |model: &'a Means| {
+        let own = rows.iter().filter(|row| row.model == model.model).filter(counts);
+        (&*model.model, own.map(measures).collect::<Vec<_>>())
+    };
+    let mut all: Vec<(&str, Vec<[f64; 4]>)> = means.iter().map(of).collect();
+    let most = all.iter().map(|(_, rows)| rows.len()).max().unwrap_or(0);
+    all.retain(|(_, rows)| rows.len() == most && most > 0);
+    let median = |k: usize| {
+        let sum = |(_, rows): &(&str, Vec<[f64; 4]>)| rows.iter().map(|row| row[k]).sum::<f64>();
+        let mut sums: Vec<f64> = all.iter().map(sum).collect();
+        sums.sort_by(f64::total_cmp);
+        sums.get(sums.len() / 2).map_or(1.0, |sum| sum / most as f64)
+    };
+    let scale = [0, 1, 2, 3].map(median);
+    let score = |row: &[f64; 4]| {
+        let relative = |k: usize| if scale[k] > 0.0 { row[k] / scale[k] } else { 0.0 };
+        (0..4).map(relative).sum::<f64>() / 4.0
+    };
+    all.iter().map(|(name, rows)| (*name, rows.iter().map(score).collect())).collect()
 }
 
 /// The speed whose FE run would help most.
@@ -106,14 +154,17 @@ pub struct Gap {
     /// run there would take away.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_force_l1: Option<f64>,
+    /// Whether the collapse changes its mode between the two speeds, which a run there decides.
+    pub mode_switch: bool,
 }
 
 impl Gap {
-    /// The gaps with a known error first, the largest first; without errors the widest relative to
+    /// Changes of mode and the gaps with a known error first, the largest first; without errors the widest relative to
     /// its speeds.
-    fn rank(&self) -> (bool, f64) {
+    fn rank(&self) -> (bool, bool, f64) {
         let (low, high) = self.between_m_per_s;
-        (self.expected_force_l1.is_some(), self.expected_force_l1.unwrap_or(high / low))
+        let known = self.expected_force_l1;
+        (self.mode_switch, known.is_some(), known.unwrap_or(high / low))
     }
 }
 
@@ -132,6 +183,8 @@ pub fn gaps(set: &TrainingSet, validation: &Validation) -> Vec<Gap> {
             of_chosen.filter(|r| r.speed_m_per_s == v).map(|r| r.force_l1).collect();
         (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64)
     };
+    let switches = Model::fit_curves(set, ModelKind::linear());
+    let switches = switches.map(|model| model.mode_switches_m_per_s).unwrap_or_default();
     let gap = |i: usize| {
         let width = speeds[i + 1] - speeds[i];
         let from = |k: usize| {
@@ -143,12 +196,13 @@ pub fn gaps(set: &TrainingSet, validation: &Validation) -> Vec<Gap> {
             between_m_per_s: (speeds[i], speeds[i + 1]),
             expected_force_l1: (!ends.is_empty())
                 .then(|| ends.iter().sum::<f64>() / ends.len() as f64),
+            mode_switch: switches.contains(&(speeds[i], speeds[i + 1])),
         }
     };
     let mut gaps: Vec<Gap> = (0..speeds.len().saturating_sub(1)).map(gap).collect();
     gaps.sort_by(|a, b| {
         let (a, b) = (a.rank(), b.rank());
-        b.0.cmp(&a.0).then(b.1.total_cmp(&a.1))
+        (b.0, b.1).cmp(&(a.0, a.1)).then(b.2.total_cmp(&a.2))
     });
     gaps
 }
@@ -156,8 +210,13 @@ pub fn gaps(set: &TrainingSet, validation: &Validation) -> Vec<Gap> {
 /// Proposes the middle of the first of [`gaps`]. `None` for fewer than two speeds.
 pub(crate) fn next_run(set: &TrainingSet, validation: &Validation) -> Option<NextRun> {
     let mut gaps = gaps(set, validation).into_iter();
-    let Gap { between_m_per_s: (low, high), expected_force_l1 } = gaps.next()?;
+    let Gap { between_m_per_s: (low, high), expected_force_l1, mode_switch } = gaps.next()?;
     let reason = match expected_force_l1 {
+        _ if mode_switch => format!(
+            "the collapse changes its mode between {} and {}: a run in the middle decides which of the two a speed between them follows",
+            km_per_h(low),
+            km_per_h(high)
+        ),
         Some(error) => format!(
             "of all intervals between training speeds, the one from {} to {} has the largest expected force error ({:.1} %), estimated from the errors at its two ends when left out",
             km_per_h(low),
@@ -182,49 +241,33 @@ pub(crate) fn next_run(set: &TrainingSet, validation: &Validation) -> Option<Nex
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::surrogate::max_crush::MaxCrushRule;
 
-    fn means(model: &str, force_l1: f64, velocity_l1: f64) -> Means {
-        Means {
-            model: model.into(),
-            speeds: 3,
-            force_l1,
-            velocity_l1,
-            energy_error: 0.0,
-            max_crush_error: 0.0,
-            max_crush_rule: MaxCrushRule::Energy,
-            max_crush_errors: Default::default(),
-            acceleration_l1: 0.0,
-            acceleration_unfiltered_l1: 0.0,
-        }
+    fn chosen(of: &[(&str, &[f64])]) -> String {
+        let of: Vec<(&str, Vec<f64>)> = of.iter().map(|(m, e)| (*m, e.to_vec())).collect();
+        choose(&of).unwrap().0
     }
 
     #[test]
-    fn ties_go_to_the_simpler_model() {
-        let chosen = |of: &[Means]| choose(of, Purpose::Vehicle).unwrap().0;
-        let (nearest, forest) = (means("nearest", 0.2, 0.2), means("forest", 0.1, 0.1));
-        let linear = means("linear", 0.05, 0.03);
-        let rate = means("rate", 0.048, 0.02);
-        let all = |rate: Means| [nearest.clone(), linear.clone(), forest.clone(), rate];
-        assert_eq!(chosen(&all(rate)), "linear");
-        assert_eq!(chosen(&all(means("rate", 0.040, 0.02))), "rate");
-        assert_eq!(chosen(&all(means("rate", 0.040, 0.031))), "linear", "worse in velocity");
-        assert!(choose(&[], Purpose::Vehicle).is_none());
-        // For trains a force that follows the closing speed goes first, among those that tie.
-        let for_train = |of: &[Means]| choose(of, Purpose::Train).unwrap().0;
-        assert_eq!(for_train(&all(means("rate", 0.048, 0.02))), "rate");
-        assert_eq!(for_train(&all(means("rate", 0.060, 0.02))), "linear");
+    fn the_default_stands_unless_another_is_better_beyond_chance() {
+        let law: (&str, &[f64]) = ("crush-law", &[1.0, 1.2, 0.9]);
+        // Better on average, and by less than the differences scatter.
+        assert_eq!(chosen(&[law, ("extra", &[0.9, 0.5, 1.0])]), "crush-law");
+        assert_eq!(chosen(&[law, ("extra", &[0.8, 0.9, 0.7])]), "extra");
+        // Of two speeds no scatter is known.
+        let law: (&str, &[f64]) = ("crush-law", &[1.0, 1.2]);
+        assert_eq!(chosen(&[law, ("extra", &[0.8, 1.0])]), "crush-law");
+        assert_eq!(chosen(&[law, ("extra", &[0.6, 0.7])]), "extra");
+        assert_eq!(chosen(&[("crush-law", &[1.0]), ("extra", &[0.1])]), "crush-law");
+        assert!(choose(&[]).is_none());
     }
 
-    /// Where linear wins in force and the forest in velocity, neither is chosen blindly.
     #[test]
-    fn no_baseline_wins_in_both() {
-        let of = [
-            means("nearest", 0.2, 0.2),
-            means("linear", 0.050, 0.030),
-            means("forest", 0.09, 0.028),
-            means("rate", 0.051, 0.0281),
-        ];
-        assert_eq!(choose(&of, Purpose::Vehicle).unwrap().0, "rate");
+    fn the_default_is_the_simplest_that_follows_the_closing_speed() {
+        let (rate, linear): ((&str, &[f64]), (&str, &[f64])) =
+            (("rate", &[1.0]), ("linear", &[0.9]));
+        assert_eq!(chosen(&[linear, rate]), "rate");
+        assert_eq!(chosen(&[linear, rate, ("crush-law", &[1.1])]), "crush-law");
+        // Cases that differ in more than speed leave forests alone.
+        assert_eq!(chosen(&[("forest", &[0.9, 1.0]), ("extra", &[0.8, 1.0])]), "extra");
     }
 }

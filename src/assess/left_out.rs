@@ -56,6 +56,13 @@ impl<'a> LeftOutCase<'a> {
     /// Leaves out all cases of the speed of the set's case `index`.
     pub(crate) fn new(set: &'a TrainingSet, index: usize) -> Result<Self, NotLeftOut> {
         let own = &set.cases[index];
+        let v = own.speed_m_per_s;
+        let rest = set.with(|case| !is_same_speed(case.speed_m_per_s, v));
+        Self::of(own, rest)
+    }
+
+    /// A case that a set lacks.
+    pub(super) fn of(own: &'a TrainingCase, rest: TrainingSet) -> Result<Self, NotLeftOut> {
         let case: &Case = &own.case;
         let name = || own.name.clone();
         if own.truncated {
@@ -66,8 +73,6 @@ impl<'a> LeftOutCase<'a> {
             return Err(NotLeftOut::NoEnergy { case: name() });
         }
         let v = own.speed_m_per_s;
-        let mut rest = set.clone();
-        rest.cases.retain(|c| !is_same_speed(c.speed_m_per_s, v));
         let others = rest.speeds_m_per_s();
         let inner = others.first().is_some_and(|&low| low < v)
             && others.last().is_some_and(|&high| v < high);
@@ -102,10 +107,7 @@ impl<'a> LeftOutCase<'a> {
 
     /// FE's own curves, by force.
     fn own_curves(&self) -> Vec<(ForceKind, ForceCurve)> {
-        let of_body = |envelope: &Envelope| {
-            let recorded = ForceCurve::recorded(self.case);
-            (ForceKind::Body, recorded.unwrap_or_else(|| rebounding(self.own, envelope)))
-        };
+        let of_body = |envelope: &Envelope| (ForceKind::Body, rebounding(self.own, envelope));
         match self.rest.force_kind {
             ForceKind::Contact => {
                 let contact = rebounding(self.own, &self.own.envelope);

@@ -8,6 +8,7 @@ mod methods;
 pub(crate) mod reference;
 mod row;
 mod scatter;
+pub(crate) mod subsets;
 pub(crate) mod train;
 pub(crate) mod validate;
 
@@ -16,5 +17,6 @@ pub use left_out::NotLeftOut;
 pub use methods::ComparisonSettings;
 pub use reference::{MotionErrors, Reference};
 pub(crate) use row::Row;
+pub use subsets::OverSubsets;
 pub use train::{InterfaceCrush, TrainComparison, TrainRow, VehicleErrors, compare_train};
 pub use validate::{Choice, GroupReport, Report, train, validate};

@@ -11,9 +11,10 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::choose::{NextRun, Purpose, Selection, choose};
+use super::choose::{NextRun, Purpose, Selection, choose, scores};
 use super::left_out::{Answers, LeftOutCase, LeftOutRun, Score, query_of};
 use super::scatter::scatter;
+use super::subsets::OverSubsets;
 use crate::curve::{Case, ForceKind, group};
 use crate::dataset::{TrainingSet, is_same_speed};
 use crate::error::Error;
@@ -43,6 +44,9 @@ pub enum GroupReport {
         /// Absent if it was not asked for, or if there is no gap to run in.
         #[serde(skip_serializing_if = "Option::is_none")]
         next_run: Option<NextRun>,
+        /// The choice and each model with fewer speeds; empty if that was not asked for.
+        #[serde(skip_serializing_if = "Vec::is_empty")]
+        subsets: Vec<OverSubsets>,
     },
     /// There is no table.
     Failed {
@@ -110,7 +114,7 @@ pub(super) fn choose_and_fit(group: &str, cases: &[Case], seed: u64) -> Result<M
     let trials = trials(&fitting, &left_out);
     let tables = Tables::of(&fitting, &trials, left_out.len(), (set.force_kind, None));
     let (chosen, _) =
-        choose(&tables.means, Purpose::Vehicle).unwrap_or_else(|| without_validation(&fitting));
+        tables.chosen(Purpose::Vehicle).unwrap_or_else(|| without_validation(&fitting));
     let all = ModelKind::all(seed);
     let kind = all.into_iter().find(|kind| kind.name() == chosen).expect("it is among all");
     let mut model = Model::fit(&set, kind)?;
@@ -178,11 +182,7 @@ pub fn validate(
     let (chosen, reason) = match selection {
         Selection::Named(model) => (model.to_string(), "asked for".into()),
         Selection::Best(purpose) => {
-            let counted = match purpose {
-                Purpose::Vehicle => tables.means.clone(),
-                Purpose::Train => tables.means_with_ends(left_out.len()),
-            };
-            choose(&counted, purpose).unwrap_or_else(|| without_validation(&fitting))
+            tables.chosen(purpose).unwrap_or_else(|| without_validation(&fitting))
         }
     };
     let [band, band_outside] = tables.bands(&chosen, declared, scatter_of(declared));
@@ -223,7 +223,10 @@ fn floors_of(left_out: &[LeftOutCase<'_>]) -> (Vec<Floor>, Vec<String>) {
 }
 
 /// The candidates that can be fitted to the set, and why the others cannot.
-fn fittable(set: &TrainingSet, candidates: &[ModelKind]) -> (Vec<ModelKind>, Vec<String>) {
+pub(super) fn fittable(
+    set: &TrainingSet,
+    candidates: &[ModelKind],
+) -> (Vec<ModelKind>, Vec<String>) {
     let (mut fitting, mut unsuited) = (Vec::new(), Vec::new());
     for &kind in candidates {
         match Model::check_fits(set, kind) {
@@ -235,7 +238,9 @@ fn fittable(set: &TrainingSet, candidates: &[ModelKind]) -> (Vec<ModelKind>, Vec
 }
 
 /// Every case left out in turn, with notes on those that cannot be.
-fn left_out_cases(set: &TrainingSet) -> Result<(Vec<LeftOutCase<'_>>, Vec<String>), String> {
+pub(super) fn left_out_cases(
+    set: &TrainingSet,
+) -> Result<(Vec<LeftOutCase<'_>>, Vec<String>), String> {
     let mut speeds = set.speeds_m_per_s();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
     let found = speeds.len();
@@ -254,7 +259,10 @@ fn left_out_cases(set: &TrainingSet) -> Result<(Vec<LeftOutCase<'_>>, Vec<String
 }
 
 /// Every model at every case, in this order.
-fn trials<'a>(kinds: &[ModelKind], left_out: &'a [LeftOutCase<'a>]) -> Vec<LeftOutRun<'a>> {
+pub(super) fn trials<'a>(
+    kinds: &[ModelKind],
+    left_out: &'a [LeftOutCase<'a>],
+) -> Vec<LeftOutRun<'a>> {
     let pairs: Vec<(ModelKind, &LeftOutCase<'_>)> =
         kinds.iter().flat_map(|&kind| left_out.iter().map(move |case| (kind, case))).collect();
     pairs.par_iter().map(|(kind, case)| case.trial(*kind)).collect()
@@ -262,16 +270,16 @@ fn trials<'a>(kinds: &[ModelKind], left_out: &'a [LeftOutCase<'a>]) -> Vec<LeftO
 
 /// Results of the left-out speeds for all models.
 #[derive(Default)]
-struct Tables {
-    rows: Vec<LeftOut>,
-    means: Vec<Means>,
+pub(super) struct Tables {
+    pub(super) rows: Vec<LeftOut>,
+    pub(super) means: Vec<Means>,
     residuals: BTreeMap<&'static str, ResidualsOf>,
     notes: Vec<String>,
 }
 
 impl Tables {
     /// With the declared force and its scatter.
-    fn of(
+    pub(super) fn of(
         fitting: &[ModelKind],
         trials: &[LeftOutRun<'_>],
         inner_speeds: usize,
@@ -293,13 +301,9 @@ impl Tables {
         all
     }
 
-    /// The means of models with an answer at every speed that is left out, over all of these.
-    fn means_with_ends(&self, left_out: usize) -> Vec<Means> {
-        let of_all = |of: &Means| {
-            let own: Vec<_> = self.rows.iter().filter(|row| row.model == of.model).collect();
-            (own.len() == left_out).then(|| mean_over(&of.model, of.max_crush_rule, own))?
-        };
-        self.means.iter().filter_map(of_all).collect()
+    /// The model chosen for a purpose, and why.
+    pub(super) fn chosen(&self, purpose: Purpose) -> Option<(String, String)> {
+        choose(&scores(&self.means, &self.rows, purpose))
     }
 
     /// The bands of one force of a model: between training speeds, and outside of them.
@@ -441,29 +445,19 @@ fn without_validation(fitting: &[ModelKind]) -> (String, String) {
     (if linear { "linear" } else { "nearest" }.into(), reason.into())
 }
 
-/// The rule with the smallest mean error of crush and energy over the inner speeds, as the
-/// crush decides both; the reference method keeps its spline. A rule with an answer at more speeds
-/// goes before; `None` without any trial.
+/// The rule for the maximum crush: the model's own, or of the rules with answers at more inner speeds the first; the reference method
+/// keeps its spline. `None` without any trial.
 fn best_rule(kind: &ModelKind, trials: &[&LeftOutRun<'_>]) -> Option<MaxCrushRule> {
-    let errors = |rule: MaxCrushRule, of_inner: bool| -> Vec<f64> {
-        let of = trials.iter().filter(|t| t.held.inner == of_inner).filter_map(|t| t.answer(rule));
-        of.map(|j| j.max_crush_error.abs() + j.energy_error.abs()).collect()
-    };
-    let missing = |rule: MaxCrushRule| {
-        let inner = errors(rule, true).len();
-        (trials.len() - inner, trials.len() - inner - errors(rule, false).len())
-    };
-    let mean = |rule: MaxCrushRule| {
-        let errors = errors(rule, true);
-        errors.iter().sum::<f64>() / errors.len().max(1) as f64
+    let missing = |rule: &MaxCrushRule| {
+        let of = |inner| trials.iter().filter(move |t| t.held.inner == inner);
+        let lacks = |t: &&&LeftOutRun<'_>| t.answer(*rule).is_none();
+        (of(true).filter(lacks).count(), of(false).filter(lacks).count())
     };
     // The spline is not monotone by construction: it is used only on request.
-    let best = (!trials.is_empty()).then_some(MaxCrushRule::ALL).and_then(|all| {
-        all.into_iter()
-            .filter(|rule| *rule != MaxCrushRule::Spline)
-            .min_by(|&a, &b| missing(a).cmp(&missing(b)).then(mean(a).total_cmp(&mean(b))))
-    })?;
-    if kind.is_reference_method() && missing(MaxCrushRule::Spline).0 <= missing(best).0 {
+    let own = kind.entry().crush_rule;
+    let rules = [own, MaxCrushRule::Motion, MaxCrushRule::Energy, MaxCrushRule::Monotone];
+    let best = (!trials.is_empty()).then_some(rules)?.into_iter().min_by_key(missing)?;
+    if kind.is_reference_method() && missing(&MaxCrushRule::Spline).0 <= missing(&best).0 {
         Some(MaxCrushRule::Spline)
     } else {
         Some(best)
@@ -471,7 +465,7 @@ fn best_rule(kind: &ModelKind, trials: &[&LeftOutRun<'_>]) -> Option<MaxCrushRul
 }
 
 /// Means over the inner speeds; `None` without any.
-fn mean(model: &str, rule: MaxCrushRule, rows: &[LeftOut]) -> Option<Means> {
+pub(super) fn mean(model: &str, rule: MaxCrushRule, rows: &[LeftOut]) -> Option<Means> {
     mean_over(model, rule, rows.iter().filter(|r| r.inner).collect())
 }
 

@@ -6,6 +6,7 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use crate::assess::choose::{NextRun, Purpose, Selection, next_run};
+use crate::assess::subsets::{OverSubsets, subsets};
 use crate::assess::validate::{GroupReport, Report, add_nested, validate};
 use crate::curve::Case;
 use crate::database::Database;
@@ -39,7 +40,8 @@ can be expected to do better. FE body (check) is derived from FE's own speeds an
 force law and run. FE scatter (floor) is how far a run deviates from the mean of repeated runs at its
 speed: no model can remove this part of an error, though the mean over n runs has
 only its 1/sqrt(n). forest is the reference method (DDTCM), nearest is FDRM. --nested adds auto:
-model and rule chosen without the left-out speed.")]
+model and rule chosen without the left-out speed. --subsets adds how auto and each model do with fewer
+runs; regret is by how much their errors exceed those of the model that turns out best.")]
 pub(super) struct Args {
     /// Curve database
     database: PathBuf,
@@ -52,6 +54,9 @@ pub(super) struct Args {
     /// Also leave speeds out of the choice itself, for an unbiased error of auto (takes longer)
     #[arg(long)]
     nested: bool,
+    /// Judge the choice by every subset of 4 and 5 speeds, which predicts the speeds that it lacks (takes longer)
+    #[arg(long)]
+    subsets: bool,
     /// Seed of the forests
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -73,9 +78,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         bar.step(&format!("validating {group}"));
         let cases = database.group(&args.database, group)?;
         report.groups.push(match validated(args, group, cases) {
-            Ok((validation, next_run)) => {
-                GroupReport::Validated { validation: Box::new(validation), next_run }
-            }
+            Ok(validated) => validated,
             Err(error) if groups.len() == 1 => return Err(error.into()),
             // The others can be validated all the same.
             Err(error) => GroupReport::Failed { group: group.into(), error: error.to_string() },
@@ -97,7 +100,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     options.show(&report, |out| {
         let mut first = true;
         for group in &report.groups {
-            let GroupReport::Validated { validation, next_run } = group else { continue };
+            let GroupReport::Validated { validation, next_run, subsets } = group else { continue };
             if !std::mem::take(&mut first) {
                 writeln!(out)?;
             }
@@ -110,6 +113,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             if let Some(next) = next_run {
                 print_next(out, next)?;
             }
+            print_subsets(out, &validation.group, subsets)?;
         }
         Ok(())
     })?;
@@ -125,11 +129,7 @@ pub(super) fn print_validation(
     if options.verbose { print_means(out, validation) } else { print_summary(out, validation) }
 }
 
-fn validated(
-    args: &Args,
-    group: &str,
-    cases: &[Case],
-) -> Result<(Validation, Option<NextRun>), Error> {
+fn validated(args: &Args, group: &str, cases: &[Case]) -> Result<GroupReport, Error> {
     let mut validation = validate(
         group,
         cases,
@@ -147,7 +147,16 @@ fn validated(
             validation.notes.push(note.into());
         }
     }
-    Ok((validation, next))
+    let mut over_subsets = Vec::new();
+    if args.subsets {
+        over_subsets = subsets(group, cases, &ModelKind::candidates(args.seed))?;
+        if over_subsets.is_empty() {
+            let note = "no subset of 4 or 5 speeds lacks a speed inside its range, or there are more than 12 speeds";
+            validation.notes.push(note.into());
+        }
+    }
+    let validation = Box::new(validation);
+    Ok(GroupReport::Validated { validation, next_run: next, subsets: over_subsets })
 }
 
 fn percent(error: f64) -> String {
@@ -222,6 +231,25 @@ fn print_next(out: &mut dyn Write, next: &NextRun) -> io::Result<()> {
     });
     let then: Vec<String> = then.collect();
     if then.is_empty() { Ok(()) } else { writeln!(out, "then: {}", then.join(", ")) }
+}
+
+/// The choice and each model over the subsets of a group.
+fn print_subsets(out: &mut dyn Write, group: &str, of: &[OverSubsets]) -> io::Result<()> {
+    let Some(first) = of.first() else { return Ok(()) };
+    writeln!(
+        out,
+        "\n{group}: mean errors at the speeds that subsets of 4 and 5 speeds lack, over {} subsets",
+        first.subsets
+    )?;
+    let table = Table::of(of)
+        .column("model", |m| m.model.clone())
+        .column("force", |m| percent(m.force_l1))
+        .column("crush", |m| percent(m.max_crush_error))
+        .column("velocity", |m| percent(m.velocity_l1))
+        .column("acceleration", |m| percent(m.acceleration_l1))
+        .column("regret", |m| format!("{:.0} %", m.mean_regret * 100.0))
+        .column("at most", |m| format!("{:.0} %", m.worst_regret * 100.0));
+    output::table(out, table)
 }
 
 /// The mean errors of each model, which is chosen and why, and a line for each band.

@@ -325,6 +325,13 @@ impl TrainingSet {
         hash.finalize().to_hex().to_string()
     }
 
+    /// Those of its cases for which that holds.
+    pub(crate) fn with(&self, keep: impl FnMut(&TrainingCase) -> bool) -> Self {
+        let mut set = self.clone();
+        set.cases.retain(keep);
+        set
+    }
+
     pub(crate) fn speeds_m_per_s(&self) -> Vec<f64> {
         self.cases.iter().map(|c| c.speed_m_per_s).collect()
     }

@@ -9,10 +9,11 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
 use super::crush_law::{CrushLaw, per_crush_force};
+use super::curves::mean_over;
 use super::entry::{ModelEntry, loaded};
 use super::max_crush::MaxCrushRule;
 use super::{CaseCurve, QueryPoint, Surrogate};
-use crate::curve::{Envelope, ForceKind};
+use crate::curve::ForceKind;
 use crate::dataset::{TrainingCase, TrainingSet};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {
@@ -52,38 +53,6 @@ fn interval_s(set: &TrainingSet) -> f64 {
     };
     set.cases.iter().map(of).sum::<f64>() / set.cases.len() as f64
 }
-
-/// Means of a force, given at increasing deflections, over the way that a body goes within `interval_s` at
-/// its closing speed there: as fine as these deflections are. Before the contact the force is taken for the
-/// opposite of that behind it, so that it still begins at 0; before the first deflection it is held.
-fn over_interval(
-    interval_s: f64,
-    along_m: &[f64],
-    force_n: &[f64],
-    closing_m_per_s: &[f64],
-) -> Vec<f64> {
-    let (mut d, mut f) = (along_m.to_vec(), force_n.to_vec());
-    if d.first().is_some_and(|d| *d > 0.0) {
-        d.insert(0, 0.0);
-        f.insert(0, force_n[0]);
-    }
-    // One point, or a force that is not a number, has no mean.
-    let (Some(&end_m), Ok(force)) = (along_m.last(), Envelope::new(d, f)) else {
-        return force_n.to_vec();
-    };
-    let mean_n = |((&d, &f), u): ((&f64, &f64), &f64)| {
-        let half_m = (0.5 * interval_s * u).min(end_m - d);
-        if half_m > LEAST_WAY_M {
-            (force.work_to(d + half_m) - force.work_to((d - half_m).abs())) / (2.0 * half_m)
-        } else {
-            f
-        }
-    };
-    along_m.iter().zip(force_n).zip(closing_m_per_s).map(mean_n).collect()
-}
-
-/// Over a shorter way a mean is the force itself, and the difference of works their rounding.
-const LEAST_WAY_M: f64 = 1e-6;
 
 impl OfCrushLaw {
     /// Force on a body of one mass for each newton of crush force.
@@ -139,7 +108,9 @@ impl Surrogate for OfCrushLaw {
         // body would only make it jagged. A crush law that drives a train has it, as the contact has.
         let crush_n = match self.force {
             ForceKind::Contact => crush_n,
-            ForceKind::Body => over_interval(self.interval_s, deflection_m, &crush_n, closing),
+            ForceKind::Body => {
+                mean_over(deflection_m, &crush_n, |i| 0.5 * self.interval_s * closing[i])
+            }
         };
         let force = |((&d, &crush_n), &u): ((&f64, &f64), &f64)| match self.force {
             ForceKind::Contact => crush_n + self.law.stopped.rate_kg_per_m(d) * u * u,
@@ -219,32 +190,5 @@ mod tests {
             assert!((contact_n[i] - crush_n - of_stopping).abs() < 1e-6 * contact_n[i]);
         }
         assert!(contact_n[0] > 1.05 * body_n[0], "at 50 mm mass is being stopped");
-    }
-
-    /// At 2 m/s and 10 ms the mean is over 10 mm to both sides.
-    #[test]
-    fn a_force_is_averaged_over_the_way_of_an_interval() {
-        let along: Vec<f64> = (0..=100).map(|i| 0.001 * f64::from(i)).collect();
-        let closing = vec![2.0; along.len()];
-        let of = |force: &dyn Fn(f64) -> f64| {
-            let force_n: Vec<f64> = along.iter().map(|&d| force(d)).collect();
-            over_interval(0.01, &along, &force_n, &closing)
-        };
-        // A constant force rises over the first half and stays; a line stays one, up to the end.
-        for (i, (found, d)) in of(&|_| 1e6).iter().zip(&along).enumerate() {
-            let expected = if i < 10 { 1e6 * d / 0.01 } else { 1e6 };
-            assert!((found - expected).abs() < 1.0, "{found} N at {d} m");
-        }
-        for (found, d) in of(&|d| 1e7 * d).iter().zip(&along) {
-            assert!((found - 1e7 * d).abs() < 1.0, "{found} N at {d} m");
-        }
-        // A wave as long as the whole way is gone, away from both ends.
-        let wave = of(&|d| 1e6 + 1e5 * (std::f64::consts::TAU * d / 0.02).sin());
-        assert!(wave[20..=80].iter().all(|f| (f - 1e6).abs() < 100.0), "{wave:?}");
-        // Not from 0 on: the same away from the start.
-        let later = over_interval(0.01, &along[30..], &vec![1e6; 71], &closing[30..]);
-        assert!(later.iter().all(|f| (f - 1e6).abs() < 1.0), "{later:?}");
-        assert_eq!(over_interval(0.01, &[0.0], &[5.0], &[2.0]), [5.0]);
-        assert_eq!(over_interval(0.0, &along, &vec![1e6; 101], &closing), vec![1e6; 101]);
     }
 }

@@ -48,6 +48,19 @@ impl CaseCurve {
         Self { envelope, ..self.clone() }
     }
 
+    /// The same forces and speeds at the deflections that a growing map makes of its own.
+    pub(crate) fn placed(&self, to_m: impl Fn(f64) -> f64) -> Option<Self> {
+        let placed = |e: &Envelope| {
+            let to_m = e.deflection_m().iter().map(|&d| to_m(d)).collect();
+            Envelope::new(to_m, e.force_n().to_vec()).ok()
+        };
+        let closing = match &self.closing {
+            Some(closing) => Some(placed(closing)?),
+            None => None,
+        };
+        Some(Self { envelope: placed(&self.envelope)?, closing, ..self.clone() })
+    }
+
     /// Force in N; the last one beyond the end.
     pub(crate) fn force_at(&self, deflection_m: f64) -> f64 {
         self.envelope.force_at(deflection_m)
@@ -71,6 +84,36 @@ impl CaseCurve {
         }
     }
 }
+
+/// Means of a force, given at increasing deflections from 0 on or later, over `half_m` to both sides of each. Before the contact the force
+/// is taken for the opposite of that after it, so that it still begins at 0.
+pub(super) fn mean_over(
+    along_m: &[f64],
+    force_n: &[f64],
+    half_m: impl Fn(usize) -> f64,
+) -> Vec<f64> {
+    let (mut d, mut f) = (along_m.to_vec(), force_n.to_vec());
+    if d.first().is_some_and(|d| *d > 0.0) {
+        d.insert(0, 0.0);
+        f.insert(0, force_n[0]);
+    }
+    // One point, or a force that is not a number, has no mean.
+    let (Some(&end_m), Ok(force)) = (along_m.last(), Envelope::new(d, f)) else {
+        return force_n.to_vec();
+    };
+    let mean_n = |(i, (&d, &f)): (usize, (&f64, &f64))| {
+        let half_m = half_m(i).min(end_m - d);
+        if half_m > LEAST_WAY_M {
+            (force.work_to(d + half_m) - force.work_to((d - half_m).abs())) / (2.0 * half_m)
+        } else {
+            f
+        }
+    };
+    along_m.iter().zip(force_n).enumerate().map(mean_n).collect()
+}
+
+/// Over a shorter way a mean is the force itself, and the difference of works their rounding.
+pub(super) const LEAST_WAY_M: f64 = 1e-6;
 
 /// The two neighbours of `v` among increasing speeds and the share of the second, 0 to 1:
 /// beyond the ends the outermost alone.
@@ -98,80 +141,9 @@ pub(crate) fn interpolate_held(points: &[(f64, f64)], x: f64) -> Option<f64> {
     Some(a.1 + (b.1 - a.1) * (x - a.0) / (b.0 - a.0))
 }
 
-/// Coefficients of the polynomial of `degree` (0, 1 or 2) with the least squares, constant
-/// first, over centred and scaled abscissae; `None` if the points do not determine it.
-pub(crate) fn least_squares(points: &[(f64, f64)], degree: usize) -> Option<Polynomial> {
-    let n = points.len();
-    if n <= degree || degree > 2 {
-        return None;
-    }
-    let centre = points.iter().map(|p| p.0).sum::<f64>() / n as f64;
-    let scale = points.iter().map(|p| (p.0 - centre).abs()).fold(0.0, f64::max).max(1e-300);
-    let size = degree + 1;
-    let mut m = [[0.0; 4]; 3];
-    for &(x, y) in points {
-        let t = (x - centre) / scale;
-        let powers = [1.0, t, t * t];
-        for r in 0..size {
-            for c in 0..size {
-                m[r][c] += powers[r] * powers[c];
-            }
-            m[r][3] += powers[r] * y;
-        }
-    }
-    // Gauss with pivoting on at most three equations.
-    for k in 0..size {
-        let pivot = (k..size).max_by(|&a, &b| m[a][k].abs().total_cmp(&m[b][k].abs()))?;
-        m.swap(k, pivot);
-        if m[k][k].abs() < 1e-10 * n as f64 {
-            return None;
-        }
-        for r in 0..size {
-            if r != k {
-                let factor = m[r][k] / m[k][k];
-                let row = m[k];
-                m[r].iter_mut().zip(row).skip(k).for_each(|(x, p)| *x -= factor * p);
-            }
-        }
-    }
-    let mut coefficients = [0.0; 3];
-    for (k, c) in coefficients.iter_mut().enumerate().take(size) {
-        *c = m[k][3] / m[k][k];
-    }
-    Some(Polynomial { centre, scale, coefficients })
-}
-
-/// A polynomial of up to second degree.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Polynomial {
-    centre: f64,
-    scale: f64,
-    coefficients: [f64; 3],
-}
-
-impl Polynomial {
-    pub(crate) fn at(&self, x: f64) -> f64 {
-        let t = (x - self.centre) / self.scale;
-        let [a, b, c] = self.coefficients;
-        a + t * (b + t * c)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn least_squares_repeats_its_polynomial() {
-        let f = |x: f64| 3.0 - 2.0 * x + 0.5 * x * x;
-        let points: Vec<(f64, f64)> = [1.0, 2.0, 4.0, 7.0].map(|x| (x, f(x))).to_vec();
-        let fit = least_squares(&points, 2).unwrap();
-        assert!((fit.at(5.5) - f(5.5)).abs() < 1e-10);
-        assert!(least_squares(&points[..2], 2).is_none());
-        let line = least_squares(&[(0.0, 0.0), (1.0, 3.0), (2.0, 0.0)], 1).unwrap();
-        assert!((line.at(9.0) - 1.0).abs() < 1e-12, "the mean, as the slope is 0");
-        assert!(least_squares(&[(1.0, 0.0), (1.0, 3.0)], 1).is_none());
-    }
 
     #[test]
     fn neighbours_hold_the_outermost() {
@@ -180,5 +152,31 @@ mod tests {
         assert_eq!(neighbours(&speeds, 3.0), (1, 2, 0.5));
         assert_eq!(neighbours(&speeds, 2.0), (1, 2, 0.0));
         assert_eq!(neighbours(&speeds, 9.0), (2, 2, 0.0));
+    }
+
+    /// At 2 m/s and 10 ms the mean is over 10 mm to both sides.
+    #[test]
+    fn a_force_is_averaged_over_the_way_of_an_interval() {
+        let along: Vec<f64> = (0..=100).map(|i| 0.001 * f64::from(i)).collect();
+        let of = |force: &dyn Fn(f64) -> f64| {
+            let force_n: Vec<f64> = along.iter().map(|&d| force(d)).collect();
+            mean_over(&along, &force_n, |_| 0.01)
+        };
+        // A constant force rises over the first half and stays; a line stays one, up to the end.
+        for (i, (found, d)) in of(&|_| 1e6).iter().zip(&along).enumerate() {
+            let expected = if i < 10 { 1e6 * d / 0.01 } else { 1e6 };
+            assert!((found - expected).abs() < 1.0, "{found} N at {d} m");
+        }
+        for (found, d) in of(&|d| 1e7 * d).iter().zip(&along) {
+            assert!((found - 1e7 * d).abs() < 1.0, "{found} N at {d} m");
+        }
+        // A wave as long as the whole way is gone, away from both ends.
+        let wave = of(&|d| 1e6 + 1e5 * (std::f64::consts::TAU * d / 0.02).sin());
+        assert!(wave[20..=80].iter().all(|f| (f - 1e6).abs() < 100.0), "{wave:?}");
+        // Not from 0 on: the same away from the start.
+        let later = mean_over(&along[30..], &vec![1e6; 71], |_| 0.01);
+        assert!(later.iter().all(|f| (f - 1e6).abs() < 1.0), "{later:?}");
+        assert_eq!(mean_over(&[0.0], &[5.0], |_| 0.01), [5.0]);
+        assert_eq!(mean_over(&along, &vec![1e6; 101], |_| 0.0), vec![1e6; 101]);
     }
 }

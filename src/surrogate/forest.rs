@@ -25,7 +25,7 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     needs_crush_law: false,
     least_curves: 2,
     // The reference method knows only crush over speed.
-    crush_rule: MaxCrushRule::Monotone,
+    crush_rule: MaxCrushRule::Motion,
     forest: Some(ForestOptions::paper),
     fit: |input| {
         Ok(Arc::new(ForestSurrogate::fit(input.set, input.force, input.forest_options())?))

@@ -1,9 +1,10 @@
 //! Surrogates: models of F(v, d) behind one trait, and the curve predicted from them.
 //!
 //! Every model answers through one trait: force over speed, further features, mass and deflection. Models that answer from the
-//! training curves alone (`nearest`, `linear`, `registered`) hold nothing else; the curves stand once in the model file, over even
+//! training curves alone (`nearest`, `linear`) hold nothing else; the curves stand once in the model file, over even
 //! deflections.
 
+mod alignment;
 pub(crate) mod band;
 mod blend;
 mod cached;
@@ -15,7 +16,6 @@ mod entry;
 mod extra;
 pub(crate) mod forest;
 mod forest_options;
-mod landmarks;
 pub(crate) mod leave_one_out;
 mod linear;
 pub(crate) mod max_crush;
@@ -50,7 +50,6 @@ pub(crate) mod predicted;
 mod query;
 mod rate;
 pub(crate) mod recorded;
-mod registered;
 mod spikes;
 pub(crate) mod warning;
 

@@ -2,13 +2,13 @@
 
 use std::sync::Arc;
 
+use super::alignment::mode_switches;
 use super::band::{self, Band};
 use super::cases::{Curves, ModelCase, SlopeJump};
 use super::crush_law::{CrushCurve, CrushLaw};
 use super::curves::interpolate_held;
 use super::entry::FitInput;
 use super::forest::ForestSurrogate;
-use super::landmarks::Landmarks;
 use super::leave_one_out::Validation;
 use super::max_crush::MaxCrushRule;
 use super::models::{MODELS, ModelKind};
@@ -87,11 +87,8 @@ impl Model {
         let cases: Vec<ModelCase> =
             set.cases.iter().map(|c| ModelCase::of(c, set.force_kind)).collect();
         let curves = Curves::of(&cases)?;
-        let switches = if set.features.is_empty() {
-            Landmarks::of(&curves.declared).jumps
-        } else {
-            Vec::new()
-        };
+        let switches =
+            if set.features.is_empty() { mode_switches(&curves.declared) } else { Vec::new() };
         let speed = |i: usize| cases[i].speed_m_per_s;
         let needed_law = if kind.entry().needs_crush_law {
             crush_law(set, &curves.declared).filter(|law| law.stopped.is_known())

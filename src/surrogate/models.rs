@@ -6,7 +6,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 pub(crate) use super::entry::ModelEntry;
 use super::forest_options::ForestOptions;
-use super::{crush_law_model, extra, forest, linear, nearest, rate, registered};
+use super::{crush_law_model, extra, forest, linear, nearest, rate};
 use crate::guess;
 
 /// Every model, in the order of the tables. To add one: write its file with an `ENTRY`, add its
@@ -16,7 +16,6 @@ pub(crate) const MODELS: &[ModelEntry] = &[
     linear::ENTRY,
     rate::ENTRY,
     crush_law_model::ENTRY,
-    registered::ENTRY,
     extra::ENTRY,
     forest::ENTRY,
 ];
@@ -67,11 +66,6 @@ impl ModelKind {
     /// Linear in speed, with the force following the speed at each deflection.
     pub fn rate() -> Self {
         Self::known(rate::ENTRY.name)
-    }
-
-    /// Peaks matched and warped onto each other before curves are blended.
-    pub fn registered() -> Self {
-        Self::known(registered::ENTRY.name)
     }
 
     /// A random forest (DDTCM with [`ForestOptions::paper`]).

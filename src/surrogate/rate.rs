@@ -15,6 +15,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
+use super::alignment::Alignment;
 use super::blend::Blend;
 use super::cached::Cached;
 use super::curves::neighbours;
@@ -58,14 +59,17 @@ pub(crate) struct Rate {
     #[serde(skip)]
     of_impact: Option<f64>,
     #[serde(skip)]
-    levels: Cached<Levels>,
+    prepared: Cached<Prepared>,
 }
 
-/// Level of each curve at its end against the next faster one, 1 for the fastest.
+/// What a group's curves have in common, whatever is asked.
 #[derive(Clone, Debug)]
-struct Levels {
-    /// Speed, end and work of the curves that have them.
+struct Prepared {
+    /// Speed, end and work of the curves.
     of: Vec<[f64; 3]>,
+    /// `None` where no event moves.
+    alignment: Option<Alignment>,
+    /// Level of each curve, aligned where that is needed, at its end against the next faster one; 1 for the fastest.
     levels: Vec<f64>,
 }
 
@@ -109,7 +113,7 @@ impl Rate {
 
     /// With a known β, and γ, in (s/m)^½.
     pub(super) fn of(sensitivity: f64, of_impact: Option<f64>) -> Self {
-        Self { sensitivity, of_impact, levels: Cached::default() }
+        Self { sensitivity, of_impact, prepared: Cached::default() }
     }
 
     /// Half of the β that fits best, in (s/m)^½, and the γ that explains what this leaves of the
@@ -153,14 +157,53 @@ impl Rate {
         speed_m_per_s: f64,
         deflection_m: &[f64],
     ) -> Vec<f64> {
-        let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
-        let levels = self.levels(cases);
-        if let Some(of_impact) = self.of_impact {
-            return self.blended_n(cases, &levels, of_impact, speed_m_per_s, deflection_m);
+        let of = || cases.iter().map(|c| [c.speed_m_per_s, c.end_m(), c.envelope().work()]);
+        let prepare = || {
+            let alignment = self.alignment(cases);
+            let levels = self.find_levels(alignment.as_ref().map_or(cases, Alignment::curves));
+            Prepared { of: of().collect(), alignment, levels }
+        };
+        let kept = self.prepared.get_or_compute(prepare);
+        let own;
+        let Prepared { alignment, levels, .. } = if kept.of.iter().copied().eq(of()) {
+            kept
+        } else {
+            own = prepare();
+            &own
+        };
+        let blended_n = |cases: &[CaseCurve], d: &[f64]| match self.of_impact {
+            Some(of_impact) => self.blended_n(cases, levels, of_impact, speed_m_per_s, d),
+            None => self.between_n(cases, levels, speed_m_per_s, d),
+        };
+        match alignment {
+            Some(alignment) => alignment.blended_n(speed_m_per_s, deflection_m, blended_n),
+            None => blended_n(cases, deflection_m),
         }
+    }
+
+    /// By the `Q` of the runs, freed of what the impact speed makes of their levels.
+    fn alignment(&self, cases: &[CaseCurve]) -> Option<Alignment> {
+        let fit = || impact_sensitivity(cases, self.sensitivity);
+        let of_impact = self.of_impact.unwrap_or_else(fit);
+        Alignment::of(cases, |i, d| {
+            let level =
+                self.factor(cases[i].closing_at(d)) * factor(of_impact, cases[i].speed_m_per_s);
+            cases[i].force_at(d) / level
+        })
+    }
+
+    /// Between the `Q` of the two neighbouring runs.
+    fn between_n(
+        &self,
+        cases: &[CaseCurve],
+        levels: &[f64],
+        speed_m_per_s: f64,
+        deflection_m: &[f64],
+    ) -> Vec<f64> {
+        let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
         let (low, high, share) = neighbours(&speeds, speed_m_per_s);
         let standing_n = |d: f64| {
-            let of = |i| self.quotient(cases, &levels, i, d);
+            let of = |i| self.quotient(cases, levels, i, d);
             if low == high { of(low) } else { (1.0 - share) * of(low) + share * of(high) }
         };
         deflection_m.iter().map(|&d| standing_n(d)).collect()
@@ -241,15 +284,6 @@ impl Rate {
         } else {
             Err(format!("its rate sensitivity is {}", self.sensitivity))
         }
-    }
-
-    /// The levels, kept for the first curves that are requested.
-    fn levels(&self, cases: &[CaseCurve]) -> Vec<f64> {
-        let of = || cases.iter().map(|c| [c.speed_m_per_s, c.end_m(), c.envelope().work()]);
-        let kept = self
-            .levels
-            .get_or_compute(|| Levels { of: of().collect(), levels: self.find_levels(cases) });
-        if kept.of.iter().copied().eq(of()) { kept.levels.clone() } else { self.find_levels(cases) }
     }
 
     fn find_levels(&self, cases: &[CaseCurve]) -> Vec<f64> {

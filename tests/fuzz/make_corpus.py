@@ -390,7 +390,7 @@ def main(folder):
     files["study"] = [STUDY.encode(), STUDY.replace("pair", "wall").replace("half_model = true\n", "").encode()]
     files["scenario"] = [SCENARIO.encode(), SCENARIO.replace("[wall]", "").encode()]
     files["model"] = [model(name, fitted) for name, fitted in (
-        ("nearest", "nearest"), ("linear", "linear"), ("registered", "registered"),
+        ("nearest", "nearest"), ("linear", "linear"),
         ("rate", {"rate": {"sensitivity_sqrt_s_per_m": 0.03}}))]
     files["curve"] = curves()
     databases = pathlib.Path(__file__).parents[2] / "fixtures" / "databases"

@@ -1,0 +1,132 @@
+//! The choice of a model, judged by smaller groups: every subset of the speeds chooses, and predicts the inner speeds that it
+//! lacks.
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::Serialize;
+
+use super::choose::{Purpose, scores};
+use super::left_out::LeftOutCase;
+use super::validate::{Tables, fittable, left_out_cases, mean, trials};
+use crate::curve::Case;
+use crate::dataset::{TrainingSet, is_same_speed};
+use crate::error::Error;
+use crate::surrogate::ModelKind;
+use crate::surrogate::leave_one_out::{LeftOut, Means};
+
+/// Numbers of speeds that a subset keeps.
+const SIZES: [u32; 2] = [4, 5];
+/// Most speeds of a group whose subsets are tried: of 12 there are 1 287.
+const MOST_SPEEDS: usize = 12;
+
+/// A model, or the choice among all, over the subsets of a group.
+#[derive(Clone, Debug, Serialize, JsonSchema)]
+pub struct OverSubsets {
+    /// Name of the model, or `auto`.
+    pub model: String,
+    /// In how many subsets of 4 and 5 speeds it predicts every inner speed that these lack.
+    pub subsets: usize,
+    /// Mean over the subsets of the mean error of the declared force at these speeds.
+    pub force_l1: f64,
+    /// Of the maximum crush.
+    pub max_crush_error: f64,
+    /// Of the velocity.
+    pub velocity_l1: f64,
+    /// Of accelerations filtered with CFC 60.
+    pub acceleration_l1: f64,
+    /// By how much its errors, as the choice sums them up, are larger than those of the model that turns out best for a subset;
+    /// mean over the subsets.
+    pub mean_regret: f64,
+    /// The same for the subset where it is largest.
+    pub worst_regret: f64,
+}
+
+/// What one model does at the speeds that a subset lacks.
+struct Trial {
+    model: String,
+    means: Means,
+    regret: f64,
+}
+
+/// Each model, and the choice first, over all subsets of 4 and 5 speeds that lack a speed inside their range; empty
+/// without such a subset, or for more than 12 speeds.
+///
+/// # Errors
+/// If the cases are not a training set.
+pub(crate) fn subsets(
+    group: &str,
+    cases: &[Case],
+    candidates: &[ModelKind],
+) -> Result<Vec<OverSubsets>, Error> {
+    let set = TrainingSet::new(group, cases)?;
+    let mut speeds = set.speeds_m_per_s();
+    speeds.dedup_by(|a, b| is_same_speed(*a, *b));
+    if speeds.len() > MOST_SPEEDS {
+        return Ok(Vec::new());
+    }
+    let of_size = |bits: &u32| SIZES.contains(&bits.count_ones());
+    let all: Vec<u32> = (0..1_u32 << speeds.len()).filter(of_size).collect();
+    let of = |&bits: &u32| {
+        let kept = speeds.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, v)| *v);
+        subset(&set, &kept.collect::<Vec<_>>(), candidates)
+    };
+    let trials: Vec<Trial> = all.par_iter().filter_map(of).flatten().collect();
+    let names = candidates.iter().map(ModelKind::name);
+    Ok(std::iter::once("auto").chain(names).filter_map(|name| over(name, &trials)).collect())
+}
+
+/// The choice and every model by one subset; `None` if it lacks no speed inside its range.
+fn subset(set: &TrainingSet, speeds: &[f64], candidates: &[ModelKind]) -> Option<Vec<Trial>> {
+    let has = |v: f64| speeds.iter().any(|kept| is_same_speed(*kept, v));
+    let kept = set.with(|case| has(case.speed_m_per_s));
+    let lacking = set.cases.iter().filter(|case| !has(case.speed_m_per_s));
+    let lacking = lacking.filter_map(|case| LeftOutCase::of(case, kept.clone()).ok());
+    let lacking: Vec<LeftOutCase<'_>> = lacking.filter(|case| case.inner).collect();
+    if lacking.is_empty() {
+        return None;
+    }
+    let (fitting, _) = fittable(&kept, candidates);
+    let (mut left_out, _) = left_out_cases(&kept).ok()?;
+    left_out.retain(|case| case.inner);
+    let own = trials(&fitting, &left_out);
+    let tables = Tables::of(&fitting, &own, left_out.len(), (set.force_kind, None));
+    let (chosen, _) = tables.chosen(Purpose::Vehicle)?;
+    let mut rows: Vec<LeftOut> = Vec::new();
+    let mut means = Vec::new();
+    for of in &tables.means {
+        let kind = fitting.iter().find(|kind| kind.name() == of.model)?;
+        let judged = lacking.iter().map(|case| case.trial(*kind).judged(of.max_crush_rule));
+        // One without an answer is not compared.
+        let Ok(judged) = judged.collect::<Result<Vec<_>, _>>() else { continue };
+        let own: Vec<LeftOut> = judged.into_iter().map(|score| score.row).collect();
+        means.extend(mean(&of.model, of.max_crush_rule, &own));
+        rows.extend(own);
+    }
+    let scores = scores(&means, &rows, Purpose::Vehicle);
+    let sums: Vec<(&str, f64)> = scores.iter().map(|(m, of)| (*m, of.iter().sum())).collect();
+    let best = sums.iter().map(|(_, sum)| *sum).fold(f64::INFINITY, f64::min);
+    let trial = |name: &str, model: &str| {
+        let (_, sum) = sums.iter().find(|(m, _)| *m == model)?;
+        let means = means.iter().find(|m| m.model == model)?.clone();
+        Some(Trial { model: name.into(), means, regret: sum / best - 1.0 })
+    };
+    let auto = std::iter::once(("auto", &*chosen));
+    let each = sums.iter().map(|(model, _)| (*model, *model));
+    Some(auto.chain(each).filter_map(|(name, model)| trial(name, model)).collect())
+}
+
+/// Means of a model over its subsets.
+fn over(name: &str, trials: &[Trial]) -> Option<OverSubsets> {
+    let own: Vec<&Trial> = trials.iter().filter(|trial| trial.model == name).collect();
+    let mean = |of: fn(&Trial) -> f64| own.iter().map(|t| of(t)).sum::<f64>() / own.len() as f64;
+    (!own.is_empty()).then(|| OverSubsets {
+        model: name.into(),
+        subsets: own.len(),
+        force_l1: mean(|t| t.means.force_l1),
+        max_crush_error: mean(|t| t.means.max_crush_error),
+        velocity_l1: mean(|t| t.means.velocity_l1),
+        acceleration_l1: mean(|t| t.means.acceleration_l1),
+        mean_regret: mean(|t| t.regret),
+        worst_regret: own.iter().map(|t| t.regret).fold(0.0, f64::max),
+    })
+}
