@@ -44,7 +44,7 @@ pub enum Selection<'a> {
 /// The default is the simplest model whose force follows the closing speed, without such a one that with the smallest mean error.
 /// Another takes its place if the mean of the paired differences is larger than their standard deviation, from three speeds on; or, of
 /// fewer, if it is grossly better at each.
-pub(crate) fn choose(of: &[(&str, Vec<f64>)]) -> Option<(String, String)> {
+pub(crate) fn choose(of: &[(&str, Vec<f64>)], purpose: Purpose) -> Option<(String, String)> {
     let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
     let follows = |name: &str| {
         let entry = MODELS.iter().find(|entry| entry.name == name)?;
@@ -70,12 +70,16 @@ pub(crate) fn choose(of: &[(&str, Vec<f64>)]) -> Option<(String, String)> {
     };
     let rivals = of.iter().filter(|model| model.0 != default.0);
     let better = rivals.clone().filter(is_better).min_by(|a, b| mean(&a.1).total_cmp(&mean(&b.1)));
-    let speeds = counted(default.1.len(), "speed");
+    let ends = match purpose {
+        Purpose::Vehicle => "",
+        Purpose::Train => ", ends of the range included,",
+    };
+    let speeds = format!("{} left out{ends}", counted(default.1.len(), "speed"));
     let share = |other: &[f64]| 100.0 * (mean(other) / mean(&default.1) - 1.0);
     if let Some((name, errors)) = better {
         let less = -share(errors);
         let reason = format!(
-            "its errors at {speeds} left out are {less:.0} % smaller than those of {}, beyond their scatter",
+            "its errors at {speeds} are {less:.0} % smaller than those of {}, beyond their scatter",
             default.0
         );
         return Some(((*name).into(), reason));
@@ -87,11 +91,11 @@ pub(crate) fn choose(of: &[(&str, Vec<f64>)]) -> Option<(String, String)> {
             let direction = if more < 0.0 { "smaller" } else { "larger" };
             let within = if more < 0.0 { ", within their scatter" } else { "" };
             format!(
-                "the default; the errors of the next best, {name}, at {speeds} left out are {:.0} % {direction}{within}",
+                "the default; the errors of the next best, {name}, at {speeds} are {:.0} % {direction}{within}",
                 more.abs()
             )
         }
-        Some(_) => format!("it has the smallest errors at {speeds} left out"),
+        Some(_) => format!("it has the smallest errors at {speeds}"),
         None => "no other model fits these runs".into(),
     };
     Some((default.0.into(), reason))
@@ -244,7 +248,7 @@ mod tests {
 
     fn chosen(of: &[(&str, &[f64])]) -> String {
         let of: Vec<(&str, Vec<f64>)> = of.iter().map(|(m, e)| (*m, e.to_vec())).collect();
-        choose(&of).unwrap().0
+        choose(&of, Purpose::Vehicle).unwrap().0
     }
 
     #[test]
@@ -258,7 +262,7 @@ mod tests {
         assert_eq!(chosen(&[law, ("extra", &[0.8, 1.0])]), "crush-law");
         assert_eq!(chosen(&[law, ("extra", &[0.6, 0.7])]), "extra");
         assert_eq!(chosen(&[("crush-law", &[1.0]), ("extra", &[0.1])]), "crush-law");
-        assert!(choose(&[]).is_none());
+        assert!(choose(&[], Purpose::Vehicle).is_none());
     }
 
     #[test]

@@ -303,7 +303,7 @@ impl Tables {
 
     /// The model chosen for a purpose, and why.
     pub(super) fn chosen(&self, purpose: Purpose) -> Option<(String, String)> {
-        choose(&scores(&self.means, &self.rows, purpose))
+        choose(&scores(&self.means, &self.rows, purpose), purpose)
     }
 
     /// The bands of one force of a model: between training speeds, and outside of them.

@@ -15,7 +15,7 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     follows_closing: false,
     needs_crush_law: false,
     least_curves: 1,
-    crush_rule: MaxCrushRule::Monotone,
+    crush_rule: MaxCrushRule::Motion,
     forest: None,
     fit: |_| Ok(Arc::new(Nearest)),
     load: |_| Ok(Arc::new(Nearest)),

@@ -362,12 +362,12 @@ impl PredictedCurve {
         self.provenance.body_band = None;
     }
 
-    /// Unloading stiffness with which a run leaves the end of one of the curve's envelopes: the
+    /// Unloading stiffness with which a run leaves one of the curve's envelopes where that has taken up the energy of the impact: the
     /// energy of the rebound is the same whichever force it comes from.
     pub(crate) fn stiffness_at_end(&self, envelope: &Envelope) -> f64 {
-        let end = self.max_deflection_m;
-        let driving = self.body_force_n.as_ref().unwrap_or(&self.force_n).last();
-        let share = driving.map_or(1.0, |driving| envelope.force_at(end) / driving);
+        let kinetic_j = self.provenance.kinetic_energy_j;
+        let driving = self.driving_envelope().map(|driving| stopping_force_n(&driving, kinetic_j));
+        let share = driving.map_or(1.0, |driving| stopping_force_n(envelope, kinetic_j) / driving);
         self.rebound
             .map(|r| r.stiffness_n_per_m * share * share)
             .filter(|k| *k > 0.0 && k.is_finite())
@@ -465,6 +465,14 @@ impl PredictedCurve {
             None => Ok(declared),
         }
     }
+}
+
+/// The force in N that stops a body of this energy, the last one of a curve that does not. A contact force stops it before the
+/// end of its curve: mass in the crush zone is stopped by it as well.
+pub(super) fn stopping_force_n(envelope: &Envelope, kinetic_j: f64) -> f64 {
+    let end_m = envelope.end_m();
+    let stop_m = envelope.deflection_for_work(kinetic_j).map_or(end_m, |d| d.min(end_m));
+    envelope.force_at(stop_m)
 }
 
 /// The last point may differ by this share from the stated maximum crush.

@@ -6,6 +6,7 @@ use super::cases::ModelCase;
 use super::curves::{interpolate_held, neighbours};
 use super::max_crush::{self, MaxCrush, MaxCrushRule};
 use super::predicted::Rebound;
+use super::predicted::stopping_force_n;
 use super::warning::{Warning, is_far_outside, outside_of};
 use super::{CaseCurve, Model, QueryPoint};
 use crate::curve::body::rebound_stiffness_n_per_m;
@@ -162,7 +163,7 @@ impl<'a> ResolvedQuery<'a> {
     pub(crate) fn rebound(&self, body: &Envelope) -> Option<Rebound> {
         // Another mass gets the same energy back: the structure's, not the car's.
         let trained_kg = self.model.masses().effective_kg();
-        let top_n = body.force_at(body.end_m());
+        let top_n = stopping_force_n(body, self.kinetic_energy_j);
         let per_mass = (trained_kg / self.mass_kg).sqrt();
         // No body leaves faster than it came.
         let speed = rebound_speed(self.model, self.v, last_force_n(body))?.min(self.v / per_mass);
