@@ -121,6 +121,29 @@ fn a_cut_run_is_used_as_far_as_it_goes() {
     assert!(error.contains("is not complete and is left out"), "{error}");
 }
 
+/// A run that ended before its largest crush is a lower bound: no reference, but a training curve.
+#[test]
+fn methods_are_compared_where_runs_are_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    crate::common::write_contents(here, &crate::common::contents(&fixture("fe/lead-car-wall")));
+    let path = here.join("48kmh/nodout");
+    let text = fs::read_to_string(&path).unwrap();
+    let (cut, _) = text.match_indices("n o d a l").nth(130).unwrap();
+    fs::write(&path, &text[..text[..cut].rfind('\n').unwrap()]).unwrap();
+    crumple_in(here, &["build", "study.toml", "-o", "c.h5"]);
+    let output = crumple_in(here, &["compare", "c.h5", "--nsdm-seeds", "0"]);
+    let (table, error) =
+        (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
+    assert!(output.status.success(), "{error}");
+    assert!(error.contains("case \"48kmh\" ended while loading and cannot serve"), "{error}");
+    let means = table.lines().find(|line| line.contains(": means over ")).unwrap();
+    assert!(means.contains("36 km/h") && !means.contains("48 km/h"), "{means}");
+    assert!(!table.contains("FE at 48 km/h"), "{table}");
+    let error = crumple_fails(here, 1, &["compare", "c.h5", "--speed", "48km/h"]);
+    assert!(error.contains("compare at another speed"), "{error}");
+}
+
 /// The old database survives a target that cannot be replaced.
 #[test]
 fn a_second_writer_is_known_and_changes_nothing() {

@@ -18,7 +18,7 @@ use crate::unit::km_per_h;
 /// Fewest left-out speeds whose scatter says something.
 const LEAST_SPEEDS: usize = 3;
 /// With fewer, another model must come below this share of the error of the default at each of them.
-const GROSSLY_BETTER: f64 = 2.0 / 3.0;
+const GROSSLY_BETTER: f64 = 0.5;
 
 /// Where the queries of a model will lie.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -61,7 +61,7 @@ pub(crate) fn choose(of: &[(&str, Vec<f64>)], purpose: Purpose) -> Option<(Strin
             default.1.iter().zip(errors).map(|(own, other)| own - other).collect();
         let gain = mean(&gains);
         let squares: f64 = gains.iter().map(|g| (g - gain).powi(2)).sum();
-        if gains.len() >= LEAST_SPEEDS {
+        if gains_tell(gains.len()) {
             gain > (squares / (gains.len() - 1) as f64).sqrt()
         } else {
             let grossly = |(own, other): (&f64, &f64)| *other < GROSSLY_BETTER * own;
@@ -89,7 +89,11 @@ pub(crate) fn choose(of: &[(&str, Vec<f64>)], purpose: Purpose) -> Option<(Strin
         Some((name, errors)) if follows(default.0).is_some() => {
             let more = share(errors);
             let direction = if more < 0.0 { "smaller" } else { "larger" };
-            let within = if more < 0.0 { ", within their scatter" } else { "" };
+            let within = match gains_tell(default.1.len()) {
+                _ if more >= 0.0 => "",
+                true => ", within their scatter",
+                false => ", too few to tell",
+            };
             format!(
                 "the default; the errors of the next best, {name}, at {speeds} are {:.0} % {direction}{within}",
                 more.abs()
@@ -99,6 +103,11 @@ pub(crate) fn choose(of: &[(&str, Vec<f64>)], purpose: Purpose) -> Option<(Strin
         None => "no other model fits these runs".into(),
     };
     Some((default.0.into(), reason))
+}
+
+/// Whether differences at so many speeds have a scatter that says something.
+fn gains_tell(speeds: usize) -> bool {
+    speeds >= LEAST_SPEEDS
 }
 
 /// Errors of each model that has means, at the speeds left out that count for a purpose: force, velocity, acceleration and crush, each
@@ -260,7 +269,7 @@ mod tests {
         // Of two speeds no scatter is known.
         let law: (&str, &[f64]) = ("crush-law", &[1.0, 1.2]);
         assert_eq!(chosen(&[law, ("extra", &[0.8, 1.0])]), "crush-law");
-        assert_eq!(chosen(&[law, ("extra", &[0.6, 0.7])]), "extra");
+        assert_eq!(chosen(&[law, ("extra", &[0.4, 0.5])]), "extra");
         assert_eq!(chosen(&[("crush-law", &[1.0]), ("extra", &[0.1])]), "crush-law");
         assert!(choose(&[], Purpose::Vehicle).is_none());
     }

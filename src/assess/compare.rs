@@ -80,15 +80,30 @@ pub(crate) struct NsdmFit {
     pub fit_time_s: f64,
 }
 
-/// The speeds of a group that lie between others, for a comparison at each, in m/s.
-pub(crate) fn inner_speeds(group: &str, cases: &[Case]) -> Result<Vec<f64>, Error> {
+/// The speeds of a group that lie between others, for a comparison at each, in m/s, and the names of the cases there that ended while
+/// loading and are no reference.
+pub(crate) fn inner_speeds(group: &str, cases: &[Case]) -> Result<(Vec<f64>, Vec<String>), Error> {
     let set = TrainingSet::new(group, cases)?;
     let mut speeds = set.speeds_m_per_s();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
-    match speeds.len() {
-        0..3 => Err(too_few(speeds.len())),
-        n => Ok(speeds[1..n - 1].to_vec()),
+    if speeds.len() < 3 {
+        return Err(too_few(speeds.len()));
     }
+    let ends = [speeds[0], speeds[speeds.len() - 1]];
+    let is_inner = |v: f64| ends.iter().all(|end| !is_same_speed(*end, v));
+    let inner = set.cases.iter().filter(|case| is_inner(case.speed_m_per_s));
+    let (cut, whole): (Vec<_>, Vec<_>) = inner.partition(|case| case.truncated);
+    let mut speeds: Vec<f64> = whole.iter().map(|case| case.speed_m_per_s).collect();
+    speeds.dedup_by(|a, b| is_same_speed(*a, *b));
+    let cut: Vec<String> = cut.iter().map(|case| case.name.clone()).collect();
+    if speeds.is_empty() {
+        return Err(error!(
+            Comparison,
+            "all cases of inner speeds ended while loading ({}): none can serve as the reference",
+            cut.join(", ")
+        ));
+    }
+    Ok((speeds, cut))
 }
 
 /// Compares the methods at `speed_m_per_s`, with that speed's case left out of training.
@@ -202,8 +217,10 @@ fn fixed_case<'a>(
     settings: &ComparisonSettings,
 ) -> Result<&'a TrainingCase, Error> {
     let Some(asked) = settings.fixed_speed_m_per_s else {
-        let speeds = rest.cases.iter().map(|c| c.speed_m_per_s);
-        return Ok(&rest.cases[nearest(speeds, left_out_m_per_s)]);
+        // A run that ended while loading is the whole of no impact.
+        let whole: Vec<&TrainingCase> = rest.cases.iter().filter(|c| !c.truncated).collect();
+        let all = if whole.is_empty() { rest.cases.iter().collect() } else { whole };
+        return Ok(all[nearest(all.iter().map(|c| c.speed_m_per_s), left_out_m_per_s)]);
     };
     if is_same_speed(asked, left_out_m_per_s) {
         return Err(error!(

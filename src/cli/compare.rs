@@ -89,10 +89,15 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     };
     let database = Database::read(path)?;
     let (group, cases) = database.group_or_only(path, args.group.as_deref())?;
-    let speeds = match args.speed {
-        Some(speed) => vec![speed],
+    let (speeds, cut) = match args.speed {
+        Some(speed) => (vec![speed], Vec::new()),
         None => compare::inner_speeds(group, cases)?,
     };
+    for case in &cut {
+        options.warn(&format!(
+            "case \"{case}\" ended while loading and cannot serve as the reference: not compared"
+        ));
+    }
     let bar = Bar::new(options, "comparing");
     let mut comparisons = Vec::new();
     for speed in speeds {
@@ -109,7 +114,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     } else {
         several(&comparisons, options)?;
     }
-    Ok(Outcome::warned_if(!inner))
+    Ok(Outcome::warned_if(!inner || !cut.is_empty()))
 }
 
 fn percent(error: f64) -> String {

@@ -196,7 +196,11 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         }
         let stopped = model.crush_law.as_ref().map(|law| &law.stopped);
         if let Some(stopped) = stopped.filter(|stopped| stopped.is_known()) {
-            writeln!(out, "{}", stopped_mass_line(stopped, model.speed_kind))?;
+            writeln!(
+                out,
+                "{}",
+                stopped_mass_line(stopped, model.speed_kind, model.masses().effective_kg())
+            )?;
         }
         if let Some(validation) = &model.leave_one_out {
             print_validation(out, validation, options)?;
@@ -206,15 +210,26 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     Ok(outcome)
 }
 
+/// Crush zones with their equipment are up to about a tenth of a vehicle; beyond this share that is said.
+const USUAL_SHARE: f64 = 0.15;
+
 /// How much of the crush zone stops before the body, over which deflection, and how well the runs agree.
-pub(super) fn stopped_mass_line(stopped: &StoppedMass, kind: SpeedKind) -> String {
+pub(super) fn stopped_mass_line(stopped: &StoppedMass, kind: SpeedKind, moved_kg: f64) -> String {
     let (end_m, all_kg) = stopped.in_all();
     let of = match kind {
         SpeedKind::Wall => "of the crush zone",
         SpeedKind::Closing => "of reduced mass (half that of one of two equal ends)",
     };
     let scatter_kg = stopped.residual_kg;
+    let share = all_kg / moved_kg;
+    let unusual = match share > USUAL_SHARE {
+        true => format!(
+            "; {:.0} % of the moving mass is more than crush zones hold: part of it stands for what else lies between contact force and body, such as parts that turn or vibrate",
+            share * 100.0
+        ),
+        false => String::new(),
+    };
     format!(
-        "crush law: {all_kg:.0} kg {of} come to rest within {end_m:.3} m of crush (scatter {scatter_kg:.0} kg RMS)"
+        "crush law: {all_kg:.0} kg {of} come to rest within {end_m:.3} m of crush (scatter {scatter_kg:.0} kg RMS){unusual}"
     )
 }

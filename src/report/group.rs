@@ -256,7 +256,9 @@ impl Validated<'_> {
         let speeds = match settings.methods {
             MethodSpeeds::None => Vec::new(),
             MethodSpeeds::Worst => self.worst().map(|row| row.speed_m_per_s).into_iter().collect(),
-            MethodSpeeds::All => inner_speeds(group, cases).unwrap_or_default(),
+            MethodSpeeds::All => {
+                inner_speeds(group, cases).map(|(speeds, _)| speeds).unwrap_or_default()
+            }
         };
         let asked = ComparisonSettings {
             seed: settings.seed,

@@ -209,8 +209,8 @@ impl Rate {
         deflection_m.iter().map(|&d| standing_n(d)).collect()
     }
 
-    /// The `Q` of all runs, freed of the impact speed, blended and given it again. Beyond the end of a run
-    /// the faster ones blend alone, after a length over which it fades.
+    /// The `Q` of all runs, freed of the impact speed, blended and given it again, beyond the speeds of the runs as well. Beyond the
+    /// end of a run the faster ones blend alone, after a length over which it fades.
     fn blended_n(
         &self,
         cases: &[CaseCurve],
@@ -226,7 +226,8 @@ impl Rate {
         let weights: Vec<Vec<f64>> = (0..cases.len())
             .map(|first| {
                 let of = blend.weights(first, v);
-                of.iter().zip(&speeds).map(|(w, &s)| w * of_impact(v) / of_impact(s)).collect()
+                let level = of_impact(speed_m_per_s);
+                of.iter().zip(&speeds).map(|(w, &s)| w * level / of_impact(s)).collect()
             })
             .collect();
         // A run that ends before a slower one does not end the blend of that one.

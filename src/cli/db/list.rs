@@ -65,8 +65,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         groups.iter().try_for_each(|(group, cases)| {
             print_group(out, group, cases)?;
             if let Some(stopped) = stopped_mass.get(*group) {
-                let kind = database.cases(group)[0].conditions.speed.kind;
-                writeln!(out, "{}", stopped_mass_line(stopped, kind))?;
+                let of = &database.cases(group)[0].conditions;
+                let moved_kg = of.masses.effective_kg();
+                writeln!(out, "{}", stopped_mass_line(stopped, of.speed.kind, moved_kg))?;
             }
             writeln!(out)
         })
