@@ -116,6 +116,11 @@ impl Cholesky {
         }
         y
     }
+
+    /// The logarithm of the determinant of the first `n` rows and columns.
+    pub(crate) fn log_determinant(&self, n: usize) -> f64 {
+        self.rows[..n].iter().enumerate().map(|(i, row)| 2.0 * row[i].ln()).sum()
+    }
 }
 
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -180,7 +185,10 @@ mod cholesky_tests {
         let a = [[4.0, 2.0, -2.0], [2.0, 10.0, 2.0], [-2.0, 2.0, 6.0]];
         let x = [1.0, -2.0, 3.0];
         let right = a.map(|row| dot(&row, &x));
-        let found = Cholesky::of(3, |r, c| a[r][c]).solve(&right);
+        let of = Cholesky::of(3, |r, c| a[r][c]);
+        let two = a[0][0] * a[1][1] - a[0][1] * a[1][0];
+        assert!((of.log_determinant(2) - two.ln()).abs() < 1e-12);
+        let found = of.solve(&right);
         assert!(found.iter().zip(x).all(|(found, x)| (found - x).abs() < 1e-12), "{found:?}");
         // The first two alone: 4 x + 2 y = 8, 2 x + 10 y = 22.
         let found = Cholesky::of(3, |r, c| a[r][c]).solve(&[8.0, 22.0]);

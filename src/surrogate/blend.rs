@@ -3,7 +3,8 @@
 //! The values of the runs are modelled as a smooth function of the impact speed with noise, a Gaussian
 //! process of unknown mean (ordinary kriging: Rasmussen and Williams, Gaussian Processes for Machine
 //! Learning, 2006, sections 2.2, 2.7 and 4.2). A run that deviates from the others does so by an individual
-//! fold, which need not occur at neighbouring speeds. The residual of a run fades with
+//! fold, which need not occur at neighbouring speeds. How much runs have of their own is what makes their values most likely
+//! (ibid., section 5.4). The residual of a run fades with
 //! the square of the proximity in speed, so that at its own speed a run is reproduced exactly.
 
 use super::curves::neighbours;
@@ -11,8 +12,13 @@ use crate::signal::Cholesky;
 
 /// Length over which the runs are alike, relative to the range of their speeds.
 const LENGTH: f64 = 1.5;
-/// Variance of what is a run's own, relative to that of the smooth function.
-const OWN: f64 = 0.02;
+/// Variances of what is a run's own, relative to that of the smooth function: runs that differ by nothing but speed have the first.
+const OWN: [f64; 4] = [0.02, 0.05, 0.1, 0.2];
+/// Of a hundred places along a crush about five belong to one fold: they are one observation.
+const VALUES_OF_STRETCH: f64 = 5.0;
+/// By how much the logarithm of the likelihood must exceed that of the first: by 1, as for a further parameter (Akaike, IEEE Trans. Automatic
+/// Control 19, 1974).
+const EVIDENCE: f64 = 1.0;
 
 /// The runs of a group, by their increasing impact speeds.
 pub(super) struct Blend<'a> {
@@ -23,13 +29,13 @@ pub(super) struct Blend<'a> {
 }
 
 impl<'a> Blend<'a> {
-    /// Of one speed at least.
-    pub(super) fn of(speeds_m_per_s: &'a [f64]) -> Self {
+    /// Of one speed at least, with one of the shares that [`own_share`] gives.
+    pub(super) fn of(speeds_m_per_s: &'a [f64], own: f64) -> Self {
         let last = speeds_m_per_s.len() - 1;
         let length_m_per_s = LENGTH * (speeds_m_per_s[last] - speeds_m_per_s[0]);
         let entry = |r: usize, c: usize| {
             let distance = speeds_m_per_s[last - r] - speeds_m_per_s[last - c];
-            matern(distance, length_m_per_s) + if r == c { OWN } else { 0.0 }
+            matern(distance, length_m_per_s) + if r == c { own } else { 0.0 }
         };
         let equations = Cholesky::of(last + 1, entry);
         Self { speeds_m_per_s, length_m_per_s, equations }
@@ -66,6 +72,34 @@ impl<'a> Blend<'a> {
     }
 }
 
+/// The variance of what is a run's own under which values are most likely. Each of `values` has those of the fastest runs at one
+/// place, the fastest first; the variance of the smooth function is alike where as many runs have a value.
+pub(super) fn own_share(speeds_m_per_s: &[f64], values: &[Vec<f64>]) -> f64 {
+    let likelihood = |own: f64| {
+        let equations = Blend::of(speeds_m_per_s, own).equations;
+        let of_runs = |runs: usize| {
+            let ones = vec![1.0; runs];
+            let of_mean = equations.solve(&ones);
+            let precision: f64 = of_mean.iter().sum();
+            let square = |y: &Vec<f64>| {
+                let mean = y.iter().zip(&of_mean).map(|(y, w)| y * w).sum::<f64>() / precision;
+                let rest: Vec<f64> = y.iter().map(|y| y - mean).collect();
+                rest.iter().zip(equations.solve(&rest)).map(|(r, solved)| r * solved).sum::<f64>()
+            };
+            let own: Vec<f64> = values.iter().filter(|y| y.len() == runs).map(square).collect();
+            let freedom = (runs - 1) as f64;
+            let variance = own.iter().sum::<f64>() / (own.len() as f64 * freedom);
+            let spread = freedom * variance.ln() + equations.log_determinant(runs) + precision.ln();
+            if variance > 0.0 { -0.5 * own.len() as f64 * spread } else { 0.0 }
+        };
+        // Two runs say nothing of it.
+        (3..=speeds_m_per_s.len()).map(of_runs).sum::<f64>()
+    };
+    let tried = OWN.map(|own| (own, likelihood(own) / VALUES_OF_STRETCH));
+    let usual = (OWN[0], tried[0].1 + EVIDENCE);
+    tried.into_iter().fold(usual, |best, next| if next.1 > best.1 { next } else { best }).0
+}
+
 /// The correlation of Matérn with ν = 5/2 over a distance; 1 where all speeds are the same.
 fn matern(distance: f64, length: f64) -> f64 {
     if distance == 0.0 {
@@ -87,7 +121,7 @@ mod tests {
 
     #[test]
     fn weights_add_up_to_one_and_a_run_comes_out_as_it_is() {
-        let blend = Blend::of(&SPEEDS);
+        let blend = Blend::of(&SPEEDS, OWN[0]);
         for first in 0..SPEEDS.len() {
             for v in [1.0, 3.0, 4.2, 7.0, 15.0, 20.0, 40.0] {
                 let weights = blend.weights(first, v);
@@ -100,12 +134,12 @@ mod tests {
                 assert!(weights.iter().enumerate().all(is_run), "{run} from {first}: {weights:?}");
             }
         }
-        assert_eq!(Blend::of(&[8.0]).weights(0, 9.0), [1.0]);
+        assert_eq!(Blend::of(&[8.0], OWN[0]).weights(0, 9.0), [1.0]);
     }
 
     #[test]
     fn between_runs_a_smooth_function_is_followed_and_weights_are_continuous() {
-        let blend = Blend::of(&SPEEDS);
+        let blend = Blend::of(&SPEEDS, OWN[0]);
         let of = |v: f64| 1.0 + 0.05 * v - 0.001 * v * v;
         for v in [4.0, 6.0, 9.0, 16.0] {
             let weights = blend.weights(0, v);
@@ -122,7 +156,7 @@ mod tests {
     #[test]
     fn weights_are_bounded_wherever_slower_runs_have_ended() {
         let speeds = [18.0, 25.0, 36.0, 48.0, 60.0, 72.0];
-        let blend = Blend::of(&speeds);
+        let blend = Blend::of(&speeds, OWN[0]);
         for first in 0..speeds.len() {
             for v in (10..80).map(f64::from) {
                 let weights = blend.weights(first, v);
@@ -130,14 +164,29 @@ mod tests {
             }
         }
         // Three cases of one speed have equal weights.
-        let equal = Blend::of(&[5.0; 3]).weights(0, 5.0);
+        let equal = Blend::of(&[5.0; 3], OWN[0]).weights(0, 5.0);
         assert!(close(equal.iter().sum(), 1.0) && equal.iter().all(|w| w.is_finite()), "{equal:?}");
     }
 
     /// One run that stands out moves the middle between two runs by less than half.
     #[test]
     fn what_is_a_runs_own_fades_towards_its_neighbours() {
-        let middle = Blend::of(&SPEEDS).weights(0, 6.0);
+        let middle = Blend::of(&SPEEDS, OWN[0]).weights(0, 6.0);
         assert!(middle[1] < 0.5 && middle[2] < 0.5, "{middle:?}");
+    }
+
+    /// Values along a parabola have nothing of their own, values that alternate have as much as is tried.
+    #[test]
+    fn what_runs_have_of_their_own_is_seen() {
+        let of = |odd: f64| {
+            let value = |(i, v): (usize, &f64)| {
+                10.0 + 0.4 * v - 0.01 * v * v + if i % 2 == 0 { odd } else { -odd }
+            };
+            let values: Vec<f64> = SPEEDS.iter().enumerate().map(value).rev().collect();
+            own_share(&SPEEDS, &vec![values; 20])
+        };
+        assert_eq!([of(0.0), of(0.02), of(2.0)], [0.02, 0.02, 0.2]);
+        assert_eq!(own_share(&SPEEDS, &[]), 0.02);
+        assert_eq!(own_share(&[5.0], &[vec![1.0]]), 0.02);
     }
 }

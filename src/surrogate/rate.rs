@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
 use super::alignment::Alignment;
-use super::blend::Blend;
+use super::blend::{Blend, own_share};
 use super::cached::Cached;
 use super::curves::neighbours;
 use super::entry::{ModelEntry, loaded};
@@ -71,6 +71,8 @@ struct Prepared {
     alignment: Option<Alignment>,
     /// Level of each curve, aligned where that is needed, at its end against the next faster one; 1 for the fastest.
     levels: Vec<f64>,
+    /// What the runs have of their own, for [`Blend`].
+    own: f64,
 }
 
 /// Of the β that fits best, this is taken: two runs that overlap also differ by how they fold.
@@ -80,6 +82,8 @@ const MOST: f64 = 0.5;
 const STEPS: usize = 100;
 /// Points of an overlap at which two curves are compared.
 const POINTS: usize = 200;
+/// Points at which the values of all curves are compared.
+const OWN_POINTS: usize = 100;
 /// A level beyond these factors is not carried on.
 const LEVELS: (f64, f64) = (0.5, 2.0);
 
@@ -160,19 +164,21 @@ impl Rate {
         let of = || cases.iter().map(|c| [c.speed_m_per_s, c.end_m(), c.envelope().work()]);
         let prepare = || {
             let alignment = self.alignment(cases);
-            let levels = self.find_levels(alignment.as_ref().map_or(cases, Alignment::curves));
-            Prepared { of: of().collect(), alignment, levels }
+            let curves = alignment.as_ref().map_or(cases, Alignment::curves);
+            let levels = self.find_levels(curves);
+            let own = self.own_share(curves);
+            Prepared { of: of().collect(), alignment, levels, own }
         };
         let kept = self.prepared.get_or_compute(prepare);
         let own;
-        let Prepared { alignment, levels, .. } = if kept.of.iter().copied().eq(of()) {
+        let Prepared { alignment, levels, own, .. } = if kept.of.iter().copied().eq(of()) {
             kept
         } else {
             own = prepare();
             &own
         };
         let blended_n = |cases: &[CaseCurve], d: &[f64]| match self.of_impact {
-            Some(of_impact) => self.blended_n(cases, levels, of_impact, speed_m_per_s, d),
+            Some(of_impact) => self.blended_n(cases, (levels, *own), of_impact, speed_m_per_s, d),
             None => self.between_n(cases, levels, speed_m_per_s, d),
         };
         match alignment {
@@ -190,6 +196,21 @@ impl Rate {
                 self.factor(cases[i].closing_at(d)) * factor(of_impact, cases[i].speed_m_per_s);
             cases[i].force_at(d) / level
         })
+    }
+
+    /// What the runs have of their own in their `Q`, freed of the impact speed.
+    fn own_share(&self, cases: &[CaseCurve]) -> f64 {
+        let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
+        let ends_m = furthest_m(cases);
+        let level = |i: usize| factor(self.of_impact.unwrap_or(0.0), speeds[i]);
+        let values = |k: usize| -> Vec<f64> {
+            let d = ends_m[ends_m.len() - 1] * k as f64 / OWN_POINTS as f64;
+            let reached = (0..cases.len()).rev().take_while(|&i| d <= ends_m[i]);
+            reached
+                .map(|i| cases[i].force_at(d) / self.factor(cases[i].closing_at(d)) / level(i))
+                .collect()
+        };
+        own_share(&speeds, &(1..OWN_POINTS).map(values).collect::<Vec<_>>())
     }
 
     /// Between the `Q` of the two neighbouring runs.
@@ -214,14 +235,14 @@ impl Rate {
     fn blended_n(
         &self,
         cases: &[CaseCurve],
-        levels: &[f64],
+        (levels, own): (&[f64], f64),
         of_impact: f64,
         speed_m_per_s: f64,
         deflection_m: &[f64],
     ) -> Vec<f64> {
         let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
         let v = speed_m_per_s.clamp(speeds[0], speeds[speeds.len() - 1]);
-        let blend = Blend::of(&speeds);
+        let blend = Blend::of(&speeds, own);
         let of_impact = |speed: f64| factor(of_impact, speed);
         let weights: Vec<Vec<f64>> = (0..cases.len())
             .map(|first| {
@@ -230,12 +251,7 @@ impl Rate {
                 of.iter().zip(&speeds).map(|(w, &s)| w * level / of_impact(s)).collect()
             })
             .collect();
-        // A run that ends before a slower one does not end the blend of that one.
-        let furthest = |furthest_m: &mut f64, case: &CaseCurve| {
-            *furthest_m = furthest_m.max(case.end_m());
-            Some(*furthest_m)
-        };
-        let ends_m: Vec<f64> = cases.iter().scan(0.0, furthest).collect();
+        let ends_m = furthest_m(cases);
         let mut now = vec![0.0; cases.len()];
         let mut standing_n = |d: f64| {
             let is_gone = |i: &usize| self.fading(ends_m[*i], d) == 0.0;
@@ -302,6 +318,15 @@ impl Rate {
         }
         levels
     }
+}
+
+/// Ends of the curves in m: a run that ends before a slower one does not end the blend of that one.
+fn furthest_m(cases: &[CaseCurve]) -> Vec<f64> {
+    let furthest = |furthest_m: &mut f64, case: &CaseCurve| {
+        *furthest_m = furthest_m.max(case.end_m());
+        Some(*furthest_m)
+    };
+    cases.iter().scan(0.0, furthest).collect()
 }
 
 /// `1 + β√u`, 1 for bodies that part.
