@@ -4,7 +4,7 @@ use std::fs;
 use std::io::{self, BufRead};
 use std::path::Path;
 
-use crate::common::{fixture, shared};
+use crate::common::{crumple_ok, fixture, shared};
 use crumple::solver::{
     Deck, DeckInterface, DeckPlace, ProblemCode, TitledEntity, Value, parse_deck,
 };
@@ -204,6 +204,30 @@ fn reads_what_names_and_sizes_a_run() {
     let mut crlf = deck(&text.replace('\n', "\r\n").replace("*PART", "*part  "));
     crlf.problems.clear();
     assert_eq!(crlf, d);
+}
+
+/// What `inspect` prints of it: units, speed, outputs, numbers with their titles, parameters, files.
+#[test]
+fn a_deck_is_printed() {
+    let folder = tempfile::tempdir().unwrap();
+    let more = "*PARAMETER\nR   speed    -6944.\nI   state         3\n*INCLUDE\nmesh.k\n*end\n";
+    let text = CAR.replace("         2\n\n -6944", "         2\n -6944").replace("*end\n", more);
+    fs::write(folder.path().join("car.k"), text).unwrap();
+    let printed = crumple_ok(folder.path(), &["inspect", "car.k"]);
+    for expected in [
+        "units       Mg mm s N MPa",
+        "speed       6944.444 (initial velocity, in the deck's units)",
+        "nodout each 0.00075",
+        "201  nose, upper",
+        "7  self contact",
+        "1  rigid wall",
+        "5  crossbeam, left",
+        "speed = -6944",
+        "state = 3",
+        "mesh.k  (not found)",
+    ] {
+        assert!(printed.contains(expected), "{printed}\nlacks {expected}");
+    }
 }
 
 #[test]
