@@ -172,11 +172,11 @@ impl Pair {
         let unaligned: f64 = (0..overlap).map(|i| misfit(i, i)).sum();
         let enough = GAIN * overlap as f64;
         let rms = |sum: f64| (sum / overlap as f64).sqrt();
-        if unaligned < enough {
+        let nodes = (slow.len() - 1) / NODE;
+        if unaligned < enough || nodes == 0 {
             return unshifted(rms(unaligned));
         }
         let most = (MOST * STEPS as f64) as usize;
-        let nodes = (slow.len() - 1) / NODE;
         // Entry k is the shift k − most.
         let mut least = vec![f64::INFINITY; 2 * most + 1];
         least[most] = 0.0;

@@ -8,7 +8,7 @@ use super::line::{Line, is_whole_real};
 use crate::solver::problem::{Diagnostics, Place, ProblemCode};
 use crate::solver::states::StateReader;
 
-/// A component and its label.
+/// A component and its label, which ends with `=`.
 pub(crate) type Label = (&'static str, &'static str);
 
 /// How wide the numbers after each label of a file are, and where that was first seen.
@@ -77,19 +77,21 @@ pub(crate) fn fields(
     let text = line.text.trim_ascii_end();
     // Beginning and end of each label, and which of the components it names.
     let mut marks: Vec<(usize, usize, Option<usize>)> = Vec::new();
+    let equals: Vec<usize> = memchr::memchr_iter(b'=', text).collect();
     for (k, (_, label)) in labels.iter().enumerate() {
-        let mut found = memchr::memmem::find_iter(text, label);
+        let ends_here = |at: &&usize| text[..=**at].ends_with(label.as_bytes());
+        let mut found = equals.iter().filter(ends_here);
         let Some(at) = found.next() else { continue };
         // A label that is there twice: two rows were joined.
         if found.next().is_some() {
             return None;
         }
-        marks.push((at, at + label.len(), Some(k)));
+        marks.push((at + 1 - label.len(), at + 1, Some(k)));
     }
     if marks.is_empty() {
         return None;
     }
-    for equals in memchr::memchr_iter(b'=', text) {
+    for equals in equals {
         if !marks.iter().any(|&(from, to, _)| (from..to).contains(&equals)) {
             let word = text[..equals].trim_ascii_end();
             let start = word.iter().rposition(u8::is_ascii_whitespace).map_or(0, |at| at + 1);

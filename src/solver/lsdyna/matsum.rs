@@ -72,8 +72,10 @@ impl Body for Matsum {
             }
             return Some(());
         }
-        let is_first = |labels: &[Label]| memchr::memmem::find(text, labels[0].1.as_bytes());
-        let found = LINES.iter().position(|(_, labels)| is_first(labels).is_some());
+        let has = |label: &str| {
+            memchr::memchr_iter(b'=', text).any(|at| text[..=at].ends_with(label.as_bytes()))
+        };
+        let found = LINES.iter().position(|(_, labels)| has(labels[0].1));
         if text.starts_with(PART) {
             let end = memchr::memmem::find(text, b"inten=");
             let id = end.and_then(|end| integer(&text[PART.len()..end]));
