@@ -1,8 +1,8 @@
 //! The choice among models that were validated, and the run that would help most.
 //!
 //! Two to five left-out speeds decide little: the model with the smallest mean is often the luckiest one. `auto` therefore starts
-//! from the model with the most physics in it that the runs allow (`crush-law`, else `rate`), and leaves it only for one that is better beyond
-//! chance at the speeds left out: in force, velocity, acceleration and crush together. `validate --subsets` shows what that costs
+//! from the simplest model of the physics that the runs allow (`crush-law`, else `rate`), and leaves it only for one whose errors at the speeds
+//! left out are smaller by more than the differences scatter: in force, velocity, acceleration and crush together. `validate --subsets` shows what that costs
 //! against the best model in hindsight. The errors of the chosen model are a little optimistic, so `--nested` repeats the choice without
 //! each left-out speed. For trains the ends of the range count as much as the inner speeds.
 
@@ -196,7 +196,7 @@ pub fn gaps(set: &TrainingSet, validation: &Validation) -> Vec<Gap> {
             of_chosen.filter(|r| r.speed_m_per_s == v).map(|r| r.force_l1).collect();
         (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64)
     };
-    let switches = Model::fit_curves(set, ModelKind::linear());
+    let switches = Model::fit(set, ModelKind::linear());
     let switches = switches.map(|model| model.mode_switches_m_per_s).unwrap_or_default();
     let gap = |i: usize| {
         let width = speeds[i + 1] - speeds[i];

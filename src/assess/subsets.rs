@@ -75,7 +75,7 @@ pub(crate) fn subsets(
     Ok(std::iter::once("auto").chain(names).filter_map(|name| over(name, &trials)).collect())
 }
 
-/// The choice and every model by one subset; `None` if it lacks no speed inside its range.
+/// The choice and every model by one subset; `None` if it lacks no speed inside its range, or one of the models cannot predict that.
 fn subset(set: &TrainingSet, speeds: &[f64], candidates: &[ModelKind]) -> Option<Vec<Trial>> {
     let has = |v: f64| speeds.iter().any(|kept| is_same_speed(*kept, v));
     let kept = set.with(|case| has(case.speed_m_per_s));
@@ -96,8 +96,8 @@ fn subset(set: &TrainingSet, speeds: &[f64], candidates: &[ModelKind]) -> Option
     for of in &tables.means {
         let kind = fitting.iter().find(|kind| kind.name() == of.model)?;
         let judged = lacking.iter().map(|case| case.trial(*kind).judged(of.max_crush_rule));
-        // One without an answer is not compared.
-        let Ok(judged) = judged.collect::<Result<Vec<_>, _>>() else { continue };
+        // The models are compared over the same subsets.
+        let judged = judged.collect::<Result<Vec<_>, _>>().ok()?;
         let own: Vec<LeftOut> = judged.into_iter().map(|score| score.row).collect();
         means.extend(mean(&of.model, of.max_crush_rule, &own));
         rows.extend(own);

@@ -445,7 +445,7 @@ fn without_validation(fitting: &[ModelKind]) -> (String, String) {
     (if linear { "linear" } else { "nearest" }.into(), reason.into())
 }
 
-/// The rule for the maximum crush: the model's own, or of the rules with answers at more inner speeds the first; the reference method
+/// The rule for the maximum crush: the body's motion, or of the rules with more answers, at inner speeds before ends, the first; the reference method
 /// keeps its spline. `None` without any trial.
 fn best_rule(kind: &ModelKind, trials: &[&LeftOutRun<'_>]) -> Option<MaxCrushRule> {
     let missing = |rule: &MaxCrushRule| {
@@ -454,8 +454,7 @@ fn best_rule(kind: &ModelKind, trials: &[&LeftOutRun<'_>]) -> Option<MaxCrushRul
         (of(true).filter(lacks).count(), of(false).filter(lacks).count())
     };
     // The spline is not monotone by construction: it is used only on request.
-    let own = kind.entry().crush_rule;
-    let rules = [own, MaxCrushRule::Motion, MaxCrushRule::Energy, MaxCrushRule::Monotone];
+    let rules = [MaxCrushRule::Motion, MaxCrushRule::Energy, MaxCrushRule::Monotone];
     let best = (!trials.is_empty()).then_some(rules)?.into_iter().min_by_key(missing)?;
     if kind.is_reference_method() && missing(&MaxCrushRule::Spline).0 <= missing(&best).0 {
         Some(MaxCrushRule::Spline)

@@ -29,7 +29,7 @@ use super::{CommandResult, Failure, GlobalOptions, keep_input, usage};
   crumple train curves.h5 --group lead-car-wall --paper -o ddtcm.model
   crumple train curves.h5 --group lead-car-wall --model nearest -o fdrm.model
 auto fits every model with each speed left out (crumple validate shows the table) and keeps to
-crush-law, or rate, unless another is better beyond chance. The same seed gives the same bytes, on any number of threads.")]
+crush-law, or rate, unless another is better by more than the differences scatter. The same seed gives the same bytes, on any number of threads.")]
 pub(super) struct Args {
     /// Curve database
     database: PathBuf,

@@ -10,6 +10,8 @@ const CLASS: u32 = 60;
 const CLASSES: [u32; 4] = [CLASS, 180, 600, 1000];
 /// A class that changes the energy by more than this share is too low for the duration of the impact.
 const LOST: f64 = 0.005;
+/// Most of the energy that a factor makes up.
+const MADE_UP: f64 = 0.1;
 
 /// The motion of a case along its loading branch and at the end of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,7 +51,7 @@ pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
     let mass = case.conditions.masses.effective_kg();
     let speeds = &case.curves.closing_speed_m_per_s;
     let accelerations = derivative(time_s, speeds);
-    let mut raw: Vec<f64> = accelerations.into_iter().map(|a| -mass * a).collect();
+    let raw: Vec<f64> = accelerations.into_iter().map(|a| -mass * a).collect();
     let end = loading_end(&case.curves.sampled);
     let lost_j = 0.5 * mass * (speeds[0] * speeds[0] - speeds[end] * speeds[end]);
     // The work over the energy that the body lost.
@@ -65,10 +67,10 @@ pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
         Some((force_n, share))
     };
     let of_class = |&class: &u32| Some(cfc::filter(class, time_s, &raw).ok()?.values);
-    let filtered = CLASSES.iter().filter_map(of_class).filter_map(from_rest);
+    let by_class = CLASSES.iter().filter_map(of_class).filter_map(from_rest);
     let mut best: Option<(Vec<f64>, f64)> = None;
     let changes = |of: &(Vec<f64>, f64)| (of.1 - 1.0).abs();
-    for next in filtered {
+    for next in by_class {
         if best.as_ref().is_none_or(|best| changes(&next) < changes(best)) {
             best = Some(next);
         }
@@ -76,14 +78,19 @@ pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
             break;
         }
     }
-    match best.or_else(|| from_rest(raw.clone())) {
+    let unfiltered = || from_rest(raw.clone());
+    match best.or_else(unfiltered) {
         Some((mut force_n, share)) => {
-            force_n.iter_mut().for_each(|f| *f /= share);
+            // Further off, mass, speeds and deflection contradict each other, which no factor mends.
+            if (share - 1.0).abs() <= MADE_UP {
+                force_n.iter_mut().for_each(|f| *f /= share);
+            }
             force_n
         }
         None => {
-            raw[0] = 0.0;
-            raw
+            let mut force_n = filtered(time_s, raw);
+            force_n[0] = 0.0;
+            force_n
         }
     }
 }

@@ -3,7 +3,7 @@
 //! Where a fold, a stage or a step begins at another deflection in each run, a blend at equal deflection makes two half steps.
 //! Neighbouring runs are therefore aligned by the shift `s(d)` of the faster one that makes
 //! `∫ ((q_slow(d) − q_fast(d + s))/q̄)² + s'² dd` smallest, by dynamic programming (time warping: Sakoe and Chiba, IEEE Trans.
-//! Acoustics 26, 1978, here with a price per slope instead of a window). An event at another speed lies where the straight line over the speed
+//! Acoustics 26, 1978, here with a price per slope besides the window). An event at another speed lies where the straight line over the speed
 //! between its places in the two neighbouring runs has it. As it may lie anywhere between these places, the blend is averaged
 //! over a length that is as long as their distance in the middle between two speeds, and 0 at the speed of a run.
 //!
@@ -13,8 +13,8 @@ use super::CaseCurve;
 use super::curves::{LEAST_WAY_M, mean_over, neighbours};
 use crate::piecewise;
 
-/// A pair is aligned if that takes so much away from the mean square of its differences, relative to the level:
-/// a tenth of the level, RMS.
+/// A pair is aligned if that takes so much away from the mean square of its differences, relative to the level, after the price of the
+/// shift: a tenth of the level, RMS.
 const GAIN: f64 = 0.01;
 /// Steps to the end of the longer curve of a pair. Shifts are whole steps.
 const STEPS: usize = 500;
@@ -25,9 +25,8 @@ const SLOPE: usize = 2;
 /// Largest shift, as a share of the end of the longer curve.
 const MOST: f64 = 0.15;
 
-/// A shift over speed that is so many times the usual one of a group is a jump,
+/// A shift over speed that is so many times the usual one of a group, and more than a share of the crush, is a jump.
 const JUMP: f64 = 3.0;
-/// if it is also more than this share of the crush.
 const LEAST_JUMP: f64 = 0.03;
 /// Curves that still differ by this much of their level, RMS, once they are aligned collapse in different modes.
 const UNLIKE: f64 = 0.25;
@@ -169,10 +168,17 @@ impl Pair {
         }
         // Costs in steps.
         let misfit = |i: usize, j: usize| ((slow[i] - fast[j]) / level_n).powi(2);
-        let unaligned: f64 = (0..overlap).map(|i| misfit(i, i)).sum();
-        let enough = GAIN * overlap as f64;
-        let rms = |sum: f64| (sum / overlap as f64).sqrt();
         let nodes = (slow.len() - 1) / NODE;
+        // What the faster curve reaches only unshifted costs what it costs there; what it does not reach at all is compared with nothing.
+        let compared = (overlap - 1).min(nodes * NODE);
+        let shifted_misfit = |i: usize, j: usize| match (j < fast.len(), i <= compared) {
+            (true, _) => misfit(i, j),
+            (false, true) => misfit(i, i),
+            (false, false) => 0.0,
+        };
+        let unaligned: f64 = (1..=compared).map(|i| misfit(i, i)).sum();
+        let enough = GAIN * compared as f64;
+        let rms = |sum: f64| (sum / compared.max(1) as f64).sqrt();
         if unaligned < enough || nodes == 0 {
             return unshifted(rms(unaligned));
         }
@@ -197,12 +203,11 @@ impl Pair {
                     }
                 }
                 for i in (node - 1) * NODE + 1..=node * NODE {
-                    // What the other curve does not reach is compared with nothing.
                     let Some(j) = (i + k).checked_sub(most) else {
                         *next = f64::INFINITY;
                         continue;
                     };
-                    *next += if j < fast.len() { misfit(i, j) } else { 0.0 };
+                    *next += shifted_misfit(i, j);
                 }
             }
             least = next;
@@ -252,7 +257,7 @@ impl Warp {
     fn at(&self, d: f64) -> f64 {
         let (from, to) = (&self.from_m, &self.to_m);
         let last = from.len() - 1;
-        if d >= from[last] {
+        if last == 0 || d >= from[last] {
             return to[last] + (d - from[last]);
         }
         piecewise::by_product(from, to, piecewise::segment(from, d), d)
@@ -339,6 +344,21 @@ mod tests {
         assert!(aligned(&[step(10.0, 0.4), step(12.0, 0.4), higher(step(14.0, 0.4))]).is_none());
         assert!(aligned(&[step(10.0, 0.4)]).is_none());
         assert!(aligned(&[]).is_none());
+    }
+
+    /// A step that a run lacks is not pushed off its end.
+    #[test]
+    fn what_only_one_curve_has_is_not_shifted_away() {
+        for end_m in [0.95, 1.0, 1.02] {
+            let d: Vec<f64> = (0..=500).map(|i| end_m * f64::from(i) / 500.0).collect();
+            let flat = CaseCurve::new(12.0, vec![], d, vec![1e6; 501], vec![]).unwrap();
+            assert!(aligned(&[step(10.0, 0.88), flat.clone()]).is_none(), "{end_m}");
+            // Nor is the first point a shift.
+            let spike = flat.map_forces(|d, f| if d == 0.0 { 30e6 } else { f });
+            let mut slow = flat;
+            slow.speed_m_per_s = 10.0;
+            assert!(aligned(&[slow, spike]).is_none());
+        }
     }
 
     #[test]

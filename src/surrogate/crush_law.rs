@@ -116,7 +116,7 @@ impl CrushLaw {
     }
 
     /// `Q` in N at an impact speed of the model's kind, along deflections; beyond the training speeds that
-    /// of the outermost. `contact` are the curves that it was fitted to.
+    /// of the outermost, at the level of the impact speed. `contact` are the curves that it was fitted to.
     pub(super) fn standing_n(
         &self,
         contact: &[CaseCurve],

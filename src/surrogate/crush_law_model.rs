@@ -11,7 +11,6 @@ use serde_json::value::RawValue;
 use super::crush_law::{CrushLaw, per_crush_force};
 use super::curves::mean_over;
 use super::entry::{ModelEntry, loaded};
-use super::max_crush::MaxCrushRule;
 use super::{CaseCurve, QueryPoint, Surrogate};
 use crate::curve::ForceKind;
 use crate::dataset::{TrainingCase, TrainingSet};
@@ -26,7 +25,6 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     follows_closing: true,
     needs_crush_law: true,
     least_curves: 2,
-    crush_rule: MaxCrushRule::Motion,
     forest: None,
     fit: |input| {
         let law = input.crush_law()?;

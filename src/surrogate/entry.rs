@@ -6,7 +6,6 @@ use serde::de::DeserializeOwned;
 use serde_json::value::RawValue;
 
 use super::forest_options::ForestOptions;
-use super::max_crush::MaxCrushRule;
 use super::{CaseCurve, CrushLaw, Surrogate};
 use crate::curve::ForceKind;
 use crate::dataset::TrainingSet;
@@ -31,8 +30,6 @@ pub struct ModelEntry {
     pub needs_crush_law: bool,
     /// Minimum number of training curves that it answers from.
     pub least_curves: usize,
-    /// The rule for the maximum crush of a model that was not validated, if speed alone differs.
-    pub crush_rule: MaxCrushRule,
     /// Options of its forest; `None` for a model without one.
     pub(super) forest: Option<fn() -> ForestOptions>,
     pub(super) fit: Fit,

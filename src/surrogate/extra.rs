@@ -5,7 +5,6 @@ use std::sync::Arc;
 use super::entry::{ModelEntry, loaded};
 use super::forest::ForestSurrogate;
 use super::forest_options::ForestOptions;
-use super::max_crush::MaxCrushRule;
 use crate::forest::Thresholds;
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {
@@ -17,7 +16,6 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     follows_closing: false,
     needs_crush_law: false,
     least_curves: 2,
-    crush_rule: MaxCrushRule::Motion,
     forest: Some(ForestOptions::extra),
     fit: |input| {
         Ok(Arc::new(ForestSurrogate::fit(input.set, input.force, input.forest_options())?))

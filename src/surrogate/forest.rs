@@ -9,7 +9,6 @@ use serde_json::value::RawValue;
 
 use super::entry::{ModelEntry, loaded};
 pub use super::forest_options::ForestOptions;
-use super::max_crush::MaxCrushRule;
 use super::{CaseCurve, QueryPoint, Surrogate, Warning};
 use crate::curve::ForceKind;
 use crate::dataset::TrainingSet;
@@ -25,7 +24,6 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     needs_crush_law: false,
     least_curves: 2,
     // The reference method knows only crush over speed.
-    crush_rule: MaxCrushRule::Motion,
     forest: Some(ForestOptions::paper),
     fit: |input| {
         Ok(Arc::new(ForestSurrogate::fit(input.set, input.force, input.forest_options())?))

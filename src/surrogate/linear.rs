@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::curves::interpolate_held;
 use super::entry::ModelEntry;
-use super::max_crush::MaxCrushRule;
 use super::{CaseCurve, QueryPoint, Surrogate};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {
@@ -16,7 +15,6 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     follows_closing: false,
     needs_crush_law: false,
     least_curves: 2,
-    crush_rule: MaxCrushRule::Motion,
     forest: None,
     fit: |_| Ok(Arc::new(Linear)),
     load: |_| Ok(Arc::new(Linear)),

@@ -78,18 +78,22 @@ impl Model {
             Some(law) => Some(law),
             None => crush_law(set, &model.curves.declared),
         };
-        Ok(Self { crush_law, ..model })
+        let speed = |i: usize| model.cases[i].speed_m_per_s;
+        let switches = if set.features.is_empty() {
+            mode_switches(&model.curves.declared)
+        } else {
+            Vec::new()
+        };
+        let mode_switches_m_per_s = switches.iter().map(|&(i, k)| (speed(i), speed(k))).collect();
+        Ok(Self { crush_law, mode_switches_m_per_s, ..model })
     }
 
-    /// The same without a crush law that its curves do not need, for trials that only ask for curves.
+    /// The same without a crush law that its curves do not need and without changes of mode, for trials that only ask for curves.
     pub(crate) fn fit_curves(set: &TrainingSet, kind: ModelKind) -> Result<Self, Error> {
         Self::check_inputs(set, kind)?;
         let cases: Vec<ModelCase> =
             set.cases.iter().map(|c| ModelCase::of(c, set.force_kind)).collect();
         let curves = Curves::of(&cases)?;
-        let switches =
-            if set.features.is_empty() { mode_switches(&curves.declared) } else { Vec::new() };
-        let speed = |i: usize| cases[i].speed_m_per_s;
         let needed_law = if kind.entry().needs_crush_law {
             crush_law(set, &curves.declared).filter(|law| law.stopped.is_known())
         } else {
@@ -109,13 +113,8 @@ impl Model {
             study_units: set.units,
             features: set.features.clone(),
             training_hash: set.hash(),
-            // Crush over speed is a function only if nothing else differs.
-            max_crush_rule: if set.features.is_empty() {
-                kind.entry().crush_rule
-            } else {
-                MaxCrushRule::Motion
-            },
-            mode_switches_m_per_s: switches.iter().map(|&(i, k)| (speed(i), speed(k))).collect(),
+            max_crush_rule: MaxCrushRule::Motion,
+            mode_switches_m_per_s: Vec::new(),
             leave_one_out: None,
             fitted: fitted(&curves.declared, set.force_kind)?,
             fitted_body: match set.force_kind {

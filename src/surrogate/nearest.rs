@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use super::entry::ModelEntry;
-use super::max_crush::MaxCrushRule;
 use super::{CaseCurve, QueryPoint, Surrogate};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {
@@ -15,7 +14,6 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     follows_closing: false,
     needs_crush_law: false,
     least_curves: 1,
-    crush_rule: MaxCrushRule::Motion,
     forest: None,
     fit: |_| Ok(Arc::new(Nearest)),
     load: |_| Ok(Arc::new(Nearest)),

@@ -286,8 +286,8 @@ impl<'a> Prediction<'a> {
                 ..provenance(asked, rule, *crush, (energy, body_energy))
             },
         };
-        curve.unloading_stiffness_n_per_m = curve.stiffness_at_end(&declared);
-        curve.body_unloading_stiffness_n_per_m = body.map(|b| curve.stiffness_at_end(&b));
+        curve.unloading_stiffness_n_per_m = curve.stiffness_where_stopped(&declared);
+        curve.body_unloading_stiffness_n_per_m = body.map(|b| curve.stiffness_where_stopped(&b));
         curve
     }
 }

@@ -311,7 +311,7 @@ impl PredictedCurve {
     }
 
     fn of_contact_force(&self) -> Result<Self, Error> {
-        let stiffness = self.stiffness_at_end(&self.envelope()?);
+        let stiffness = self.stiffness_where_stopped(&self.envelope()?);
         let mut curve = self.clone();
         curve.unloading_stiffness_n_per_m = stiffness;
         if let Some(rebound) = &mut curve.rebound {
@@ -324,7 +324,7 @@ impl PredictedCurve {
     fn of_body_force(&self) -> Result<Self, Error> {
         let envelope = self.driving_envelope()?;
         let mut curve = self.clone();
-        curve.unloading_stiffness_n_per_m = self.stiffness_at_end(&envelope);
+        curve.unloading_stiffness_n_per_m = self.stiffness_where_stopped(&envelope);
         if self.body_force_n.is_none() {
             return Ok(curve);
         }
@@ -364,7 +364,7 @@ impl PredictedCurve {
 
     /// Unloading stiffness with which a run leaves one of the curve's envelopes where that has taken up the energy of the impact: the
     /// energy of the rebound is the same whichever force it comes from.
-    pub(crate) fn stiffness_at_end(&self, envelope: &Envelope) -> f64 {
+    pub(crate) fn stiffness_where_stopped(&self, envelope: &Envelope) -> f64 {
         let kinetic_j = self.provenance.kinetic_energy_j;
         let driving = self.driving_envelope().map(|driving| stopping_force_n(&driving, kinetic_j));
         let share = driving.map_or(1.0, |driving| stopping_force_n(envelope, kinetic_j) / driving);
@@ -406,7 +406,7 @@ impl PredictedCurve {
             beyond.envelope(of_body.unwrap_or(&beyond.force_n))
         });
         // The force law keeps to its bounds by itself; the one constant is for other tools.
-        let unloading = CurveUnloading::Stiffness(self.stiffness_at_end(&loading));
+        let unloading = CurveUnloading::Stiffness(self.stiffness_where_stopped(&loading));
         Ok(ForceCurve {
             unloading,
             kind: Some(force),

@@ -5,8 +5,7 @@ use std::collections::BTreeMap;
 use super::cases::ModelCase;
 use super::curves::{interpolate_held, neighbours};
 use super::max_crush::{self, MaxCrush, MaxCrushRule};
-use super::predicted::Rebound;
-use super::predicted::stopping_force_n;
+use super::predicted::{Rebound, stopping_force_n};
 use super::warning::{Warning, is_far_outside, outside_of};
 use super::{CaseCurve, Model, QueryPoint};
 use crate::curve::body::rebound_stiffness_n_per_m;
@@ -159,7 +158,7 @@ impl<'a> ResolvedQuery<'a> {
         })
     }
 
-    /// The rebound from the end of the body force over its deflection.
+    /// The rebound from where the body force has stopped the body.
     pub(crate) fn rebound(&self, body: &Envelope) -> Option<Rebound> {
         // Another mass gets the same energy back: the structure's, not the car's.
         let trained_kg = self.model.masses().effective_kg();

@@ -20,7 +20,6 @@ use super::blend::{Blend, own_share};
 use super::cached::Cached;
 use super::curves::neighbours;
 use super::entry::{ModelEntry, loaded};
-use super::max_crush::MaxCrushRule;
 use super::{CaseCurve, QueryPoint, Surrogate};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {
@@ -32,7 +31,6 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     follows_closing: true,
     needs_crush_law: false,
     least_curves: 2,
-    crush_rule: MaxCrushRule::Motion,
     forest: None,
     fit: |input| Ok(Arc::new(Rate::fit(input.curves))),
     load: loaded::<Rate>,
@@ -166,7 +164,7 @@ impl Rate {
             let alignment = self.alignment(cases);
             let curves = alignment.as_ref().map_or(cases, Alignment::curves);
             let levels = self.find_levels(curves);
-            let own = self.own_share(curves);
+            let own = self.of_impact.map_or(0.0, |of_impact| self.own_share(curves, of_impact));
             Prepared { of: of().collect(), alignment, levels, own }
         };
         let kept = self.prepared.get_or_compute(prepare);
@@ -199,10 +197,10 @@ impl Rate {
     }
 
     /// What the runs have of their own in their `Q`, freed of the impact speed.
-    fn own_share(&self, cases: &[CaseCurve]) -> f64 {
+    fn own_share(&self, cases: &[CaseCurve], of_impact: f64) -> f64 {
         let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
         let ends_m = furthest_m(cases);
-        let level = |i: usize| factor(self.of_impact.unwrap_or(0.0), speeds[i]);
+        let level = |i: usize| factor(of_impact, speeds[i]);
         let values = |k: usize| -> Vec<f64> {
             let d = ends_m[ends_m.len() - 1] * k as f64 / OWN_POINTS as f64;
             let reached = (0..cases.len()).rev().take_while(|&i| d <= ends_m[i]);

@@ -76,8 +76,9 @@ impl PredictedCurve {
             deflection_m,
             force_n,
         };
-        curve.unloading_stiffness_n_per_m = curve.stiffness_at_end(&loading);
-        curve.body_unloading_stiffness_n_per_m = body.map(|b| curve.stiffness_at_end(&b.loading));
+        curve.unloading_stiffness_n_per_m = curve.stiffness_where_stopped(&loading);
+        curve.body_unloading_stiffness_n_per_m =
+            body.map(|b| curve.stiffness_where_stopped(&b.loading));
         Ok(curve)
     }
 }
