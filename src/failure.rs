@@ -27,14 +27,14 @@ pub const EXIT_CODES: [(u8, &str); 4] = [
 
 /// What `--json` prints on standard output when a command fails.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ErrorDocument {
+pub(crate) struct ErrorDocument {
     /// The error.
-    pub error: ErrorReport,
+    pub(crate) error: ErrorReport,
 }
 
 /// One error.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ErrorReport {
+pub(crate) struct ErrorReport {
     /// Its kind; a code never changes its meaning.
     pub code: ErrorCode,
     /// What standard error would have shown, without the excerpt.
@@ -97,7 +97,7 @@ pub(crate) fn causes(error: &(dyn Error + 'static)) -> Vec<String> {
 
 impl ErrorDocument {
     /// The document of an error.
-    pub fn new(error: &(dyn Error + 'static)) -> Self {
+    pub(crate) fn new(error: &(dyn Error + 'static)) -> Self {
         let message = error.to_string();
         let place = place(error);
         let error = ErrorReport {

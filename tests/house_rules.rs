@@ -450,16 +450,7 @@ fn the_fuzzer_is_built_on_the_same_profile() {
 /// CRUMPLE_WRITE_SCHEMAS=1 cargo test --release --test all schemas
 #[test]
 fn schemas_are_those_of_the_types() {
-    let schemas = [
-        ("study.schema.json", schemars::schema_for!(crumple::study::Manifest)),
-        ("scenario.schema.json", schemars::schema_for!(crumple::scenario::Scenario)),
-        ("plan.schema.json", schemars::schema_for!(crumple::plan::PlanFile)),
-        ("predicted_curve.schema.json", schemars::schema_for!(crumple::surrogate::PredictedCurve)),
-        ("validation.schema.json", schemars::schema_for!(crumple::assess::Report)),
-        ("rating.schema.json", schemars::schema_for!(crumple::rating::Rating)),
-        ("error.schema.json", schemars::schema_for!(crumple::failure::ErrorDocument)),
-    ];
-    for (name, schema) in schemas {
+    for (name, schema) in crumple::cli::schemas() {
         let path = root().join("schemas").join(name);
         let text = serde_json::to_string_pretty(&schema).unwrap() + "\n";
         if std::env::var_os("CRUMPLE_WRITE_SCHEMAS").is_some() {

@@ -51,7 +51,7 @@ pub struct BuiltRun {
     /// Name of the run in the manifest.
     pub name: String,
     /// Where its case is, if the database has one.
-    pub case: CasePath,
+    pub(crate) case: CasePath,
     /// How it ended.
     pub outcome: RunOutcome,
 }
@@ -64,9 +64,9 @@ pub struct BuildReport {
     /// Every run, in the order of the manifest.
     pub runs: Vec<BuiltRun>,
     /// Cases that the study no longer has.
-    pub removed: Vec<CasePath>,
+    pub(crate) removed: Vec<CasePath>,
     /// Cases of runs that have another name or group than before: from where to where.
-    pub moved: Vec<(CasePath, CasePath)>,
+    pub(crate) moved: Vec<(CasePath, CasePath)>,
     /// Groups that were built from the manifest when it had another study or group and other runs
     /// or recipe, and that stay; looked for when the database has nothing of the study yet.
     pub earlier: Vec<String>,

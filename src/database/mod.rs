@@ -53,7 +53,7 @@ pub struct Database {
 
 /// A case by its names; no name has a `/`.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct CasePath {
+pub(crate) struct CasePath {
     /// Its group.
     pub group: String,
     /// Its name in the group.
@@ -322,7 +322,7 @@ impl Database {
 
     /// The mass that the crush zone of a group stops at each deflection, as its cases are now; `None` if
     /// there is no such group, or it does not follow from them.
-    pub fn stopped_mass(&self, group: &str) -> Option<StoppedMass> {
+    pub(crate) fn stopped_mass(&self, group: &str) -> Option<StoppedMass> {
         group::stopped_mass(group, self.cases(group))
     }
 

@@ -33,7 +33,7 @@ pub use export_curve::ExportCurve;
 pub(crate) use export_curve::TargetUnloading;
 pub use fmu::{FmiVersion, Spring, archive, binaries};
 pub use lsdyna::Material;
-pub use read::curve::{Metadata, Place, ReadFile};
+pub use read::curve::{Metadata, ReadFile};
 pub(crate) use read::history;
 pub use read::{ColumnNames, READERS, ReadCurve, ReadOptions, Reader, read};
 

@@ -82,7 +82,7 @@ pub struct Interface {
     /// Free distance before contact, in m.
     pub gap_m: f64,
     /// Under tension, where the bodies are coupled.
-    pub tension: Option<Tension>,
+    pub(crate) tension: Option<Tension>,
     /// Parallel to the law, while it is in contact.
     pub damping: Option<Damping>,
     /// Factor on the law's force that follows speeds.
@@ -93,7 +93,7 @@ pub struct Interface {
 
 /// A law on the extension beyond the initial distance of the bodies.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tension {
+pub(crate) struct Tension {
     /// Force over the extension.
     pub law: Arc<ForceLaw>,
     /// Extension before the coupling pulls, in m.

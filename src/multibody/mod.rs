@@ -32,11 +32,10 @@ mod rows;
 mod run;
 
 use crate::error::{Error, error};
-pub use chain::{Body, Chain, Interface, Resistance, STANDARD_GRAVITY_M_PER_S2, Tension};
+pub(crate) use chain::Tension;
+pub use chain::{Body, Chain, Interface, Resistance, STANDARD_GRAVITY_M_PER_S2};
 use engine::Scheme;
-pub use law::{
-    EnvelopeEnd, ForceLaw, LawTables, MemoryTables, Unloading, UnloadingChoice, UnloadingShape,
-};
+pub use law::{EnvelopeEnd, ForceLaw, LawTables, Unloading, UnloadingChoice, UnloadingShape};
 pub use ledger::Ledger;
 pub use rates::{Damping, RateFactor, Stopping};
 use run::Grid;

@@ -20,7 +20,7 @@ pub(crate) const MAX_ITEMS: u64 = 1_000_000_000_000;
 /// A `--plan` file: the `[sweep]` table by itself.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PlanFile {
+pub(crate) struct PlanFile {
     /// What is varied.
     pub(crate) sweep: Plan,
 }
@@ -140,7 +140,7 @@ pub(crate) struct Vary {
 /// What is varied.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum What {
+pub(crate) enum What {
     /// Speed of a train.
     #[default]
     Speed,
@@ -172,7 +172,7 @@ impl What {
 /// Vehicles by name, or all of them.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected a list of vehicles, or \"all\"")]
-pub enum Vehicles {
+pub(crate) enum Vehicles {
     /// By name.
     List(Vec<String>),
     /// `all`.

@@ -19,7 +19,7 @@ const WEIGHTS: [f64; 3] = [0.5, 0.25, 0.25];
 
 /// Ratings of CORA, each from 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Cora {
+pub(crate) struct Cora {
     /// Corridor of 5 % and 50 % of the reference's largest magnitude, exponent 2.
     pub corridor: f64,
     /// `(½ (K + 1))¹⁰` of the largest correlation K.

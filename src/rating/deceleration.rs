@@ -11,7 +11,7 @@ const MOVING_MEAN_S: f64 = 0.120;
 
 /// Means of a deceleration, in the unit of the signal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Deceleration {
+pub(crate) struct Deceleration {
     /// Mean of −a from the first instant at which it exceeds 5 % of its largest value until it
     /// next returns to zero or the interval ends; null if it is never above zero. Where only the
     /// contact decelerates, that is the time in which the net contact force is above zero.

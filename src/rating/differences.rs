@@ -12,7 +12,7 @@ const CANCELS: f64 = 0.05;
 
 /// Mean of `|p − r|/|r|` over the samples where `|r|` is at least 5 % of its maximum.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Pointwise {
+pub(crate) struct Pointwise {
     /// The mean; 0 where the signals agree.
     pub mean: f64,
     /// Share of the samples that are left out.
@@ -21,7 +21,7 @@ pub struct Pointwise {
 
 /// The largest difference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct MaxAbs {
+pub(crate) struct MaxAbs {
     /// `|p − r|`, in the unit of the signals.
     pub value: f64,
     /// Where it is, in s.
@@ -95,7 +95,7 @@ pub(crate) fn integral_error(along: &[f64], reference: &[f64], prediction: &[f64
 
 /// Errors of magnitude and of phase, and their combination; 0 where the signals agree.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct MagnitudePhase {
+pub(crate) struct MagnitudePhase {
     /// Above 0 if the prediction is larger.
     pub magnitude: f64,
     /// 0 to 1.

@@ -26,7 +26,7 @@ pub(crate) const MOST_SAMPLES: usize = 20_000;
 
 /// Scores of ISO/TS 18571, each from 0 to 1, and the rating they give.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Iso18571 {
+pub(crate) struct Iso18571 {
     /// Corridor score Z.
     pub corridor: f64,
     /// Phase score E_P.
@@ -47,7 +47,7 @@ pub struct Iso18571 {
 /// Grades of ISO/TS 18571, table 3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Grade {
+pub(crate) enum Grade {
     /// R above 0.94.
     Excellent,
     /// Above 0.80.

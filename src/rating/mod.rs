@@ -38,22 +38,22 @@ use serde::Serialize;
 use crate::error::Error;
 use crate::signal::l1_ratio;
 use crate::signal::peaks::{MatchedPeak, matched_peaks};
-pub use cora::Cora;
+pub(crate) use cora::Cora;
 use cora::cora;
-pub use deceleration::Deceleration;
-pub use differences::{MagnitudePhase, MaxAbs, Pointwise};
+pub(crate) use deceleration::Deceleration;
+pub(crate) use differences::{MagnitudePhase, MaxAbs, Pointwise};
 use differences::{
     integral_error, max_abs, peak_norm, pointwise, rms_ratio, russell, sprague_geers,
 };
+pub(crate) use iso18571::Iso18571;
 use iso18571::iso18571;
-pub use iso18571::{Grade, Iso18571};
-pub use signal::Signal;
+pub(crate) use signal::Signal;
 pub(crate) use signal::{INTERVAL_S, Pair};
 
 /// What two signals are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Quantity {
+pub(crate) enum Quantity {
     /// Means of the deceleration are rated as well.
     Acceleration,
     /// Anything else.
@@ -72,7 +72,7 @@ impl Quantity {
 
 /// How two signals are rated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RatingSettings {
+pub(crate) struct RatingSettings {
     /// What the signals are.
     pub quantity: Quantity,
     /// Class of a CFC filter for both, such as 60.
@@ -88,11 +88,11 @@ pub struct RatingSettings {
 /// `r` is the reference, `p` the prediction, at the same times. Errors are 0 and scores 1 where
 /// they agree. What has no meaning, such as a ratio to zeros, is null.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Rating {
+pub(crate) struct Rating {
     /// The signal that is taken as right.
-    pub reference: Rated,
+    pub(crate) reference: Rated,
     /// The signal that is rated.
-    pub prediction: Rated,
+    pub(crate) prediction: Rated,
     /// What the signals are.
     pub quantity: Quantity,
     /// Class of the filter on both signals, run over all their samples; null without one.
@@ -112,32 +112,32 @@ pub struct Rating {
     /// Mean of `|p − r|` over the largest `|r|`.
     pub peak_norm: Option<f64>,
     /// Relative differences sample by sample.
-    pub pointwise: Option<Pointwise>,
+    pub(crate) pointwise: Option<Pointwise>,
     /// The largest difference and its time.
-    pub max_abs: MaxAbs,
+    pub(crate) max_abs: MaxAbs,
     /// The first two peaks of the reference, upwards or, where its largest magnitude is negative,
     /// downwards; they stand out by at least a tenth of the largest.
-    pub peaks: Vec<Peak>,
+    pub(crate) peaks: Vec<Peak>,
     /// `∫p/∫r − 1` over time: of a force the error of its impulse, of an acceleration that of the
     /// change of speed; null where the reference's positive and negative parts nearly cancel.
     pub integral_error: Option<f64>,
     /// Measure of Sprague and Geers.
-    pub sprague_geers: Option<MagnitudePhase>,
+    pub(crate) sprague_geers: Option<MagnitudePhase>,
     /// Measure of Russell.
-    pub russell: Option<MagnitudePhase>,
+    pub(crate) russell: Option<MagnitudePhase>,
     /// Null over more than 2 s.
-    pub iso18571: Option<Iso18571>,
+    pub(crate) iso18571: Option<Iso18571>,
     /// Null over more than 2 s.
-    pub cora: Option<Cora>,
+    pub(crate) cora: Option<Cora>,
     /// Of accelerations: positive where the body is slowed down, so −a.
-    pub deceleration: Option<Decelerations>,
+    pub(crate) deceleration: Option<Decelerations>,
     /// What a reader of these numbers should know.
     pub warnings: Vec<String>,
 }
 
 /// A signal that was rated.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Rated {
+pub(crate) struct Rated {
     /// Name of its column.
     pub name: String,
     /// Its own samples, before anything is done to it.
@@ -157,7 +157,7 @@ impl Rated {
 
 /// A peak of the reference and the peak of the prediction that is nearest to it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Peak {
+pub(crate) struct Peak {
     /// Time of the reference's peak, in s.
     pub time_s: f64,
     /// Value of the reference, in the unit of the signals.
@@ -171,7 +171,7 @@ pub struct Peak {
 
 /// Decelerations of both signals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Decelerations {
+pub(crate) struct Decelerations {
     /// Of the reference.
     pub reference: Deceleration,
     /// Of the prediction.
@@ -187,7 +187,7 @@ pub struct Decelerations {
 ///
 /// # Errors
 /// If they have no or too few common times, or cannot be filtered.
-pub fn rate(
+pub(crate) fn rate(
     reference: &Signal,
     prediction: &Signal,
     settings: &RatingSettings,

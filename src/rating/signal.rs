@@ -16,7 +16,7 @@ const LARGEST: f64 = 1e100;
 ///
 /// Invariant: equal lengths of at least five, all finite, time strictly increasing.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Signal {
+pub(crate) struct Signal {
     name: String,
     time_s: Vec<f64>,
     values: Vec<f64>,
@@ -52,7 +52,7 @@ impl Signal {
     ///
     /// # Errors
     /// With the number of the first wrong sample, counted from 1.
-    pub fn new(name: &str, time_s: Vec<f64>, values: Vec<f64>) -> Result<Self, Error> {
+    pub(crate) fn new(name: &str, time_s: Vec<f64>, values: Vec<f64>) -> Result<Self, Error> {
         if time_s.len() != values.len() {
             return Err(error!(
                 Rating,

@@ -15,7 +15,7 @@ use crate::unit::{
 /// A study manifest as written (TOML).
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Manifest {
+pub(crate) struct Manifest {
     /// What all runs share.
     pub(crate) study: StudyHeader,
     /// How a curve is made of a run.

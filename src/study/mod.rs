@@ -19,7 +19,7 @@ use crate::file::absolute;
 use crate::manifest as toml_file;
 use crate::unit::SpeedKind;
 pub(crate) use locate::LocatedRun;
-pub use manifest::Manifest;
+pub(crate) use manifest::Manifest;
 pub(crate) use manifest::{RunEntry, StudyKind};
 
 /// A manifest that makes sense, and where it stands.

@@ -40,7 +40,7 @@ pub struct CrushLaw {
     pub of_impact: f64,
     /// The stopped mass, with the deviation of the runs' momentum.
     #[serde(flatten)]
-    pub stopped: StoppedMass,
+    pub(crate) stopped: StoppedMass,
     #[serde(skip)]
     forces: Cached<CrushForces>,
 }

@@ -40,9 +40,9 @@ use crate::scenario::{self, CheckedScenario, Prepared, Scenario, Sources};
 pub use journal::{WriteOptions, write, write_rows};
 pub use merge::merge;
 pub use run::Chunk;
-pub use statistics::ColumnStatistics;
+pub(crate) use statistics::ColumnStatistics;
 use variables::Variable;
-pub use variables::VariableSummary;
+pub(crate) use variables::VariableSummary;
 
 /// A share of a sweep: block `index` of `count` blocks of neighbouring items.
 ///
@@ -114,7 +114,7 @@ pub struct Report {
     /// The first few messages of rows that failed, by item.
     pub messages: Vec<(u64, String)>,
     /// Statistics of the columns of numbers.
-    pub columns: Vec<ColumnStatistics>,
+    pub(crate) columns: Vec<ColumnStatistics>,
 }
 
 impl Report {
@@ -196,7 +196,7 @@ impl Sweep {
     }
 
     /// The variables: columns and how many values they have.
-    pub fn variables(&self) -> Vec<VariableSummary> {
+    pub(crate) fn variables(&self) -> Vec<VariableSummary> {
         let variables = self.variables.iter().zip(&self.design.spreads);
         let summary = |(variable, spread): (&Variable, &Spread)| VariableSummary {
             column: variable.column.clone(),

@@ -13,7 +13,7 @@ const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
 
 /// Statistics of one column, over the rows that have a number there.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ColumnStatistics {
+pub(crate) struct ColumnStatistics {
     /// Name of the column.
     pub column: String,
     /// Rows with a number.

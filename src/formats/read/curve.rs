@@ -238,7 +238,7 @@ pub(super) fn content(path: &Path) -> impl Fn(Error) -> Error {
 
 /// A place in a file, counted from 1; bytes from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub(crate) enum Place {
     /// A whole line.
     Line(u64),
     /// A field of a line whose fields are separated.
