@@ -19,13 +19,12 @@
 //! ```
 
 mod curves;
-mod histories;
 mod motion;
 
 use crate::unit::km_per_h;
 pub(crate) use curves::file_curve;
 pub use curves::{group_curves, left_out_at, prediction};
-pub use histories::{HistoryOptions, histories};
+pub use motion::{HistoryOptions, histories};
 pub use motion::{Motion, Quantity, train_speeds};
 
 /// A speed in km/h with at most one digit after the point.

@@ -12,7 +12,7 @@ use crate::plural::counted;
 use crate::table::Table;
 
 use super::db::{case_columns, case_row};
-use super::progress::Bar;
+use super::output::Bar;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, output, usage};
 
 /// Read all runs of a study, extract their curves and write the database

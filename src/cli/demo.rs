@@ -21,7 +21,7 @@ use crate::table::Table;
 use crate::unit::{M_PER_S_PER_KM_PER_H, Shown, km_per_h};
 use include_dir::{Dir, include_dir};
 
-use super::progress::Bar;
+use super::output::Bar;
 use super::validate::print_validation;
 use super::{CommandResult, Failure, GlobalOptions, output, usage};
 

@@ -11,8 +11,8 @@ use crate::import::{self, Item, Settings};
 use crate::surrogate::{Model, PredictedCurve, Query, predict};
 use crate::unit::km_per_h;
 
+use super::curve_file::FileKind;
 use super::export::{Args, Which};
-use super::file_kind::FileKind;
 use super::{Failure, usage};
 
 /// The input of an export.

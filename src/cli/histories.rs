@@ -9,7 +9,7 @@ use crate::solver::{self, Access, Selection, SolverFile, WantedId, decks};
 use crate::unit::UnitSystem;
 
 use super::arguments::{selection, units};
-use super::progress::Bar;
+use super::output::Bar;
 use super::{CommandResult, Failure, GlobalOptions, is_stdout, keep_input, output, usage};
 
 /// Write the histories of a solver file as CSV, JSON or HDF5, in the solver's units

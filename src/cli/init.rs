@@ -11,7 +11,7 @@ use crate::table::Table;
 use crate::unit::{Shown, UnitSystem, km_per_h};
 
 use super::arguments;
-use super::progress::Bar;
+use super::output::Bar;
 use super::{CommandResult, GlobalOptions, Outcome, is_stdout, output};
 
 /// Examine run folders and write a commented study; or write a scenario for models

@@ -10,21 +10,16 @@ mod build;
 mod compare;
 mod curve_file;
 mod db;
-mod deck_report;
 mod demo;
 mod export;
 mod export_input;
-mod export_output;
-mod file_kind;
 mod histories;
 mod init;
 mod inspect;
 mod plot;
 mod predict;
-mod progress;
 mod rate;
 mod report;
-mod run_channels;
 mod shell;
 mod simulate;
 mod sweep;
@@ -46,7 +41,7 @@ use crate::failure::{self, DONE, DONE_WITH_WARNINGS, ErrorDocument, FAILED, USAG
 use crate::file::{self, is_same};
 use crate::solver;
 use clap::{FromArgMatches, Parser, Subcommand};
-use file_kind::FileKind;
+use curve_file::FileKind;
 use serde::Serialize;
 
 #[derive(Parser)]

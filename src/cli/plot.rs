@@ -19,9 +19,9 @@ use crate::surrogate::{Model, ModelCase, PredictedCurve, Query, predict};
 use crate::unit::{UnitSystem, km_per_h};
 
 use super::arguments::{self, one_of, selection, units};
+use super::curve_file::FileKind;
 use super::curve_file::Reading;
-use super::file_kind::FileKind;
-use super::progress::Bar;
+use super::output::Bar;
 use super::{
     CommandResult, Failure, GlobalOptions, Outcome, failed_at, is_stdout, keep_input, output,
     usage, usage_error,

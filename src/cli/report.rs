@@ -7,8 +7,8 @@ use crate::file::write_whole;
 use crate::report::{MethodSpeeds, ReportSettings, report};
 
 use super::arguments::{self, one_of};
-use super::file_kind::FileKind;
-use super::progress::Bar;
+use super::curve_file::FileKind;
+use super::output::Bar;
 use super::{CommandResult, GlobalOptions, Outcome, keep_input, keep_inputs, output};
 
 /// Write one self-contained HTML page: curves, validation, predictions, methods, train results

@@ -12,7 +12,7 @@ use std::time::Instant;
 use crate::sweep::{self, ColumnStatistics, Report, Shard, Sweep, WriteOptions};
 use crate::table::Table;
 
-use super::progress::Bar;
+use super::output::Bar;
 use super::{
     CommandResult, Failure, GlobalOptions, Outcome, failed, is_stdout, keep_input, keep_inputs,
     output, usage,

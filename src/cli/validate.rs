@@ -19,7 +19,7 @@ use crate::surrogate::max_crush::MaxCrushRule;
 use crate::table::Table;
 use crate::unit::km_per_h;
 
-use super::progress::Bar;
+use super::output::Bar;
 use super::{CommandResult, GlobalOptions, Outcome, output, usage};
 
 /// Leave out every speed in turn, predict it with every model, and compare with FE

@@ -8,13 +8,12 @@
 mod compare;
 mod join;
 mod labels;
-mod names;
 mod selection;
 mod tables;
 
 pub(crate) use compare::{Difference, compare};
 pub(crate) use join::{Joined, OnConflict, copy, merge};
 pub(crate) use labels::{Labels, label};
-pub(crate) use names::{remove, rename_case, rename_group};
+pub(crate) use labels::{remove, rename_case, rename_group};
 pub(crate) use selection::{Selection, SpeedRange};
 pub(crate) use tables::write_tables;

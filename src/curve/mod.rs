@@ -27,7 +27,7 @@ use crate::unit::{Speed, UnitSystem};
 pub use body::BodyMotion;
 pub use energy::audit;
 pub use envelope::Envelope;
-pub use extract::input::{DeckSpeed, StatedContact};
+pub use extract::{DeckSpeed, StatedContact};
 pub use extract::{ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract};
 pub use force_curve::{CurveUnloading, ForceCurve};
 pub use from_table::from_table;

@@ -24,10 +24,8 @@
 
 pub(crate) mod check;
 mod edit;
-mod foreign;
 mod group;
 mod layout;
-pub(crate) mod names;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt;
@@ -122,7 +120,7 @@ impl Database {
     /// something of others would be lost; the old file is unchanged.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         if is_file(path)? {
-            let foreign = foreign::found(&layout::open(path)?)?;
+            let foreign = edit::found(&layout::open(path)?)?;
             if !foreign.is_empty() {
                 return edit::write_keeping(self, path, &foreign);
             }
@@ -354,8 +352,8 @@ pub(crate) fn record_hash(case: &Case) -> Result<String, Error> {
 
 /// What other programs have put into the file at `path`, as a message lists it; `None` if nothing.
 pub(crate) fn foreign_items(path: &Path) -> Result<Option<String>, Error> {
-    let items = foreign::found(&layout::open(path)?)?;
-    Ok((!items.is_empty()).then(|| foreign::listed(&items)))
+    let items = edit::found(&layout::open(path)?)?;
+    Ok((!items.is_empty()).then(|| edit::listed(&items)))
 }
 
 /// Whether the file at `path` is a curve database.
@@ -397,4 +395,25 @@ fn damaged(path: &Path, place: &str, detail: impl fmt::Display) -> Error {
 /// Turns a curve that breaks its invariant into a database error.
 fn damaged_curve(path: &Path, place: &str, error: Error) -> Error {
     damaged(path, place, error)
+}
+
+/// Longest name of a case or group, in bytes.
+const MAX_NAME: usize = 200;
+
+/// Why a text is not a name of a group or case, as a message says it of "it".
+pub(crate) fn check_name(name: &str) -> Result<(), &'static str> {
+    if name.trim().is_empty() || name == "." || name == ".." {
+        Err("it is blank")
+    } else if name.contains(|c: char| c.is_control() || c == '/') {
+        Err("it may not contain \"/\" or control characters")
+    } else if name.len() > MAX_NAME {
+        Err("it has more than 200 bytes")
+    } else {
+        Ok(())
+    }
+}
+
+/// The name as a message shows it.
+pub(crate) fn shown(name: &str) -> String {
+    name.chars().take(MAX_NAME).collect()
 }

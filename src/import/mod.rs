@@ -4,7 +4,6 @@
 //! meanwhile, and written as a whole.
 
 mod case;
-mod metadata;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -29,7 +29,6 @@ mod law;
 mod motion;
 mod simplex;
 mod spread;
-mod start;
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -291,7 +290,7 @@ fn first_individuals(target: &Target, settings: &FitSettings, seed: u64) -> Vec<
         // A number that no individual of the search has.
         let mut stream = Stream::new(seed, u64::MAX - i as u64);
         let mut genes: Genes = std::array::from_fn(|_| if i == 0 { 0.5 } else { stream.unit() });
-        start::least_squares(&mut genes, target);
+        simplex::least_squares(&mut genes, target);
         genes
     };
     (0..count).into_par_iter().map(individual).collect()

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::iso18571::{MOST_SAMPLES, corridor};
-use super::shift::{best, plain};
+use super::signal::{best, plain};
 
 /// Exponent K_V of the progression.
 const PROGRESSION_EXPONENT: i32 = 10;

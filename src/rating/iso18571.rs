@@ -4,7 +4,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::shift::{best, centred};
+use super::signal::{best, centred};
 use crate::signal::derivative;
 
 /// Largest phase error that has a score, as a share of the samples; nothing is shifted further.

@@ -29,7 +29,6 @@ pub(crate) mod cora;
 pub(crate) mod deceleration;
 pub(crate) mod differences;
 pub(crate) mod iso18571;
-pub(crate) mod shift;
 mod signal;
 
 use schemars::JsonSchema;

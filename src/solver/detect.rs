@@ -193,7 +193,7 @@ fn look_at(
                 error!(SolverFile at "deck", "{path}: this is a keyword deck, which holds no histories; crumple inspect shows what it says of its run"),
             );
         }
-        is_lsdyna |= line.number == 2 && lsdyna::header::version(line.text).is_some();
+        is_lsdyna |= line.number == 2 && lsdyna::line::version(line.text).is_some();
         if line.number <= 2 {
             continue;
         }

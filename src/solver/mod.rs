@@ -31,7 +31,6 @@ mod problem;
 mod restart;
 pub(crate) mod runs;
 mod selection;
-mod solver_file;
 pub(crate) mod source;
 mod states;
 mod zeros;
@@ -47,15 +46,15 @@ pub(crate) use detect::{entity_word, format_names, is_named_like_binary, without
 pub(crate) use family::family;
 use family::missing_continuation;
 pub use lsdyna::deck::contents::{DeckPlace, ImpactSpeed, Include, Output, StatedUnits};
-pub use lsdyna::deck::parameters::Value;
+pub use lsdyna::deck::context::Value;
 pub use lsdyna::deck::{Deck, DeckInterface, TitledEntity, parse_deck};
 pub use lsdyna::nodout::Blocks;
-pub use lsdyna::nodout::blocks::Column;
+pub use lsdyna::nodout::stride::Column;
 pub use problem::{Problem, ProblemCode};
 use selection::check_selection;
 pub(crate) use selection::no_component;
+pub use selection::{Entity, NoDataReason, SolverFile, WithoutData};
 pub use selection::{Selection, WantedId};
-pub use solver_file::{Entity, NoDataReason, SolverFile, WithoutData};
 pub use source::{Access, Source, Window};
 
 /// Reads the selected histories of the file at `path`, of one section.

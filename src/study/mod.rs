@@ -7,7 +7,6 @@ mod check;
 pub(crate) mod extract;
 pub(crate) mod files;
 mod locate;
-mod manifest;
 mod read;
 
 use std::path::{Path, PathBuf};
@@ -18,9 +17,9 @@ use crate::error::{Document, Error, KeyPath};
 use crate::file::absolute;
 use crate::manifest as toml_file;
 use crate::unit::SpeedKind;
+pub(crate) use check::Manifest;
+pub(crate) use check::{RunEntry, StudyKind};
 pub(crate) use locate::LocatedRun;
-pub(crate) use manifest::Manifest;
-pub(crate) use manifest::{RunEntry, StudyKind};
 
 /// A manifest that makes sense, and where it stands.
 #[derive(Clone, Debug)]

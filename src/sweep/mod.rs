@@ -20,7 +20,6 @@
 //! laws and only changes the numbers in them (`scenario::adjust`). `cargo bench --bench sweep` prints the saving.
 
 mod journal;
-mod merge;
 mod row;
 mod run;
 mod statistics;
@@ -37,8 +36,8 @@ use crate::manifest;
 use crate::multibody::Chain;
 use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName, Spread};
 use crate::scenario::{self, CheckedScenario, Prepared, Scenario, Sources};
+pub use journal::merge;
 pub use journal::{WriteOptions, write, write_rows};
-pub use merge::merge;
 pub use run::Chunk;
 pub(crate) use statistics::ColumnStatistics;
 use variables::Variable;

@@ -10,8 +10,8 @@ use crate::unit::UnitSystem;
 
 use super::super::curve_file::CurveFile;
 use super::arguments::{FORCES, mass, one_of, parameter, speed, units};
+use super::list::case_row;
 use super::list::print_group;
-use super::row::case_row;
 use super::{CommandResult, Failure, GlobalOptions, output, usage};
 
 /// Files, the group they join, and data missing from them.

@@ -6,7 +6,7 @@ use crate::curate;
 use crate::curve::Case;
 use crate::database::Database;
 
-use super::chosen::Chosen;
+use super::Chosen;
 use super::{CommandResult, GlobalOptions, Outcome};
 
 /// Cases, and the folder for their tables.

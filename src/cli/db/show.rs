@@ -12,9 +12,9 @@ use crate::table::Table;
 use crate::unit::{Shown, km_per_h};
 
 use super::super::predict::draw_curve;
-use super::chosen::Chosen;
+use super::Chosen;
+use super::list::full_case;
 use super::list::print_group;
-use super::row::full_case;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, output, usage};
 
 /// A database, and which of its cases are shown how.

@@ -3,7 +3,7 @@
 use crate::error::{Error, error};
 use std::path::{Path, PathBuf};
 
-use super::text::number;
+use super::encoding::number;
 use crate::curve::contact::{THRESHOLD, onset, threshold_n};
 use crate::curve::loading::loading_branch;
 use crate::curve::{Curve, CurveUnloading, Envelope, ForceCurve, ForceKind, unloading_stiffness};

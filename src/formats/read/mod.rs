@@ -23,7 +23,6 @@ mod modelica_package;
 mod radioss;
 mod table;
 mod tables;
-mod text;
 
 use crate::error::{Error, error};
 use crate::guess;

@@ -7,8 +7,8 @@
 use super::Input;
 use super::columns::{Columns, Places, check_curves, check_points, choose};
 use super::curve::{CUT, Metadata, Place, expected, miscounted, shown, stated_units, units, value};
+use super::encoding::lines;
 use super::label::{Label, Quantity};
-use super::text::lines;
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 

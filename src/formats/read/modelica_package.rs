@@ -6,7 +6,7 @@
 use super::Input;
 use super::columns::{Columns, Places, check_curves, check_points, choose};
 use super::curve::{CUT, Metadata, Place, miscounted, shown, title, value};
-use super::text::lines;
+use super::encoding::lines;
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 

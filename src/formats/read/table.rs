@@ -11,8 +11,8 @@
 
 use super::columns::check_curves;
 use super::curve::{CUT, Place, expected, miscounted, shown, value};
+use super::encoding::{lines, number};
 use super::label::{Label, Quantity, is_unit};
-use super::text::{lines, number};
 use crate::error::{Error, error};
 
 /// Lines with content among which the header is looked for.

@@ -18,8 +18,8 @@
 use std::collections::{HashMap, HashSet};
 use std::io;
 
-use super::header;
 use super::line::{Line, Lines};
+use super::line::{legend_entry, version};
 use crate::solver::Format;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::{Source, Stream};
@@ -176,7 +176,7 @@ impl<'a> AsciiReader<'a> {
             let text = String::from_utf8_lossy(line.text).trim().to_string();
             self.title = (!text.is_empty()).then_some(text);
         } else if line.number == 2 {
-            self.version = header::version(line.text);
+            self.version = version(line.text);
             if self.version.is_none() {
                 let message = "expected LS-DYNA's version line (\"ls-dyna … date …\")";
                 states.note(ProblemCode::NoVersionLine, &line, message);
@@ -207,7 +207,7 @@ impl<'a> AsciiReader<'a> {
             if self.in_legend || opens || closes {
                 self.in_legend = !closes;
                 if self.legend.len() < MAX_LEGEND {
-                    self.legend.extend(header::legend_entry(line.text));
+                    self.legend.extend(legend_entry(line.text));
                 }
             } else if text.is_empty() {
                 body.blank(states);

@@ -18,8 +18,6 @@
 //! to the states written after them, until others are written. The file has no checksums: flipped bits within a
 //! value cannot be detected.
 
-mod bytes;
-mod metadata;
 mod owners;
 mod records;
 mod section;
@@ -34,7 +32,7 @@ use crate::solver::Format;
 use crate::solver::problem::{Problem, ProblemCode};
 use crate::solver::source::Source;
 use crate::solver::{Selection, SolverFile};
-use bytes::Bytes;
+use records::Bytes;
 use records::{Section, Tree};
 use section::SectionReader;
 

@@ -6,9 +6,9 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::bytes::Bytes;
-use super::metadata::Metadata;
+use super::owners::Metadata;
 use super::owners::{Entities, EntityList, OwnerSearch, row_name};
+use super::records::Bytes;
 use super::records::Section;
 use super::states::StateReader;
 use super::values::Series;

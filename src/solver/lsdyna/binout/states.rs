@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::io;
 use std::sync::Arc;
 
-use super::bytes::Bytes;
+use super::records::Bytes;
 use super::records::{Component, DataRecord, LISTS, Section};
 use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::solver::restart;

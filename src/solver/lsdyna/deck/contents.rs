@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::parameters::Value;
+use super::context::Value;
 use crate::solver::problem::Problem;
 use crate::unit::UnitSystem;
 

@@ -7,11 +7,9 @@
 mod card;
 mod cards;
 pub(crate) mod contents;
-mod context;
+pub(crate) mod context;
 mod keyword;
-pub(crate) mod parameters;
 mod reader;
-mod units;
 
 use std::io::{self, BufRead};
 

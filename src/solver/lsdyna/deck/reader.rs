@@ -6,10 +6,10 @@ use std::rc::Rc;
 
 use super::super::line::{Line, Lines, shown};
 use super::card::{Card, start, text};
+use super::cards;
 use super::contents::{Deck, DeckInterface, Include, Scope};
 use super::context::{Block, Context, MAX_INCLUDES};
 use super::keyword::{Keyword, Kind, STANDARD, kind};
-use super::units;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::read_buffered;
 
@@ -135,7 +135,7 @@ impl Reader<'_, '_> {
     }
 
     fn comment(&mut self, line: &Line<'_>) {
-        if let Some(stated) = units::in_comment(line.text) {
+        if let Some(stated) = cards::in_comment(line.text) {
             self.context.units(stated, line.into(), false);
         }
     }
@@ -182,7 +182,7 @@ impl Reader<'_, '_> {
                 self.context.deck.title = text(card.text);
             }
             Kind::ControlUnits if first => {
-                self.context.units(units::on_card(&card), card.place, true);
+                self.context.units(cards::on_card(&card), card.place, true);
             }
             Kind::VelocityOfSet => self.context.velocity_of_set(block, &card),
             Kind::VelocityOfNodes => self.context.velocity_of_id(block, &card, Scope::Node),

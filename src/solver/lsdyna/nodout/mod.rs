@@ -5,9 +5,8 @@
 //! which block it is. Ends of fields are counted from the right, because l2a pushes rows with wide ids to the right. `nodout`
 //! writes the cycle of a state, so states of one time are only repeated if the cycle does not increase.
 
-pub(crate) mod blocks;
 mod rows;
-mod stride;
+pub(crate) mod stride;
 
 use std::io;
 
@@ -18,7 +17,7 @@ use crate::solver::Format;
 use crate::solver::problem::Place;
 use crate::solver::source::Source;
 use crate::solver::states::{StateReader, TableId};
-pub use blocks::Blocks;
+pub use stride::Blocks;
 use stride::Stride;
 
 /// Opens every block's state line.
