@@ -9,13 +9,13 @@ use serde::Serialize;
 use crate::error::{self, ErrorCode, Place};
 
 /// Exit code of a command that did its work.
-pub const DONE: u8 = 0;
+pub(crate) const DONE: u8 = 0;
 /// Exit code of a command that could not do its work, or only part of it.
-pub const FAILED: u8 = 1;
+pub(crate) const FAILED: u8 = 1;
 /// Exit code for arguments that make no sense or do not fit together.
-pub const USAGE: u8 = 2;
+pub(crate) const USAGE: u8 = 2;
 /// Exit code of a command that did its work, but with damage or warnings, under `--strict`.
-pub const DONE_WITH_WARNINGS: u8 = 3;
+pub(crate) const DONE_WITH_WARNINGS: u8 = 3;
 
 /// The exit codes with their meanings, as docs/error-codes.md has them.
 pub const EXIT_CODES: [(u8, &str); 4] = [

@@ -44,7 +44,6 @@ impl SpeedKind {
         }
     }
 
-    /// The kind of that name.
     pub(crate) fn parse(name: &str) -> Option<Self> {
         [Self::Wall, Self::Closing].into_iter().find(|kind| kind.name() == name)
     }
@@ -87,7 +86,6 @@ impl Shown {
         Self::fitting(largest_n, 0.1, &[(1e6, "MN", 3), (1e3, "kN", 3), (1.0, "N", 2)])
     }
 
-    /// In t or kg.
     pub(crate) fn mass(largest_kg: f64) -> Self {
         Self::fitting(largest_kg, 1.0, &[(1e3, "t", 2), (1.0, "kg", 2)])
     }

@@ -9,7 +9,7 @@ use crumple::unit::UnitSystem;
 use proptest::prelude::*;
 use serde_json::Value;
 
-use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, entries};
+use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, entries, says};
 
 /// The curve of all these files: a rise, a fall, a plateau; in m and N.
 pub const POINTS: [(f64, f64); 5] =
@@ -264,10 +264,7 @@ fn mat_files_of_both_byte_orders() {
         let other = other.concat();
         is_points(&read_bytes("b.mat", &other, &given(Some("SI"))).unwrap().0, "other");
         let error = read_bytes("b.mat", &other, &given(None)).unwrap_err();
-        assert!(
-            error.contains("b.mat: the file does not state its units: give them with --units"),
-            "{error}"
-        );
+        says(&error, "b.mat: the file does not state its units: give them with --units");
     }
 }
 
@@ -306,15 +303,17 @@ fn iso_mme_tests() {
     fs::write(channels.join("T1.004"), channel("12FRONT00000FOXP", "kN", &f)).unwrap();
     let path = folder.path().join("T1");
     let error = read(&path, &given(None)).unwrap_err().to_string();
-    assert!(error.contains("choose one with --curve: displacement 11FRONT00000DSXP; force 11FRONT00000FOXP, 12FRONT00000FOXP"), "{error}");
+    says(
+        &error,
+        "choose one with --curve: displacement 11FRONT00000DSXP; force 11FRONT00000FOXP, 12FRONT00000FOXP",
+    );
     let chosen =
         ReadOptions { curve: Some("11FRONT00000DSXP,12FRONT00000FOXP".into()), ..given(None) };
     assert!(read(&path, &chosen).is_ok());
     // Damage is named with its file and line.
     let t = |text: String, expected: &str| {
         fs::write(channels.join("T1.004"), text).unwrap();
-        let error = read(&path, &chosen).unwrap_err().to_string();
-        assert!(error.contains(expected), "{error}");
+        says(&read(&path, &chosen).unwrap_err().to_string(), expected);
     };
     let good = channel("12FRONT00000FOXP", "kN", &f);
     t(
@@ -699,7 +698,7 @@ fn a_file_becomes_a_case_that_every_command_knows() {
     }
     let t: Vec<f64> = serde_json::from_value(case["time_s"].clone()).unwrap();
     assert!((t[1] - 0.75e-3).abs() < 1e-12);
-    let check = crumple_ok(here, &["db", "check", "c.h5", "--strict"]);
+    let check = crumple_ok(here, "db check c.h5 --strict");
     assert_eq!(check, "1 case checked, 0 findings\n");
 }
 
@@ -807,7 +806,7 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
     );
     // The kind is the group's where nothing else says it.
     let added = crumple_ok(here, &adding(&["--speed", &v, "--mass", "24t", "--case", "b"]));
-    assert!(added.contains("speed: wall as in the group"), "{added}");
+    says(&added, "speed: wall as in the group");
     // A database that is none stays as it is.
     fs::write(here.join("c.h5"), "hello\n").unwrap();
     t_with(1, &[], "c.h5: ");
@@ -836,8 +835,8 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
     }
     fs::write(here.join("nose.csv"), text).unwrap();
     let added = crumple_ok(here, &adding(&["--speed", "10m/s", "--kind", "wall", "--mass", "24t"]));
-    assert!(added.contains("motion: that of the file's times"), "{added}");
-    assert!(added.contains("force: sign flipped, positive in compression"), "{added}");
+    says(&added, "motion: that of the file's times");
+    says(&added, "force: sign flipped, positive in compression");
     let case = &cases(here, "tests")[0];
     let crush = case["max_deflection_m"].as_f64().unwrap();
     // Contact is where the force has risen to 0.5 % of its largest, as in FE records.
@@ -850,8 +849,8 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
         1,
         &adding(&["--speed", "10m/s", "--kind", "wall", "--mass", "24kg", "--case", "b"]),
     );
-    assert!(error.contains("such an impact is impossible"), "{error}");
-    assert!(error.contains("--accept-energy"), "{error}");
+    says(&error, "such an impact is impossible");
+    says(&error, "--accept-energy");
 }
 
 /// Predicted curves of a model, written as JSON and CSV and added again, make a group on which
@@ -908,7 +907,7 @@ fn predicted_curves_come_back_as_a_group_that_trains() {
         rebound(&first),
         rebound(&second)
     );
-    let report = crumple_ok(here, &["validate", "c.h5", "--group", "again", "--json"]);
+    let report = crumple_ok(here, "validate c.h5 --group again --json");
     let report: Value = serde_json::from_str(&report).unwrap();
     assert!(report["groups"][0]["rows"].as_array().unwrap().len() > 3);
     // A build leaves them, in other groups and in its own.
@@ -954,7 +953,10 @@ fn predicted_curves_come_back_as_a_group_that_trains() {
             "--replace",
         ],
     );
-    assert!(error.contains("case \"36kmh\" of group \"lead-car-wall\" belongs to the study \"lead car to rigid wall\", which builds it"), "{error}");
+    says(
+        &error,
+        "case \"36kmh\" of group \"lead-car-wall\" belongs to the study \"lead car to rigid wall\", which builds it",
+    );
 }
 
 /// What crumple export writes comes back: the loading branch without the points that other tools
@@ -1010,7 +1012,7 @@ fn exported_curves_come_back() {
     // Histories of a recorded case.
     let export = ["export", "curves.h5", "--case", "36kmh", "--to", "iso-mme", "-o", "test"];
     crumple_ok(here, &[&export[..], &group].concat());
-    crumple_ok(here, &["db", "add", "c.h5", "test", "--group", "mme", "--kind", "wall"]);
+    crumple_ok(here, "db add c.h5 test --group mme --kind wall");
     let recorded = &cases(here, "mme")[0];
     let shown = crumple_ok(
         here,
@@ -1030,7 +1032,7 @@ fn no_study_takes_the_name_of_what_was_added() {
     let name = study.lines().find(|l| l.starts_with("name")).unwrap();
     let study = study.replace(name, "name = \"imported\"");
     let error = crumple::study::parse(Path::new("study.toml"), &study).unwrap_err().to_string();
-    assert!(error.contains("is the name of the curves that crumple db add takes"), "{error}");
+    says(&error, "is the name of the curves that crumple db add takes");
 }
 
 /// Reads bytes as every format, by name and by content.

@@ -7,7 +7,7 @@ use std::path::Path;
 use crumple::assess::Choice;
 use crumple::assess::ComparisonSettings;
 use crumple::assess::compare_train;
-use crumple::charts::{self, HistoryOptions, Motion, Quantity};
+use crumple::charts::{self, Motion, Quantity};
 use crumple::curve::ForceKind;
 use crumple::database::Database;
 use crumple::multibody::simulate;
@@ -17,25 +17,22 @@ use crumple::solver::{self, Selection};
 use crumple::surrogate::{Model, Query, predict};
 use crumple::unit::UnitSystem;
 
-use crate::common::{crumple_fails, crumple_ok, demo_folder, entries, root};
+use crate::common::{crumple_fails, crumple_ok, demo_folder, entries, root, says};
 
 /// Every text lies within the picture, and no two texts touch.
 fn assert_texts_are_free(drawing: &Drawing, what: &str) {
     let boxes = drawing.text_boxes();
-    for (k, one) in boxes.iter().enumerate() {
-        let [left, top, right, bottom] = one.place;
+    for (k, &(one, place)) in boxes.iter().enumerate() {
+        let [left, top, right, bottom] = place;
         assert!(
             left >= 0.0 && top >= 0.0 && right <= drawing.width && bottom <= drawing.height,
-            "{what}: \"{}\" leaves the picture: {:?} of {} × {}",
-            one.text,
-            one.place,
+            "{what}: \"{one}\" leaves the picture: {place:?} of {} × {}",
             drawing.width,
             drawing.height
         );
-        for other in &boxes[..k] {
-            let [l, t, r, b] = other.place;
-            let is_apart = right <= l || r <= left || bottom <= t || b <= top;
-            assert!(is_apart, "{what}: \"{}\" and \"{}\" overlap", one.text, other.text);
+        for (other, [l, t, r, b]) in &boxes[..k] {
+            let is_apart = right <= *l || *r <= left || bottom <= *t || *b <= top;
+            assert!(is_apart, "{what}: \"{one}\" and \"{other}\" overlap");
         }
     }
 }
@@ -121,9 +118,8 @@ fn texts_of_all_charts_are_free() {
         let read = solver::read(&path, None, &Selection::all()).unwrap();
         let histories: Vec<_> = read.histories.iter().take(20).collect();
         let units = Some(UnitSystem::parse("mm-t-s").unwrap());
-        for options in [HistoryOptions { units, filter_class: Some(60) }, HistoryOptions::default()]
-        {
-            check(&charts::histories(file, &histories, options).unwrap(), file);
+        for (units, class) in [(units, Some(60)), (None, None)] {
+            check(&charts::histories(file, &histories, units, class).unwrap(), file);
         }
     }
 }
@@ -194,7 +190,7 @@ fn extreme_values_are_drawn() {
 fn every_kind_of_file_is_drawn() {
     let folder = demo_folder();
     let folder = folder.path();
-    crumple_ok(folder, &["simulate", "scenario.toml", "-o", "result.csv"]);
+    crumple_ok(folder, "simulate scenario.toml -o result.csv");
     for (arguments, texts) in [
         ("curves.h5 --group lead-car-wall", &["FE at 72 km/h", "deflection [m]", "force [MN]"][..]),
         (
@@ -339,7 +335,7 @@ fn curve_files_are_drawn() {
         assert!(picture.contains("deflection") && picture.contains("<path"), "{file}");
     }
     std::fs::write(here.join("notes"), "no\nnumbers\n").unwrap();
-    let error = crumple_fails(here, 1, &["plot", "notes", "-o", "n.svg"]);
-    assert!(error.contains("no solver output is recognised"), "{error}");
-    assert!(error.contains("as a curve: notes: the format of this file"), "{error}");
+    let error = crumple_fails(here, 1, "plot notes -o n.svg");
+    says(&error, "no solver output is recognised");
+    says(&error, "as a curve: notes: the format of this file");
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use crate::common::{crumple_fails, crumple_in, crumple_ok, fixture};
+use crate::common::{crumple_fails, crumple_in, crumple_ok, fixture, says};
 use serde_json::Value;
 
 /// Writes a table of `time` and `value` over samples of 1 ms.
@@ -135,20 +135,20 @@ fn units_and_factors_are_those_of_the_arguments() {
     write(here, "ms.csv", "time [ms],a_mm", 200, |t| {
         format!("{:?},{:?}", t * 1e3, -1e3 * pulse(t))
     });
-    let error = crumple_fails(here, 1, &["rate", "a.csv", "ms.csv"]);
+    let error = crumple_fails(here, 1, "rate a.csv ms.csv");
     assert_eq!(
         error,
         "error: ms.csv: line 1, column 1 (\"time [ms]\"): expected a time in s: write ms.csv,time=ms\n"
     );
     write(here, "us.csv", "Time [µS],a", 200, |t| format!("{:?},{:?}", t * 1e6, pulse(t)));
-    let error = crumple_fails(here, 1, &["rate", "a.csv", "us.csv"]);
-    assert!(error.contains("expected a time in s: write us.csv,time=us"), "{error}");
+    let error = crumple_fails(here, 1, "rate a.csv us.csv");
+    says(&error, "expected a time in s: write us.csv,time=us");
     let of = rate(here, &["a.csv", "ms.csv,scale=-1e-3,time=ms"]);
     assert!(of["l1_ratio"].as_f64().unwrap() < 1e-12, "{of}");
     assert_eq!(of["quantity"], "other", "only one name says acceleration");
     // Nothing in this header tells the unit.
     write(here, "t.csv", "t,a", 200, |t| format!("{:?},{:?}", t * 1e3, pulse(t)));
-    let error = crumple_fails(here, 1, &["rate", "a.csv", "t.csv"]);
+    let error = crumple_fails(here, 1, "rate a.csv t.csv");
     assert_eq!(
         error,
         "error: a.csv lasts 0.199 s and t.csv 199 s, if both count time in s: write the unit of each after its name, such as a.csv,time=s and t.csv,time=ms\n"
@@ -156,8 +156,11 @@ fn units_and_factors_are_those_of_the_arguments() {
     let said = ["a.csv,time=s", "t.csv,time=ms"];
     assert!(rate(here, &said)["l1_ratio"].as_f64().unwrap() < 1e-12);
     // Both in ms: nothing compares them, but a filter sees it.
-    let error = crumple_fails(here, 1, &["rate", "t.csv", "t.csv", "--cfc", "60"]);
-    assert!(error.contains("it lasts 199 s, so its times may be in ms: then write ,time=ms after the file's name; else use a lower class"), "{error}");
+    let error = crumple_fails(here, 1, "rate t.csv t.csv --cfc 60");
+    says(
+        &error,
+        "it lasts 199 s, so its times may be in ms: then write ,time=ms after the file's name; else use a lower class",
+    );
     let both = rate(here, &["t.csv,time=ms", "t.csv,time=ms", "--cfc", "60"]);
     assert_eq!(both["to_s"], 0.199);
 }
@@ -182,13 +185,13 @@ fn histories_of_other_programs() {
     assert_eq!(of["quantity"], "acceleration", "the title says so");
     is_tenth(&rate(here, &["a.crv", "a.csv:B900002"]));
     is_tenth(&rate(here, &["a.crv:A-1", "a.cur,time=ms"]));
-    let error = crumple_fails(here, 1, &["rate", "a.crv", "a.cur"]);
-    assert!(error.contains("a.cur: line 2, column 1 (\"Time <TIME/0.001>;\"): expected a time in s: write a.cur,time=ms"), "{error}");
-    let error = crumple_fails(here, 1, &["rate", "a.csv", "a.cur"]);
-    assert!(
-        error.contains("name one of \"A900001\", \"B900002\" after the file's name: a.csv:COLUMN"),
-        "{error}"
+    let error = crumple_fails(here, 1, "rate a.crv a.cur");
+    says(
+        &error,
+        "a.cur: line 2, column 1 (\"Time <TIME/0.001>;\"): expected a time in s: write a.cur,time=ms",
     );
+    let error = crumple_fails(here, 1, "rate a.csv a.cur");
+    says(&error, "name one of \"A900001\", \"B900002\" after the file's name: a.csv:COLUMN");
     // Whatever its name says.
     std::fs::rename(here.join("a.crv"), here.join("a")).unwrap();
     is_tenth(&rate(here, &["a", "a.cur,time=ms"]));
@@ -274,13 +277,8 @@ fn wrong_input_says_where_and_what_to_do() {
         2,
         "invalid value 'a.csv,scale=0' for '<A>': \"0\" is not a factor",
     );
-    let error = crumple_fails(here, 1, &["rate", "a.csv", "note"]);
-    assert!(
-        error.contains(
-            "a CSV file has the extension .csv, or its column after its name: note:COLUMN"
-        ),
-        "{error}"
-    );
+    let error = crumple_fails(here, 1, "rate a.csv note");
+    says(&error, "a CSV file has the extension .csv, or its column after its name: note:COLUMN");
     t(
         &["a.csv", "a.csv", "--cfc=1000"],
         1,
@@ -311,7 +309,7 @@ fn degenerate_and_long_signals_are_rated() {
     let here = folder.path();
     write(here, "zero.csv", "t,v", 100, |t| format!("{t:?},0"));
     write(here, "one.csv", "t,v", 50, |t| format!("{t:?},1"));
-    let text = crumple_in(here, &["rate", "zero.csv", "one.csv", "--json", "--strict"]);
+    let text = crumple_in(here, "rate zero.csv one.csv --json --strict");
     assert_eq!(text.status.code(), Some(3), "a warning");
     let of: Value = serde_json::from_slice(&text.stdout).unwrap();
     assert_eq!((&of["l1_ratio"], &of["samples"]), (&Value::Null, &491.into()));

@@ -19,13 +19,13 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
+use crate::clock;
 use crate::curve::from_table::IMPORTED;
 use crate::curve::{Case, Origin};
 use crate::database::{CasePath, Database};
 use crate::error::{Error, ErrorCode, error};
-use crate::file::{WriterLock, is_file};
-use crate::study::{LocatedRun, Study};
-use crate::{clock, file, study};
+use crate::file::{self, WriterLock, is_file};
+use crate::study::{self, LocatedRun, Study};
 
 const LISTED: usize = 3;
 

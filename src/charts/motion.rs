@@ -280,26 +280,20 @@ pub fn train_speeds(title: &str, comparison: &TrainComparison) -> Chart {
     Chart::row(title, panels.collect())
 }
 
-/// How histories are shown.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct HistoryOptions {
-    /// The file's units; without them, numbers stand as in the file.
-    pub units: Option<UnitSystem>,
-    /// Channel frequency class of SAE J211-1, such as 60, for additional filtered lines.
-    pub filter_class: Option<u32>,
-}
-
 /// Maximum number of lines of a chart.
 const MOST: usize = 24;
 
-/// Histories over time; quantities of different components are in panels side by side.
+/// Histories over time; quantities of different components are in panels side by side. Without
+/// `units`, numbers stand as in the file; a channel frequency class of SAE J211-1, such as 60, adds
+/// filtered lines.
 ///
 /// # Errors
 /// For none or more than 24 histories, or samples that the filter does not take.
 pub fn histories(
     title: &str,
     histories: &[&History],
-    options: HistoryOptions,
+    units: Option<UnitSystem>,
+    filter_class: Option<u32>,
 ) -> Result<Chart, Error> {
     if histories.is_empty() {
         return Err(error!(Plot, "there is no history: give other ids or components"));
@@ -312,7 +306,7 @@ pub fn histories(
             most = MOST
         ));
     }
-    if options.filter_class.is_some() && options.units.is_none() {
+    if filter_class.is_some() && units.is_none() {
         return Err(error!(Plot, "a CFC filter needs the unit of time: give the file's units"));
     }
     let mut components: Vec<&str> = Vec::new();
@@ -324,10 +318,10 @@ pub fn histories(
     let mut panels = Vec::new();
     for component in components {
         let of_component = || histories.iter().filter(|h| &*h.component == component);
-        let (time, value) = axes(component, options.units, of_component().flat_map(|h| &h.values));
+        let (time, value) = axes(component, units, of_component().flat_map(|h| &h.values));
         let mut panel = Panel::new(time, value);
         for history in of_component() {
-            add(&mut panel, history, options)?;
+            add(&mut panel, history, filter_class.zip(units))?;
         }
         panels.push(panel);
     }
@@ -374,12 +368,16 @@ fn axes<'a>(
     (time, Axis { scale: value.scale * si, ..value })
 }
 
-fn add(panel: &mut Panel, history: &History, options: HistoryOptions) -> Result<(), Error> {
+fn add(
+    panel: &mut Panel,
+    history: &History,
+    filter: Option<(u32, UnitSystem)>,
+) -> Result<(), Error> {
     let entity = history.entity.map_or_else(|| "whole model".to_string(), |e| e.to_string());
     let time = history.time.to_vec();
     let look = panel.series.len();
     panel.series.push(Series::line(&entity, look, time.clone(), history.values.clone()));
-    let (Some(class), Some(units)) = (options.filter_class, options.units) else { return Ok(()) };
+    let Some((class, units)) = filter else { return Ok(()) };
     let time_s: Vec<f64> = time.iter().map(|t| t * units.time_s).collect();
     let filtered = cfc::filter(class, &time_s, &history.values).map_err(|source| {
         error!(Plot, "{history}: {source}", history = entity).caused_by(source)
@@ -409,10 +407,10 @@ mod tests {
             found = MOST + 1,
             most = MOST
         );
-        assert_eq!(histories("", &all, HistoryOptions::default()), Err(most));
-        assert!(histories("", &all[1..], HistoryOptions::default()).is_ok());
+        assert_eq!(histories("", &all, None, None), Err(most));
+        assert!(histories("", &all[1..], None, None).is_ok());
         assert_eq!(
-            histories("", &[], HistoryOptions::default()),
+            histories("", &[], None, None),
             Err(error!(Plot, "there is no history: give other ids or components"))
         );
     }

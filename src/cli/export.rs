@@ -3,18 +3,13 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::arguments::{FORCES, MAX_CRUSH_RULES, one_of, units};
-use super::curve_file::CurveFile;
-use super::curve_file::FileKind;
+use super::arguments::{self, CurveFile, FORCES, FileKind, MAX_CRUSH_RULES, one_of, units};
 use super::export_input::Input;
-use super::{
-    CommandResult, Failure, GlobalOptions, arguments, keep_input, output, usage, usage_error,
-};
+use super::{CommandResult, Failure, GlobalOptions, keep_input, output, usage, usage_error};
 use crate::curve::{ForceKind, Parameter, Tail};
 use crate::error::Error;
 use crate::file::{not_written, write_all_whole};
-use crate::formats;
-use crate::formats::{Exported, FORMATS, Format, Material, Options};
+use crate::formats::{self, Exported, FORMATS, Format, Material, Options};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{PredictedCurve, Query};
 use crate::unit::UnitSystem;

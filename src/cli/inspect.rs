@@ -1,19 +1,17 @@
 //! `crumple inspect`: what a solver file, a deck or a file of crumple holds.
 
 use std::fmt::Display;
-use std::io;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
 use super::{CommandResult, Failure, GlobalOptions, Outcome, failed_at, output};
 use crate::error::Error;
-use crate::solver;
-use crate::solver::decks::Search;
-use crate::solver::lsdyna::deck::Deck;
+use crate::solver::decks::{self, Search};
+use crate::solver::lsdyna::deck::{Deck, DeckEntity};
 use crate::solver::runs::{output_files, run_folders};
-use crate::solver::{Access, Selection, SolverFile, Value, decks};
+use crate::solver::{self, Access, Selection, SolverFile, Value};
 use crate::table::Table;
 
 /// Show what solver files hold: format, version, entities, components, states, damage
@@ -285,7 +283,7 @@ pub(super) fn deck_document(
         titles_from if_any: titles_from.map(|(path, _)| path.display().to_string()),
         titles if_any: titles_from.map(|(_, count)| count),
         units if_any: deck.and_then(|deck| Some(deck.units.as_ref()?.text.trim())),
-        impact_speed if_any: deck.and_then(|deck| Some(deck.impact_speed()?.speed)),
+        impact_speed if_any: deck.and_then(|deck| Some(deck.impact_speed()?.0)),
         outputs if_any: deck.map(|deck| &deck.outputs),
         history_nodes if_any: deck.map(|deck| &deck.history_nodes),
         contacts if_any: deck.map(|deck| &deck.contacts),
@@ -300,8 +298,7 @@ pub(super) fn print_deck(out: &mut dyn Write, deck: &Deck) -> io::Result<()> {
     if let Some(units) = &deck.units {
         writeln!(out, "  units       {}", units.text.trim())?;
     }
-    if let Some(impact) = deck.impact_speed() {
-        let speed = impact.speed;
+    if let Some((speed, _)) = deck.impact_speed() {
         writeln!(out, "  speed       {speed} (initial velocity, in the deck's units)")?;
     }
     let outputs: Vec<String> = deck
@@ -312,18 +309,11 @@ pub(super) fn print_deck(out: &mut dyn Write, deck: &Deck) -> io::Result<()> {
     if !outputs.is_empty() {
         writeln!(out, "  outputs     {}", outputs.join(", "))?;
     }
-    list(out, "nodes", deck.history_nodes.iter().map(|node| titled(node.id, &node.title)))?;
+    list(out, "nodes", deck.history_nodes.iter().map(titled_entity))?;
     for (what, interfaces) in [("contacts", &deck.contacts), ("walls", &deck.rigid_walls)] {
-        list(
-            out,
-            what,
-            interfaces.iter().map(|of| match of.id {
-                Some(id) => titled(id, &of.title),
-                None => titled("(no id)", &of.title),
-            }),
-        )?;
+        list(out, what, interfaces.iter().map(titled_entity))?;
     }
-    list(out, "parts", deck.parts.iter().map(|part| titled(part.id, &part.title)))?;
+    list(out, "parts", deck.parts.iter().map(titled_entity))?;
     let parameters = deck.parameters.iter().map(|(name, value)| match value {
         Value::Real(value) => format!("{name} = {value:?}"),
         Value::Integer(value) => format!("{name} = {value}"),
@@ -336,6 +326,10 @@ pub(super) fn print_deck(out: &mut dyn Write, deck: &Deck) -> io::Result<()> {
         writeln!(out, "  include     {}{missing}", include.name)?;
     }
     Ok(())
+}
+
+fn titled_entity(of: &DeckEntity) -> String {
+    titled(of.id.map_or("(no id)".into(), |id| id.to_string()), &of.title)
 }
 
 pub(super) fn titled(id: impl Display, title: &Option<String>) -> String {

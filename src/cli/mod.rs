@@ -8,7 +8,6 @@ mod output;
 mod arguments;
 mod build;
 mod compare;
-mod curve_file;
 mod db;
 mod demo;
 mod export;
@@ -35,13 +34,12 @@ use std::process::ExitCode;
 #[cfg(unix)]
 use std::sync::Arc;
 
-use crate::database;
 use crate::error::ErrorCode;
 use crate::failure::{self, DONE, DONE_WITH_WARNINGS, ErrorDocument, FAILED, USAGE};
 use crate::file::{self, is_same};
-use crate::solver;
+use crate::{database, solver};
+use arguments::FileKind;
 use clap::{FromArgMatches, Parser, Subcommand};
-use curve_file::FileKind;
 use serde::Serialize;
 
 #[derive(Parser)]

@@ -4,8 +4,7 @@
 
 use std::borrow::Cow;
 use std::error::Error;
-use std::io;
-use std::io::{BufWriter, IsTerminal, Write};
+use std::io::{self, BufWriter, IsTerminal, Write};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};

@@ -1,19 +1,16 @@
 //! `crumple simulate`: the multi-body run of a scenario, also as an ISO-MME folder with a channel per history.
 
-use std::io;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value, json};
 
-use super::curve_file::FileKind;
+use super::arguments::FileKind;
 use super::{CommandResult, Failure, GlobalOptions, is_stdout, keep_inputs, output, usage};
 use crate::file::{not_written, write_all_whole, write_whole};
 use crate::formats::iso_mme::{Channel, Test, folder, interval_s, object};
 use crate::multibody::{BodyHistory, Ledger, Run};
-use crate::scenario;
-use crate::scenario::Prepared;
-use crate::scenario::summary::{Limits, Summary};
+use crate::scenario::{self, Limits, Prepared, Summary};
 use crate::table::Table;
 use crate::unit::{Shown, km_per_h};
 

@@ -14,8 +14,7 @@ use crate::surrogate::{MODELS, ModelKind, WarningCode};
 use crate::unit::{Shown, SpeedKind, km_per_h};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
-use super::arguments::one_of;
-use super::curve_file::FileKind;
+use super::arguments::{FileKind, one_of};
 use super::output::Bar;
 use super::validate::print_validation;
 use super::{CommandResult, Failure, GlobalOptions, keep_input, usage};

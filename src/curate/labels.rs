@@ -5,8 +5,7 @@ use std::path::Path;
 
 use super::Selection;
 use crate::curve::Case;
-use crate::database;
-use crate::database::{CasePath, Database};
+use crate::database::{self, CasePath, Database};
 use crate::error::{Error, error};
 use crate::file::WriterLock;
 

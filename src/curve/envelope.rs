@@ -132,7 +132,7 @@ impl Envelope {
 
     /// The deflection at which the envelope has absorbed `energy_j`; beyond its end the
     /// last force holds. `None` if it never does.
-    pub fn deflection_for_work(&self, energy_j: f64) -> Option<f64> {
+    pub(crate) fn deflection_for_work(&self, energy_j: f64) -> Option<f64> {
         let end = self.work_j.len() - 1;
         match self.work_j.iter().position(|&w| w >= energy_j) {
             Some(0) => Some(0.0),

@@ -15,7 +15,6 @@ pub(crate) mod recipe;
 pub(crate) mod replicates;
 pub(crate) mod retrace;
 pub(crate) mod stopped_mass;
-pub(crate) mod tail;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -27,15 +26,15 @@ use crate::unit::{Speed, UnitSystem};
 pub use body::BodyMotion;
 pub use energy::audit;
 pub use envelope::Envelope;
-pub use extract::{DeckSpeed, StatedContact};
-pub use extract::{ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract};
-pub use force_curve::{CurveUnloading, ForceCurve};
+pub use extract::{
+    ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, StatedContact, extract,
+};
+pub use force_curve::{CurveUnloading, ForceCurve, Tail};
 pub use from_table::from_table;
 pub use loading::{Loading, unloading_stiffness};
 pub use recipe::{Filter, ForceSource, Recipe, RecordedMotion, Sampling};
 pub use retrace::{Impact, Table};
 pub(crate) use stopped_mass::StoppedMass;
-pub use tail::Tail;
 
 /// A force–deflection history: what one run measured at an interface.
 ///
@@ -126,7 +125,6 @@ impl ForceKind {
         }
     }
 
-    /// The kind of that name.
     pub(crate) fn parse(name: &str) -> Option<Self> {
         [Self::Contact, Self::Body].into_iter().find(|kind| kind.name() == name)
     }

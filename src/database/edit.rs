@@ -6,16 +6,15 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::Path;
 use std::{fmt, fs};
 
-use super::group::GROUP_ATTRIBUTES;
+use super::group::{self, GROUP_ATTRIBUTES};
 use super::layout::{
-    BODY_FORCE, CASE_ATTRIBUTES, Content, FoundGroup, ORIGINAL, Opened, ROOT, VERSION,
+    self, BODY_FORCE, CASE_ATTRIBUTES, Content, FoundGroup, ORIGINAL, Opened, ROOT, VERSION,
 };
-use super::{CasePath, Database, group, layout};
+use super::{CasePath, Database};
 use crate::curve::Case;
 use crate::error::{Error, error};
 use crate::file::write_by_path;
-use crate::hdf5;
-use crate::hdf5::{AttrValue, Dataset, File, FileAccessProperties, FileLocking, Group};
+use crate::hdf5::{self, AttrValue, Dataset, File, FileAccessProperties, FileLocking, Group};
 
 /// Writes a database over the file at `path` with all objects of other programs in it, which is
 /// `before`: into a copy of the file, in which only what differs is changed, and which then takes

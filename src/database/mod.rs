@@ -52,9 +52,7 @@ pub struct Database {
 /// A case by its names; no name has a `/`.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct CasePath {
-    /// Its group.
     pub group: String,
-    /// Its name in the group.
     pub name: String,
 }
 
@@ -97,7 +95,7 @@ impl Database {
     /// # Errors
     /// As for [`Database::read`] and [`Database::group_or_only`], and if the
     /// group has no such case.
-    pub fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, Error> {
+    pub(crate) fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, Error> {
         let opened = layout::open(path)?;
         if let Some((group, found)) = opened.find(group, case) {
             let FoundCase { case, hashes, .. } = opened.case(&group, case, &found)?;
@@ -138,7 +136,7 @@ impl Database {
     /// # Errors
     /// It lists the groups there are;
     /// `path` is for the message.
-    pub fn group_or_only<'a>(
+    pub(crate) fn group_or_only<'a>(
         &'a self,
         path: &Path,
         asked: Option<&str>,

@@ -6,10 +6,9 @@
 pub(crate) mod skeleton;
 pub(crate) mod table;
 
-use std::fs;
-use std::io;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
+use std::{fs, io};
 
 use crate::file;
 pub(crate) use hdf5_pure::{

@@ -227,7 +227,6 @@ impl Table {
         Ok(Column { name: name.into(), values, rows })
     }
 
-    /// An attribute of the file, if it has it.
     pub(crate) fn attribute(&self, name: &str) -> Result<Option<Attribute>, Error> {
         let all = self.file.root().attrs();
         self.fault.check().map_err(|source| Error::io(&self.path, source))?;
@@ -241,7 +240,6 @@ impl Table {
         })
     }
 
-    /// Bytes of `rows` values of a column from `row` on.
     pub(crate) fn read(&self, column: usize, row: u64, rows: u64) -> Result<Vec<u8>, Error> {
         let name = &self.columns[column].name;
         let bytes = rows.saturating_mul(self.columns[column].values.size() as u64);

@@ -28,7 +28,6 @@ mod genetic;
 mod law;
 mod motion;
 mod simplex;
-mod spread;
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -37,10 +36,9 @@ use crate::error::{Error, error};
 use crate::signal::l1_ratio;
 use crate::stream::Stream;
 use genetic::{Genes, Scales};
-pub use law::{Nsdm, PiecewiseLinear};
+pub use law::{Identifiability, LawSpread, Nsdm, PiecewiseLinear, Range};
 pub use motion::Motion;
 use motion::Steps;
-pub use spread::{Identifiability, LawSpread, Range};
 
 /// Bounds of the stiffness at its nodes, in N/m; searched evenly in the logarithm.
 pub const STIFFNESS_N_PER_M: [f64; 2] = [1e5, 1e8];

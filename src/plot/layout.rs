@@ -1,7 +1,8 @@
 //! Places a chart: margins from the measured texts, axes, series, marks, legend, notes.
 
-use super::chart::{Axis, Chart, Mark, Panel, Shown};
-use super::drawing::{Drawing, Paint, PanelPlace, Shape, Shows, Stroke, Text};
+use super::chart::{
+    Axis, Chart, Drawing, Mark, Paint, Panel, PanelPlace, Shape, Shown, Shows, Stroke, Text,
+};
 use super::ticks::{self, Ticks};
 use super::{font, style, thin};
 

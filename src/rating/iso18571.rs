@@ -9,7 +9,6 @@ use crate::signal::derivative;
 
 /// Largest phase error that has a score, as a share of the samples; nothing is shifted further.
 const PHASE_ERROR: f64 = 0.2;
-/// Magnitude error at which the score is zero.
 const MAGNITUDE_ERROR: f64 = 0.5;
 /// Slope error at which the score is zero.
 const SLOPE_ERROR: f64 = 2.0;

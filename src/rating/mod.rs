@@ -25,7 +25,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub(crate) mod cora;
 pub(crate) mod deceleration;
 pub(crate) mod differences;
 pub(crate) mod iso18571;
@@ -37,17 +36,14 @@ use serde::Serialize;
 use crate::error::Error;
 use crate::signal::l1_ratio;
 use crate::signal::peaks::{MatchedPeak, matched_peaks};
-pub(crate) use cora::Cora;
-use cora::cora;
 pub(crate) use deceleration::Deceleration;
-pub(crate) use differences::{MagnitudePhase, MaxAbs, Pointwise};
+pub(crate) use differences::{Cora, MagnitudePhase, MaxAbs, Pointwise};
 use differences::{
-    integral_error, max_abs, peak_norm, pointwise, rms_ratio, russell, sprague_geers,
+    cora, integral_error, max_abs, peak_norm, pointwise, rms_ratio, russell, sprague_geers,
 };
 pub(crate) use iso18571::Iso18571;
 use iso18571::iso18571;
-pub(crate) use signal::Signal;
-pub(crate) use signal::{INTERVAL_S, Pair};
+pub(crate) use signal::{INTERVAL_S, Pair, Signal};
 
 /// What two signals are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]

@@ -208,7 +208,7 @@ pub enum NoDataReason {
 /// What a solver file holds: its own description, the selected histories, its damage.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SolverFile {
-    /// Name of the format, one of [`FORMATS`](super::FORMATS).
+    /// Name of the format, one of [`formats`](super::formats).
     pub format: &'static str,
     /// Section of a binary file; of a text file its format's name.
     pub section: String,

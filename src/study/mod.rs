@@ -6,8 +6,6 @@
 mod check;
 pub(crate) mod extract;
 pub(crate) mod files;
-mod locate;
-mod read;
 
 use std::path::{Path, PathBuf};
 
@@ -17,9 +15,8 @@ use crate::error::{Document, Error, KeyPath};
 use crate::file::absolute;
 use crate::manifest as toml_file;
 use crate::unit::SpeedKind;
-pub(crate) use check::Manifest;
-pub(crate) use check::{RunEntry, StudyKind};
-pub(crate) use locate::LocatedRun;
+pub(crate) use check::{Manifest, RunEntry, StudyKind};
+pub(crate) use files::LocatedRun;
 
 /// A manifest that makes sense, and where it stands.
 #[derive(Clone, Debug)]

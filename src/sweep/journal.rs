@@ -3,20 +3,18 @@
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
-use std::fs::{File, OpenOptions};
-use std::io::{BufReader, BufWriter, Read, Seek, SeekFrom, Write};
+use std::fs::{self, File, OpenOptions};
+use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::{fs, io};
 
 use super::row::{ShardFile, ShardHeader, read_line};
-use super::run::Chunk;
+use super::run::{self, Chunk};
 use super::statistics::Tally;
-use super::to_hdf5::is_hdf5;
-use super::{Report, Shard, Sweep, foreign, run, to_hdf5};
+use super::to_hdf5::{self, is_hdf5};
+use super::{Report, Shard, Sweep, foreign};
 use crate::error::{Error, error};
-use crate::file;
-use crate::file::{WriterLock, accepts_changed, not_written, target_of, write_by_path};
+use crate::file::{self, WriterLock, accepts_changed, not_written, target_of, write_by_path};
 
 /// How a sweep is written.
 #[derive(Clone, Copy, Debug)]

@@ -36,8 +36,7 @@ use crate::manifest;
 use crate::multibody::Chain;
 use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName, Spread};
 use crate::scenario::{self, CheckedScenario, Prepared, Scenario, Sources};
-pub use journal::merge;
-pub use journal::{WriteOptions, write, write_rows};
+pub use journal::{WriteOptions, merge, write, write_rows};
 pub use run::Chunk;
 pub(crate) use statistics::ColumnStatistics;
 use variables::Variable;
@@ -54,7 +53,7 @@ pub struct Shard {
 
 impl Shard {
     /// The whole sweep.
-    pub const WHOLE: Self = Self { index: 1, count: 1 };
+    pub(crate) const WHOLE: Self = Self { index: 1, count: 1 };
 
     /// Shard `index` of `count`, counted from 1.
     pub fn new(index: u64, count: u64) -> Option<Self> {

@@ -6,8 +6,7 @@ use crate::curate;
 use crate::curve::Case;
 use crate::database::Database;
 
-use super::Chosen;
-use super::{CommandResult, GlobalOptions, Outcome};
+use super::{Chosen, CommandResult, GlobalOptions, Outcome};
 
 /// Cases, and the folder for their tables.
 #[derive(clap::Args)]

@@ -1,8 +1,7 @@
 //! `crumple db ls`: groups and cases by speed; what lists and documents say of one case.
 
 use std::collections::BTreeMap;
-use std::io;
-use std::io::Write;
+use std::io::{self, Write};
 use std::path::PathBuf;
 
 use serde::Serialize;

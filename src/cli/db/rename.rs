@@ -4,8 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::list::{case_row, print_group};
 use super::{Chosen, CommandResult, GlobalOptions, Outcome, usage};
-use crate::curate;
-use crate::curate::{Labels, Selection};
+use crate::curate::{self, Labels, Selection};
 use crate::database::CasePath;
 use crate::plural::counted;
 

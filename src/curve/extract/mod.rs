@@ -122,7 +122,6 @@ pub(crate) fn curve_of(
     })
 }
 
-/// Filters the record's force.
 fn filter(class: u32, record: &mut Record) -> Result<Notes, ExtractError> {
     let mut remarks = Notes::default();
     let filtered = cfc::filter(class, &record.time_s, &record.force_n)?;
@@ -246,23 +245,15 @@ pub struct Setup<'a> {
     pub masses: Masses,
     /// Of the run, if the manifest gives it.
     pub manifest_speed_m_per_s: Option<f64>,
-    /// Of the run, if its deck gives it.
-    pub deck_speed: Option<DeckSpeed>,
+    /// Of the run in m/s, if its deck gives it, of half a model the closing speed; with the name of the
+    /// deck and the line of the velocity in it.
+    pub deck_speed: Option<(f64, String)>,
     /// Share of the peak force above which a record is in contact.
     pub contact_threshold: f64,
     /// Settings of the record in the run's entry.
     pub stated: Stated,
     /// Names and speeds of the study's other runs, to name what was mistaken for what.
     pub others: &'a [(String, f64)],
-}
-
-/// The impact speed of a run's deck.
-#[derive(Clone, Debug, PartialEq)]
-pub struct DeckSpeed {
-    /// In m/s; of half a model the closing speed.
-    pub m_per_s: f64,
-    /// Name of the deck and line of the velocity in it.
-    pub place: String,
 }
 
 /// What a run's entry states of its record, in the place of what would be found in it.

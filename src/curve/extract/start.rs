@@ -1,11 +1,10 @@
 //! Start of contact in a record, the record from there on (time and deflection count from it), and the impact speed.
 
-use super::Notes;
 use super::error::ExtractError;
 use super::record::{Record, impulse};
-use super::{Setup, StatedContact};
-use crate::curve::contact::milliseconds;
-use crate::curve::{Curve, ForceKind, contact, loading};
+use super::{Notes, Setup, StatedContact};
+use crate::curve::contact::{self, milliseconds};
+use crate::curve::{Curve, ForceKind, loading};
 use crate::unit::{Shown, Speed, km_per_h};
 
 /// A beginning of the crush, as a share of it, that brings less than this share of the impulse
@@ -340,7 +339,7 @@ impl ImpactSpeed {
             (Some(speed), _) => (speed, SpeedBy::Manifest, "manifest's"),
             (None, Some(speed)) => (speed, SpeedBy::Record, "record's"),
             (None, None) => match &setup.deck_speed {
-                Some(deck) => (deck.m_per_s, SpeedBy::Deck, "deck's"),
+                Some((deck, _)) => (*deck, SpeedBy::Deck, "deck's"),
                 None => {
                     let component = record.missing_velocity.clone().unwrap_or_default();
                     return Err(ExtractError::NoSpeed { component });
@@ -349,7 +348,7 @@ impl ImpactSpeed {
         };
         let deck = setup.deck_speed.as_ref();
         let of_record = recorded.map(|v| ("the record".to_string(), v));
-        let of_deck = deck.map(|d| (format!("the deck {}", d.place), d.m_per_s));
+        let of_deck = deck.map(|(speed, place)| (format!("the deck {place}"), *speed));
         for (who, other) in of_record.into_iter().chain(of_deck) {
             if differ(m_per_s, other) {
                 remarks.warn(format!(
@@ -363,11 +362,9 @@ impl ImpactSpeed {
             (SpeedBy::Record, _) => {
                 remarks.note(format!("speed: {} taken from the record", km_per_h(m_per_s)));
             }
-            (SpeedBy::Deck, Some(deck)) => remarks.note(format!(
-                "speed: {} taken from the deck {}",
-                km_per_h(m_per_s),
-                deck.place
-            )),
+            (SpeedBy::Deck, Some((_, place))) => {
+                remarks.note(format!("speed: {} taken from the deck {place}", km_per_h(m_per_s)))
+            }
             _ => {}
         }
         if m_per_s > 0.0 {

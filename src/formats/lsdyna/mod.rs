@@ -37,7 +37,6 @@ impl InUnits {
         nine_digits(n / self.0.force())
     }
 
-    /// A stiffness in N/m.
     pub(super) fn stiffness(self, n_per_m: f64) -> f64 {
         n_per_m * self.0.length_m / self.0.force()
     }

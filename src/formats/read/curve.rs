@@ -242,21 +242,9 @@ pub(crate) enum Place {
     /// A whole line.
     Line(u64),
     /// A field of a line whose fields are separated.
-    Field {
-        /// The line.
-        line: u64,
-        /// The field.
-        field: usize,
-    },
+    Field { line: u64, field: usize },
     /// Columns of a line.
-    Columns {
-        /// The line.
-        line: u64,
-        /// The first column.
-        from: usize,
-        /// The last column.
-        to: usize,
-    },
+    Columns { line: u64, from: usize, to: usize },
     /// A byte of a binary file.
     Byte(usize),
     /// A row of a table or matrix.
@@ -281,7 +269,6 @@ pub(super) fn expected(place: Place, what: impl fmt::Display, found: &str) -> Er
     error!(CurveFile, "{place}: expected {what}, found \"{found}\"")
 }
 
-/// The number that a text is.
 pub(super) fn value(place: Place, text: &str) -> Result<f64, Error> {
     number(text).ok_or_else(|| expected(place, "a number", text))
 }

@@ -10,8 +10,7 @@ use std::path::{Path, PathBuf};
 
 use super::columns::{Columns, LISTED, Places, check_points, no_curve, several_curves};
 use super::curve::{CUT, Metadata, Place, ReadFile, expected, miscounted, shown, title, value};
-use super::encoding::decoded;
-use super::encoding::{lines, number};
+use super::encoding::{decoded, lines, number};
 use super::label::Quantity;
 use super::{Input, MAX_CURVE_BYTES};
 use crate::error::{Error, error};

@@ -19,24 +19,22 @@ mod layout;
 mod lsdyna;
 mod mat;
 mod modelica;
-mod modelica_package;
 mod radioss;
 mod table;
 mod tables;
 
 use crate::error::{Error, error};
+use crate::file;
 use crate::guess;
 use std::path::Path;
 
 use super::{MAX_CURVE_BYTES, MIN_POINTS};
 use crate::curve::{ForceCurve, ForceKind};
-use crate::file;
 use crate::surrogate::PredictedCurve;
 use crate::unit::UnitSystem;
 use columns::Columns;
-pub(crate) use curve::Metadata;
 pub use curve::ReadCurve;
-pub(crate) use curve::ReadFile;
+pub(crate) use curve::{Metadata, ReadFile};
 use label::Quantity;
 pub(crate) use tables::history;
 
@@ -99,8 +97,8 @@ pub const READERS: &[Reader] = &[
         name: "mo",
         extensions: &["mo"],
         description: "Modelica package that crumple export wrote",
-        recognise: modelica_package::recognise,
-        read: Read::Columns(modelica_package::read),
+        recognise: modelica::recognise_package,
+        read: Read::Columns(modelica::read_package),
     },
     Reader {
         name: "modelica",

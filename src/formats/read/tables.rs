@@ -3,8 +3,7 @@
 use super::Input;
 use super::columns::{Columns, Places, check_points, choose};
 use super::curve::{Metadata, Place, expected, shown, stated_units, title};
-use super::encoding::decoded;
-use super::encoding::lines;
+use super::encoding::{decoded, lines};
 use super::label::{Label, Quantity};
 use super::layout::layout;
 use super::table::{Fit, Purpose, Row, Table, check_last, is_pair};

@@ -8,8 +8,7 @@ mod contact;
 use super::law::{ForceLaw, Piece};
 use super::rows::{LANES, LaneIndex, Layout, Row, Rows, ahead, each, larger};
 pub(super) use contact::Move;
-use contact::Totals;
-use contact::{Contact, Stage};
+use contact::{Contact, Stage, Totals};
 
 /// Which state of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -18,13 +18,11 @@
 use std::collections::{HashMap, HashSet};
 use std::io;
 
-use super::line::{Line, Lines};
-use super::line::{legend_entry, version};
-use crate::solver::Format;
+use super::line::{Line, Lines, legend_entry, version};
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::{Source, Stream};
 use crate::solver::states::StateReader;
-use crate::solver::{NoDataReason, Selection, SolverFile, WithoutData};
+use crate::solver::{Format, NoDataReason, Selection, SolverFile, WithoutData};
 
 /// Names of tables, for messages, each with its components.
 pub(crate) type Tables = &'static [(&'static str, &'static [&'static str])];

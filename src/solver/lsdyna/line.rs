@@ -1,7 +1,6 @@
 //! Lines, columns, Fortran numbers and the header, common to all LS-DYNA ASCII files.
 
-use std::io;
-use std::io::BufRead;
+use std::io::{self, BufRead};
 
 use crate::solver::problem::Place;
 use crate::solver::source::Stream;

@@ -5,7 +5,7 @@
 //! entities of each table, unless its rows may come and go (eroded elements). Invariant:
 //! every kept history has one value per kept state.
 
-mod finish;
+pub(in crate::solver) mod finish;
 mod table;
 
 use std::sync::Arc;

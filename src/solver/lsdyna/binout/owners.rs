@@ -4,8 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::io;
 use std::sync::Arc;
 
-use super::records::Bytes;
-use super::records::{Component, DataRecord, LISTS, Section};
+use super::records::{Bytes, Component, DataRecord, LISTS, Section};
 use super::states::StateReader;
 use crate::history::{EntityId, Side};
 use crate::solver::problem::{Problem, ProblemCode};

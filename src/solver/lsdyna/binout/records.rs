@@ -5,8 +5,7 @@ use std::io;
 use std::ops::Range;
 use std::sync::Arc;
 
-use crate::solver::lsdyna::lsda;
-use crate::solver::lsdyna::lsda::{Event, Header, Kind, Payload, change_directory};
+use crate::solver::lsdyna::lsda::{self, Event, Header, Kind, Payload, change_directory};
 use crate::solver::problem::{Diagnostics, Problem, ProblemCode};
 use crate::solver::source::{Source, fill_at};
 
@@ -220,7 +219,6 @@ impl Section {
         self.component_index.get(name).map(|&index| &self.components[index])
     }
 
-    /// The time of a state.
     pub(crate) fn time_of(&self, state: usize) -> Option<&DataRecord> {
         self.component("time")?.records.get(&state)
     }

@@ -7,8 +7,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::owners::{Entities, MAX_ROWS, ordinals, row_name};
-use super::records::{Bytes, Scratch};
-use super::records::{Component, DataRecord, Section};
+use super::records::{Bytes, Component, DataRecord, Scratch, Section};
 use super::states::{Ids, StateReader};
 use crate::history::{EntityId, History};
 use crate::solver::Selection;

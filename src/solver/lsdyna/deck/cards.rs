@@ -1,12 +1,8 @@
 //! The cards of each kind of keyword: what names a run's parts and outputs, initial velocities, parameters, units.
 
-use super::card::{Card, Field, start, text};
-use super::contents::{
-    DeckInterface, DeckPlace, InitialVelocity, Output, Scope, StatedUnits, TitledEntity,
-};
-use super::context::{Block, Context, MAX_ENTRIES, Missing};
-use super::context::{Defined, Value};
-use super::keyword::Kind;
+use super::context::{Block, Context, Defined, MAX_ENTRIES, Missing, Value};
+use super::keyword::{Card, Field, Kind, start, text};
+use super::{DeckEntity, DeckPlace, InitialVelocity, Output, Scope, StatedUnits};
 use crate::solver::lsdyna::line::shown;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::unit::UnitSystem;
@@ -31,7 +27,7 @@ impl Context {
         if sets {
             self.keep(|deck| &mut deck.history_node_sets, id, "history node sets");
         } else {
-            let node = TitledEntity { id, title: None, at: self.at(card.place) };
+            let node = self.entity(id, None, card);
             self.keep(|deck| &mut deck.history_nodes, node, "history nodes");
         }
     }
@@ -42,9 +38,13 @@ impl Context {
         }
         let (field, title) = card.id_and_text();
         if let Some(id) = self.required_id(field) {
-            let node = TitledEntity { id, title, at: self.at(card.place) };
+            let node = self.entity(id, title, card);
             self.keep(|deck| &mut deck.history_nodes, node, "history nodes");
         }
+    }
+
+    fn entity(&self, id: i64, title: Option<String>, card: &Card<'_>) -> DeckEntity {
+        DeckEntity { id: Some(id), title, keyword: String::new(), at: self.at(card.place) }
     }
 
     pub(super) fn interface(
@@ -55,7 +55,7 @@ impl Context {
         id: Option<i64>,
         title: Option<String>,
     ) {
-        let interface = DeckInterface { id: id.filter(|&id| id != 0), title, keyword, at };
+        let interface = DeckEntity { id: id.filter(|&id| id != 0), title, keyword, at };
         if kind == Kind::Wall {
             self.keep(|deck| &mut deck.rigid_walls, interface, "rigid walls");
         } else {
@@ -77,8 +77,7 @@ impl Context {
                     block.ids[0] = self.required_id(card.field(0));
                 }
                 if let Some(id) = block.ids[0] {
-                    let part =
-                        TitledEntity { id, title: block.text.take(), at: self.at(card.place) };
+                    let part = self.entity(id, block.text.take(), card);
                     self.keep(|deck| &mut deck.parts, part, "parts");
                 }
             }

@@ -5,9 +5,8 @@ use std::collections::HashMap;
 
 use serde::Serialize;
 
-use super::card::{Field, start};
-use super::contents::{Deck, DeckPlace};
-use super::keyword::{Keyword, Kind};
+use super::keyword::{Field, Keyword, Kind, start};
+use super::{Deck, DeckPlace};
 use crate::solver::lsdyna::line;
 use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
 
@@ -120,7 +119,6 @@ impl Context {
         }
     }
 
-    /// The deck with its parameters and problems.
     pub(crate) fn finish(mut self) -> Deck {
         self.deck.parameters = self.parameters.list;
         self.deck.problems = self.problems.into_list();

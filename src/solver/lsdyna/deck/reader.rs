@@ -5,11 +5,9 @@ use std::io::{self, BufRead, Read};
 use std::rc::Rc;
 
 use super::super::line::{Line, Lines, shown};
-use super::card::{Card, start, text};
-use super::cards;
-use super::contents::{Deck, DeckInterface, Include, Scope};
 use super::context::{Block, Context, MAX_INCLUDES};
-use super::keyword::{Keyword, Kind, STANDARD, kind};
+use super::keyword::{Card, Keyword, Kind, STANDARD, kind, start, text};
+use super::{Deck, DeckEntity, Include, Scope, cards};
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::read_buffered;
 
@@ -251,7 +249,7 @@ fn number_interfaces(deck: &mut Deck) {
 
 /// Without ids the solver counts. How it counts through a mixture of kinds is not
 /// documented, so a mixture stays without.
-fn number_in_order(list: &mut [DeckInterface], kind: impl Fn(&str) -> Option<&'static str>) {
+fn number_in_order(list: &mut [DeckEntity], kind: impl Fn(&str) -> Option<&'static str>) {
     let Some(first) = list.first().and_then(|i| kind(&i.keyword)) else { return };
     if list.iter().all(|i| !has_id_card(&i.keyword) && kind(&i.keyword) == Some(first)) {
         for (id, interface) in (1..).zip(list) {

@@ -19,15 +19,16 @@ use std::io;
 
 use rayon::prelude::*;
 
-use super::rows::{Block, DENSE_READ, Wanted};
-use super::{COLUMN_LINE, Nodout, ROTATIONS, STATE, TABLES, TRANSLATIONS};
+use super::{
+    Block, COLUMN_LINE, DENSE_READ, Nodout, ROTATIONS, STATE, TABLES, TRANSLATIONS, Wanted,
+};
 use crate::history::EntityId;
 use crate::solver::lsdyna::ascii::{AsciiReader, Body};
 use crate::solver::lsdyna::line::Lines;
-use crate::solver::problem::Place;
+use crate::solver::problem::{self, Place};
 use crate::solver::source::{Source, Stream, Window};
 use crate::solver::states::{StateReader, TableId};
-use crate::solver::{Selection, SolverFile, problem};
+use crate::solver::{Selection, SolverFile};
 
 /// Values held while a batch of states waits to be handed on.
 const BATCH_VALUES: usize = 1 << 20;
