@@ -524,11 +524,8 @@ fn a_record_that_is_not_one_impact_is_refused() {
     assert!(taken.iter().any(|w| w.starts_with("accept_energy: displacement: from")), "{taken:?}");
     let window = format!("{CONTACT_RECIPE}\nsampling = {{ states = 100, interval_ms = 0.75 }}");
     let said = refused(&Run::read(48), &window, Stated::default());
-    assert!(
-        said.contains("ends 74.25 ms after contact, before the maximum crush at 126.")
-            && said.contains("raise states to 171 or more"),
-        "{said}"
-    );
+    says(&said, "ends 74.25 ms after contact, before the maximum crush at 126.");
+    says(&said, "raise states to 171 or more");
     let until = Stated { truncate_s: Some(0.07), ..Stated::default() };
     Run::read(48).extract_with(&window, until).unwrap();
     let coarse = format!("{CONTACT_RECIPE}\nsampling = {{ states = 50, interval_ms = 6.0 }}");

@@ -100,49 +100,29 @@ fn what_cannot_be_chosen_is_said_with_what_is_there() {
     let folder = two_groups();
     let here = folder.path();
     let before = fs::read(here.join("curves.h5")).unwrap();
-    fails(
-        here,
-        "db rm curves.h5 --case 36kmh",
-        "curves.h5: several groups have a case \"36kmh\": choose one with --group, or write lead-car-pair/36kmh or lead-car-wall/36kmh",
-    );
-    fails(
-        here,
-        "db rm curves.h5 --case 37kmh",
-        "curves.h5: there is no case \"37kmh\": there are lead-car-pair/36kmh (36 km/h), ",
-    );
-    fails(
-        here,
-        "db tag curves.h5 --add x --speed 90km/h.. --group lead-car-pair",
-        "no case has a speed of at least 90 km/h: there are lead-car-pair/36kmh (36 km/h), lead-car-pair/48kmh (48 km/h), lead-car-pair/60kmh (60 km/h), lead-car-pair/72kmh (72 km/h)",
-    );
-    fails(
-        here,
-        "db rm curves.h5 --tag odd --speed 30km/h..40km/h",
-        "no case has a speed of 30 km/h to 40 km/h and has the tag \"odd\"",
-    );
-    fails(
-        here,
-        "db copy curves.h5 --group wall --to-group x",
-        "there is no group \"wall\": it has lead-car-pair, lead-car-wall",
-    );
+    #[rustfmt::skip]
+    let cases = [
+        ("db rm curves.h5 --case 36kmh", "curves.h5: several groups have a case \"36kmh\": choose one with --group, or write lead-car-pair/36kmh or lead-car-wall/36kmh"),
+        ("db rm curves.h5 --case 37kmh", "curves.h5: there is no case \"37kmh\": there are lead-car-pair/36kmh (36 km/h), "),
+        ("db tag curves.h5 --add x --speed 90km/h.. --group lead-car-pair", "no case has a speed of at least 90 km/h: there are lead-car-pair/36kmh (36 km/h), lead-car-pair/48kmh (48 km/h), lead-car-pair/60kmh (60 km/h), lead-car-pair/72kmh (72 km/h)"),
+        ("db rm curves.h5 --tag odd --speed 30km/h..40km/h", "no case has a speed of 30 km/h to 40 km/h and has the tag \"odd\""),
+        ("db copy curves.h5 --group wall --to-group x", "there is no group \"wall\": it has lead-car-pair, lead-car-wall"),
+    ];
+    cases.into_iter().for_each(|(line, expected)| fails(here, line, expected));
     for command in ["rm", "copy --to-group x", "tag --add x", "note --add x"] {
         let (name, options) = command.split_once(' ').unwrap_or((command, ""));
         let line = format!("db {name} curves.h5 {options}");
         misused(here, line.trim(), "choose the cases to be");
     }
-    misused(
-        here,
-        "db rm curves.h5 --speed 40..50",
-        "speed \"40\" has no unit: write for example \"40km/h\"",
-    );
-    misused(here, "db rm curves.h5 --speed 50km/h..40km/h", "ends below its start");
-    misused(
-        here,
-        "db tag curves.h5 --group lead-car-wall",
-        "nothing to do: give --add, --remove or --clear",
-    );
-    misused(here, "db copy curves.h5 --group lead-car-wall", "name the destination with");
-    misused(here, "db rename curves.h5 --to x", "--group");
+    #[rustfmt::skip]
+    let cases = [
+        ("db rm curves.h5 --speed 40..50", "speed \"40\" has no unit: write for example \"40km/h\""),
+        ("db rm curves.h5 --speed 50km/h..40km/h", "ends below its start"),
+        ("db tag curves.h5 --group lead-car-wall", "nothing to do: give --add, --remove or --clear"),
+        ("db copy curves.h5 --group lead-car-wall", "name the destination with"),
+        ("db rename curves.h5 --to x", "--group"),
+    ];
+    cases.into_iter().for_each(|(line, expected)| misused(here, line, expected));
     fails(here, "db rm none.h5 --case x", "none.h5: No such file or directory");
     assert!(fs::read(here.join("curves.h5")).unwrap() == before);
     assert_eq!(entries(here), ["curves.h5"]);
@@ -196,27 +176,15 @@ fn cases_and_groups_get_other_names() {
         renamed.id.name = new.id.name.clone();
         assert!(renamed == *new, "{}", old.id.name);
     }
-    fails(
-        here,
-        "db rename curves.h5 --group nose --to lead-car-pair",
-        "there is a group \"lead-car-pair\" already: choose another name, or join them with crumple db copy --to-group",
-    );
-    fails(
-        here,
-        "db rename curves.h5 --group nose --case 12kmh --to 18kmh",
-        "group \"nose\" has a case \"18kmh\" already",
-    );
-    fails(
-        here,
-        "db rename curves.h5 --group nose --case 12kmh --to a/b",
-        "\"a/b\" is not a valid name for a case: it may not contain \"/\"",
-    );
-    fails(here, "db rename curves.h5 --group nose --to .", "\".\" is not a valid name for a group");
-    fails(
-        here,
-        "db rename curves.h5 --group nase --to x",
-        "there is no group \"nase\": it has lead-car-pair, nose",
-    );
+    #[rustfmt::skip]
+    let cases = [
+        ("db rename curves.h5 --group nose --to lead-car-pair", "there is a group \"lead-car-pair\" already: choose another name, or join them with crumple db copy --to-group"),
+        ("db rename curves.h5 --group nose --case 12kmh --to 18kmh", "group \"nose\" has a case \"18kmh\" already"),
+        ("db rename curves.h5 --group nose --case 12kmh --to a/b", "\"a/b\" is not a valid name for a case: it may not contain \"/\""),
+        ("db rename curves.h5 --group nose --to .", "\".\" is not a valid name for a group"),
+        ("db rename curves.h5 --group nase --to x", "there is no group \"nase\": it has lead-car-pair, nose"),
+    ];
+    cases.into_iter().for_each(|(line, expected)| fails(here, line, expected));
     assert!(ok(here, "db check curves.h5").contains("11 cases checked, 0 findings"));
 }
 
@@ -524,17 +492,13 @@ fn copies_go_to_groups_and_databases() {
         report["runs"].as_array().unwrap().iter().map(|r| r["outcome"].as_str().unwrap()).collect();
     assert_eq!(outcomes[..3], ["unchanged", "unchanged", "built"]);
     let into_itself = "the copy of lead-car-wall/12kmh would be lead-car-wall/12kmh itself";
-    fails(
-        here,
-        "db copy curves.h5 --case lead-car-wall/12kmh --to-group lead-car-wall",
-        into_itself,
-    );
-    fails(here, "db copy curves.h5 --case lead-car-wall/12kmh --to ./curves.h5", into_itself);
-    fails(
-        here,
-        "db copy curves.h5 --case inner/36kmh --to c.h5 --to-group a/b",
-        "\"a/b\" is not a valid name for a group",
-    );
+    #[rustfmt::skip]
+    let cases = [
+        ("db copy curves.h5 --case lead-car-wall/12kmh --to-group lead-car-wall", into_itself),
+        ("db copy curves.h5 --case lead-car-wall/12kmh --to ./curves.h5", into_itself),
+        ("db copy curves.h5 --case inner/36kmh --to c.h5 --to-group a/b", "\"a/b\" is not a valid name for a group"),
+    ];
+    cases.into_iter().for_each(|(line, expected)| fails(here, line, expected));
     assert!(!here.join("c.h5").exists());
 }
 
@@ -581,16 +545,12 @@ fn tags_and_notes_stay_when_a_case_is_made_again() {
             .all(|c| c.provenance.tags == ["b", "reviewed"] && c.provenance.user_notes.is_empty())
     );
     assert_eq!(database.cases("tests")[0].provenance.tags, [""; 0]);
-    fails(
-        here,
-        "db tag curves.h5 --case 12kmh --remove c",
-        "none of the 1 chosen cases has the tag \"c\": they have \"b\", \"reviewed\"",
-    );
-    fails(
-        here,
-        "db tag curves.h5 --case 12kmh --add a;b",
-        "\"a;b\" is not a tag: it may not contain",
-    );
+    #[rustfmt::skip]
+    let cases = [
+        ("db tag curves.h5 --case 12kmh --remove c", "none of the 1 chosen cases has the tag \"c\": they have \"b\", \"reviewed\""),
+        ("db tag curves.h5 --case 12kmh --add a;b", "\"a;b\" is not a tag: it may not contain"),
+    ];
+    cases.into_iter().for_each(|(line, expected)| fails(here, line, expected));
     let blank =
         crumple_fails(here, 1, &["db", "note", "curves.h5", "--case", "12kmh", "--add", " "]);
     says(&blank, "\" \" is not a note: it is blank");

@@ -389,23 +389,15 @@ fn wrong_ends_are_refused() {
     };
     let second = "{ name = \"A2\", mass = \"20.24t\", ends = \"end\" }";
     let without = "{ name = \"A2\", mass = \"20.24t\" }";
-    fails(
-        second,
-        without,
-        "rear of vehicle \"A1\" comes from a model and the end that it meets does not",
-    );
-    fails(
-        "ends = \"end\"",
-        "front = { curve = \"end\" }",
-        "front of vehicle \"A2\" comes from a model",
-    );
-    fails("ends = \"end\"", "ends = \"edn\"", "there is no curve \"edn\" in [curves]");
-    fails("[contact]", "[contact]\ncurve = \"nose\"", "lies between ends that come from models");
-    fails(
-        "ends = \"end\"",
-        "behind = \"nose\", ends = \"end\"",
-        "lies between ends that come from models",
-    );
+    #[rustfmt::skip]
+    let cases = [
+        (second, without, "rear of vehicle \"A1\" comes from a model and the end that it meets does not"),
+        ("ends = \"end\"", "front = { curve = \"end\" }", "front of vehicle \"A2\" comes from a model"),
+        ("ends = \"end\"", "ends = \"edn\"", "there is no curve \"edn\" in [curves]"),
+        ("[contact]", "[contact]\ncurve = \"nose\"", "lies between ends that come from models"),
+        ("ends = \"end\"", "behind = \"nose\", ends = \"end\"", "lies between ends that come from models"),
+    ];
+    cases.into_iter().for_each(|(from, to, expected)| fails(from, to, expected));
     let file = "end = { file = \"lead50.csv\" }";
     fails("end = { model = \"vehicle-pair.model\" }", file, "ends of vehicle \"A1\" needs mass");
     let gap = "end = { model = \"vehicle-pair.model\", gap = \"3mm\" }";

@@ -689,54 +689,30 @@ fn groups_and_several_speeds_are_exported_at_once() {
         let error = crumple_fails(here, code, arguments);
         assert!(error.contains(expected), "{arguments:?} said:\n{error}");
     };
-    t(
-        2,
-        &["export", "lead.model", "--to", "csv"],
-        "name the speeds of the model's curves with --speed",
-    );
-    t(
-        2,
-        &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv", "-o", "all.csv"],
-        "this export gives 7 files: name a folder",
-    );
-    t(2, &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv"], "gives 7 files");
-    t(
-        2,
-        &["export", "curves.h5", "--group", "lead-car-wall", "--speed", "37km/h", "--to", "csv"],
-        "has no case at 37 km/h: it has 12 km/h",
-    );
-    t(2, &["export", "lead50.json", "--to", "csv", "--speed", "50km/h"], "has one speed and mass");
-    t(1, &["export", "lead50.json", "--to", "mat", "--units", UNITS], "mat is always in SI");
-    t(
-        1,
-        &["export", "lead.model", "--speed", "36km/h,50km/h", "--to", "lsdyna", "--deck"],
-        "one curve",
-    );
-    t(2, &["export", "lead50.json", "--to", "iso-mme"], "iso-mme takes histories over time");
-    t(2, &["export", "lead50.json", "--to", "table"], "table takes a model");
+    #[rustfmt::skip]
+    let cases = [
+        (2, &["export", "lead.model", "--to", "csv"][..], "name the speeds of the model's curves with --speed"),
+        (2, &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv", "-o", "all.csv"][..], "this export gives 7 files: name a folder"),
+        (2, &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv"][..], "gives 7 files"),
+        (2, &["export", "curves.h5", "--group", "lead-car-wall", "--speed", "37km/h", "--to", "csv"][..], "has no case at 37 km/h: it has 12 km/h"),
+        (2, &["export", "lead50.json", "--to", "csv", "--speed", "50km/h"][..], "has one speed and mass"),
+        (1, &["export", "lead50.json", "--to", "mat", "--units", UNITS][..], "mat is always in SI"),
+        (1, &["export", "lead.model", "--speed", "36km/h,50km/h", "--to", "lsdyna", "--deck"][..], "one curve"),
+        (2, &["export", "lead50.json", "--to", "iso-mme"][..], "iso-mme takes histories over time"),
+        (2, &["export", "lead50.json", "--to", "table"][..], "table takes a model"),
+    ];
+    cases.into_iter().for_each(|(code, arguments, expected)| t(code, arguments, expected));
     // What a format has no use for is refused.
-    t(
-        2,
-        &["export", "lead50.json", "--to", "csv", "--deck"],
-        "--deck is for lsdyna, radioss, calculix",
-    );
-    t(
-        2,
-        &["export", "lead50.json", "--to", "mat", "--material", "s06"],
-        "--material is for lsdyna",
-    );
-    t(2, &["export", "lead50.json", "--to", "json", "--tail", "hold"], "--tail is for csv, lsdyna");
-    t(
-        2,
-        &["export", "lead.model", "--to", "onnx", "--speed", "50km/h"],
-        "holds a whole model: remove --speed",
-    );
-    t(2, &["export", "lead.model", "--to", "table", "--group", "x"], "a model has only one group");
-    t(
-        2,
-        &["export", "curves.h5", "--group", "lead-car-wall", "-o", "all.spr"],
-        "name a folder, and the kind of file with --to spr",
-    );
+    #[rustfmt::skip]
+    let cases = [
+        (&["export", "lead50.json", "--to", "csv", "--deck"][..], "--deck is for lsdyna, radioss, calculix"),
+        (&["export", "lead50.json", "--to", "mat", "--material", "s06"][..], "--material is for lsdyna"),
+        (&["export", "lead50.json", "--to", "json", "--tail", "hold"][..], "--tail is for csv, lsdyna"),
+        (&["export", "lead.model", "--to", "onnx", "--speed", "50km/h"][..], "holds a whole model: remove --speed"),
+        (&["export", "lead.model", "--to", "table", "--group", "x"][..], "a model has only one group"),
+        (&["export", "curves.h5", "--group", "lead-car-wall", "-o", "all.spr"][..], "name a folder, and the kind of file with --to spr"),
+    ];
+    cases.into_iter().for_each(|(arguments, expected)| t(2, arguments, expected));
     export(here, "curves.h5", "sprs", &["--group", "lead-car-wall", "--to", "spr"]);
     assert!(entries(&here.join("sprs")).iter().all(|name| name.ends_with(".spr")));
     // Two curves of one speed keep apart, in their files and in the names within.

@@ -316,23 +316,15 @@ fn iso_mme_tests() {
         says(&read(&path, &chosen).unwrap_err().to_string(), expected);
     };
     let good = channel("12FRONT00000FOXP", "kN", &f);
-    t(
-        good.replace("kN", "lbf"),
-        "T1.004: line 4: the unit \"lbf\" of the force is not known: use one of N, kN, MN",
-    );
-    t(
-        good.replace("implicit", "explicit"),
-        "T1.004: line 5: the times are those of another channel: expected \"Reference channel :implicit\" with an interval, or \"Reference channel name :\"",
-    );
-    t(
-        good.replace("samples         :5", "samples         :9"),
-        "T1.004: line 8: number of samples declares 9, but the file has 5 values",
-    );
-    t(
-        good.replace("\n2\n", "\nNOVALUE\n"),
-        "T1.004: line 11: expected a number, found \"NOVALUE\"",
-    );
-    t(good.replace(":0.001", ":0"), "expected an interval above 0 in s, found \"0\"");
+    #[rustfmt::skip]
+    let cases = [
+        (good.replace("kN", "lbf"), "T1.004: line 4: the unit \"lbf\" of the force is not known: use one of N, kN, MN"),
+        (good.replace("implicit", "explicit"), "T1.004: line 5: the times are those of another channel: expected \"Reference channel :implicit\" with an interval, or \"Reference channel name :\""),
+        (good.replace("samples         :5", "samples         :9"), "T1.004: line 8: number of samples declares 9, but the file has 5 values"),
+        (good.replace("\n2\n", "\nNOVALUE\n"), "T1.004: line 11: expected a number, found \"NOVALUE\""),
+        (good.replace(":0.001", ":0"), "expected an interval above 0 in s, found \"0\""),
+    ];
+    cases.into_iter().for_each(|(text, expected)| t(text, expected));
 }
 
 #[test]
@@ -472,136 +464,45 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         t(empty, "", None, &["expected a curve, found an empty file"]);
     }
     let card = "       101         0";
-    t(
-        "a.k",
-        deck("x", card, &fields(1.0, 1.0)),
-        None,
-        &["the file does not state its units", "\"$ units: mm-t-s\""],
-    );
-    t(
-        "a.k",
-        deck("$x", card, &fields(1.0, 1.0)),
-        Some("SI"),
-        &["line 7, columns 1-10: expected the number of a curve (LCID)", "line 5 begins with $"],
-    );
-    t(
-        "a.k",
-        deck("x", card, "  0.0 0.0\n"),
-        Some("SI"),
-        &[
-            "line 7, columns 1-20: expected one number in each field of 20 columns, or fields with commas between, found \"0.0 0.0\"",
-        ],
-    );
-    t(
-        "a.k",
-        deck("x", card, &fields(1.0, 1.0).replace("1000000", "&param")),
-        Some("SI"),
-        &["columns 21-40: expected a number, found \"&param\""],
-    );
-    t("a.k", deck("x", card, "1,2\n"), Some("SI"), &["the curve has 1 point:"]);
-    t(
-        "a.k",
-        deck("x", card, "0,0\n1,nan\n2,2\n3,3\n"),
-        Some("SI"),
-        &["line 8, field 2: expected a number, found \"nan\""],
-    );
-    t(
-        "a.k",
-        "*KEYWORD\n*NODE\n1,2\n",
-        Some("SI"),
-        &["expected a *DEFINE_CURVE, found none in this deck"],
-    );
+    #[rustfmt::skip]
+    let cases = [
+        ("a.k", deck("x", card, &fields(1.0, 1.0)), None, &["the file does not state its units", "\"$ units: mm-t-s\""][..]),
+        ("a.k", deck("$x", card, &fields(1.0, 1.0)), Some("SI"), &["line 7, columns 1-10: expected the number of a curve (LCID)", "line 5 begins with $"][..]),
+        ("a.k", deck("x", card, "  0.0 0.0\n"), Some("SI"), &["line 7, columns 1-20: expected one number in each field of 20 columns, or fields with commas between, found \"0.0 0.0\""][..]),
+        ("a.k", deck("x", card, &fields(1.0, 1.0).replace("1000000", "&param")), Some("SI"), &["columns 21-40: expected a number, found \"&param\""][..]),
+        ("a.k", deck("x", card, "1,2\n"), Some("SI"), &["the curve has 1 point:"][..]),
+        ("a.k", deck("x", card, "0,0\n1,nan\n2,2\n3,3\n"), Some("SI"), &["line 8, field 2: expected a number, found \"nan\""][..]),
+        ("a.k", "*KEYWORD\n*NODE\n1,2\n".into(), Some("SI"), &["expected a *DEFINE_CURVE, found none in this deck"][..]),
+    ];
+    cases.into_iter().for_each(|(name, bytes, units, expected)| t(name, bytes, units, expected));
     let table = |head: &str| format!("#1\n{head}\n{}", rows(1.0, 1.0, " ", "."));
-    t("a.txt", table("double nose(5,2)"), None, &["does not state its units", "# d [m], F [N]"]);
-    t(
-        "a.txt",
-        table("double fd_load(9,2)"),
-        None,
-        &["line 2: table fd_load declares 9 rows of 2, but the file has 10 values for it"],
-    );
-    t(
-        "a.txt",
-        table("double fd_load(3,2)"),
-        None,
-        &["line 6, field 1: expected no more than the 3 rows of 2 that table fd_load declares"],
-    );
-    t(
-        "a.txt",
-        table("double fd_load(900000,900000)"),
-        None,
-        &[
-            "line 2: table fd_load declares 900000 rows of 900000, but the file has",
-            "correct the size",
-        ],
-    );
-    t("a.txt", table("double fd_load(99999999999,2)"), None, &["more than 1000000 points"]);
-    t(
-        "a.txt",
-        table("double fd_load"),
-        None,
-        &["line 2: expected a table such as \"double fd_load(4,2)\""],
-    );
-    t("a.txt", table("double k(10,1)"), Some("SI"), &["expected a table of two columns"]);
-    t(
-        "a.txt",
-        table("double fd_load(5,2)").replace("1000000", "x"),
-        None,
-        &["expected a number, found \"x\""],
-    );
+    #[rustfmt::skip]
+    let cases = [
+        ("a.txt", table("double nose(5,2)"), None, &["does not state its units", "# d [m], F [N]"][..]),
+        ("a.txt", table("double fd_load(9,2)"), None, &["line 2: table fd_load declares 9 rows of 2, but the file has 10 values for it"][..]),
+        ("a.txt", table("double fd_load(3,2)"), None, &["line 6, field 1: expected no more than the 3 rows of 2 that table fd_load declares"][..]),
+        ("a.txt", table("double fd_load(900000,900000)"), None, &["line 2: table fd_load declares 900000 rows of 900000, but the file has", "correct the size"][..]),
+        ("a.txt", table("double fd_load(99999999999,2)"), None, &["more than 1000000 points"][..]),
+        ("a.txt", table("double fd_load"), None, &["line 2: expected a table such as \"double fd_load(4,2)\""][..]),
+        ("a.txt", table("double k(10,1)"), Some("SI"), &["expected a table of two columns"][..]),
+        ("a.txt", table("double fd_load(5,2)").replace("1000000", "x"), None, &["expected a number, found \"x\""][..]),
+    ];
+    cases.into_iter().for_each(|(name, bytes, units, expected)| t(name, bytes, units, expected));
     let mat = matrix("fd_load", 5, 2, &columns(), false);
-    t(
-        "a.mat",
-        &mat[..60],
-        None,
-        &[
-            "byte 0: matrix fd_load declares 5 rows of 2, but the file has 32 bytes after its name",
-            "it may be truncated",
-        ],
-    );
-    t("a.mat", &mat[..10], None, &["byte 0: expected a matrix of a MAT file of version 4"]);
-    t(
-        "a.mat",
-        matrix("fd_load", i32::MAX, i32::MAX, &[], false),
-        None,
-        &["declares 2147483647 rows of 2147483647"],
-    );
-    t(
-        "a.mat",
-        matrix("fd_load", 5, 2, &[0.0, 1.0, 2.0, 3.0, 4.0, 0.0, f64::NAN, 1.0, 1.0, 1.0], false),
-        None,
-        &["row 2: the force is NaN: expected a finite number"],
-    );
-    t(
-        "a.mat",
-        matrix("x", 2, 5, &columns(), false),
-        None,
-        &["expected a full matrix of doubles with two columns", "found x (2 x 5)"],
-    );
-    t("a.mat", "MATLAB 5.0 MAT-file", None, &["of a later version: save it with -v4"]);
-    t(
-        "a.cur",
-        "t\nTime (ms)\nForce (kN)\nl\n0 0\n1 2\n2 3\n3 4\n",
-        None,
-        &["line 2: expected a deflection in the first column, found \"Time (ms)\""],
-    );
-    t(
-        "a.cur",
-        "t\nx\ny\nl\n0 0\n1 2\n2 3\n3 4\n",
-        None,
-        &["the deflection has no unit", "--units"],
-    );
-    t(
-        "a.cur",
-        "x (m)\ny (N)\n0 0\n1 abc\n2 3\n3 4\n",
-        None,
-        &["line 4, field 2: expected a number, found \"abc\""],
-    );
-    t(
-        "a.cur",
-        "x (m)\ny (N)\n0 0\n1 2 3\n",
-        None,
-        &["line 4: expected two numbers, or CONTINUE after a curve"],
-    );
+    #[rustfmt::skip]
+    let cases = [
+        ("a.mat", mat[..60].to_vec(), &["byte 0: matrix fd_load declares 5 rows of 2, but the file has 32 bytes after its name", "it may be truncated"][..]),
+        ("a.mat", mat[..10].to_vec(), &["byte 0: expected a matrix of a MAT file of version 4"][..]),
+        ("a.mat", matrix("fd_load", i32::MAX, i32::MAX, &[], false), &["declares 2147483647 rows of 2147483647"][..]),
+        ("a.mat", matrix("fd_load", 5, 2, &[0.0, 1.0, 2.0, 3.0, 4.0, 0.0, f64::NAN, 1.0, 1.0, 1.0], false), &["row 2: the force is NaN: expected a finite number"][..]),
+        ("a.mat", matrix("x", 2, 5, &columns(), false), &["expected a full matrix of doubles with two columns", "found x (2 x 5)"][..]),
+        ("a.mat", "MATLAB 5.0 MAT-file".into(), &["of a later version: save it with -v4"][..]),
+        ("a.cur", "t\nTime (ms)\nForce (kN)\nl\n0 0\n1 2\n2 3\n3 4\n".into(), &["line 2: expected a deflection in the first column, found \"Time (ms)\""][..]),
+        ("a.cur", "t\nx\ny\nl\n0 0\n1 2\n2 3\n3 4\n".into(), &["the deflection has no unit", "--units"][..]),
+        ("a.cur", "x (m)\ny (N)\n0 0\n1 abc\n2 3\n3 4\n".into(), &["line 4, field 2: expected a number, found \"abc\""][..]),
+        ("a.cur", "x (m)\ny (N)\n0 0\n1 2 3\n".into(), &["line 4: expected two numbers, or CONTINUE after a curve"][..]),
+    ];
+    cases.into_iter().for_each(|(name, bytes, expected)| t(name, bytes, None, expected));
 }
 
 /// Files that hold next to nothing, a million times.
@@ -713,22 +614,14 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
         assert!(error.contains(expected), "expected {expected}, found:\n{error}");
         assert_eq!(entries(here), before);
     };
-    t(
-        2,
-        &["--speed", &v, "--mass", "24t"],
-        "nose.csv: the file does not state what its speed is measured against: give --kind wall",
-    );
-    t(
-        2,
-        &["--speed", &v, "--kind", "wall"],
-        "nose.csv: the file does not state the mass of the body: give --mass",
-    );
-    t(
-        2,
-        &WALL,
-        "nose.csv: the file does not state its speed: give --speed, such as --speed 36km/h",
-    );
-    t(2, &["--speed", "36"], "speed \"36\" has no unit");
+    #[rustfmt::skip]
+    let cases = [
+        (&["--speed", &v, "--mass", "24t"][..], "nose.csv: the file does not state what its speed is measured against: give --kind wall"),
+        (&["--speed", &v, "--kind", "wall"][..], "nose.csv: the file does not state the mass of the body: give --mass"),
+        (&WALL, "nose.csv: the file does not state its speed: give --speed, such as --speed 36km/h"),
+        (&["--speed", "36"][..], "speed \"36\" has no unit"),
+    ];
+    cases.into_iter().for_each(|(more, expected)| t(2, more, expected));
     let with = |more: &[&'static str]| -> Vec<String> {
         WALL.iter()
             .chain(&["--speed"])
@@ -741,40 +634,28 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
         let with = with(more);
         t(code, &with.iter().map(String::as_str).collect::<Vec<_>>(), expected);
     };
-    t_with(
-        2,
-        &["other.csv"],
-        "--speed is given 1 time for 2 files: give it once for each file, in the same order",
-    );
-    t_with(2, &["--case", "a", "--case", "b"], "--case is given 2 times for 1 file");
-    t_with(2, &["--other-mass", "3t"], "a wall has no mass: remove --other-mass");
-    t_with(1, &["--case", "a/b"], "\"a/b\" cannot be the name of a case: it may not contain");
-    t_with(
-        1,
-        &["--from", "xyz"],
-        "there is no format \"xyz\" of curves that can be read: use one of mat, json, lsdyna",
-    );
-    t(
-        1,
-        &["--kind", "wall", "--mass", "240t", "--speed", &v],
-        "nose.csv: the curve absorbs 0.1000 times the kinetic energy of 240.0 t",
-    );
-    t(
-        1,
-        &["--kind", "wall", "--mass", "24t", "--speed", &v, "--unloading", "1MN/m"],
-        "is softer than the line from the maximum deflection",
-    );
+    #[rustfmt::skip]
+    let cases = [
+        (2, &["other.csv"][..], "--speed is given 1 time for 2 files: give it once for each file, in the same order"),
+        (2, &["--case", "a", "--case", "b"][..], "--case is given 2 times for 1 file"),
+        (2, &["--other-mass", "3t"][..], "a wall has no mass: remove --other-mass"),
+        (1, &["--case", "a/b"][..], "\"a/b\" cannot be the name of a case: it may not contain"),
+        (1, &["--from", "xyz"][..], "there is no format \"xyz\" of curves that can be read: use one of mat, json, lsdyna"),
+    ];
+    cases.into_iter().for_each(|(code, more, expected)| t_with(code, more, expected));
+    #[rustfmt::skip]
+    let cases = [
+        (&["--kind", "wall", "--mass", "240t", "--speed", &v][..], "nose.csv: the curve absorbs 0.1000 times the kinetic energy of 240.0 t"),
+        (&["--kind", "wall", "--mass", "24t", "--speed", &v, "--unloading", "1MN/m"][..], "is softer than the line from the maximum deflection"),
+    ];
+    cases.into_iter().for_each(|(more, expected)| t(1, more, expected));
     // The second file is missing: the first is not written either.
-    t(
-        1,
-        &["missing.csv", "--kind", "wall", "--mass", "24t", "--speed", &v, "--speed", &v],
-        "missing.csv: No such file",
-    );
-    t(
-        1,
-        &[".", "--kind", "wall", "--mass", "24t", "--speed", &v, "--speed", &v],
-        ".: this is a folder: give a file",
-    );
+    #[rustfmt::skip]
+    let cases = [
+        (&["missing.csv", "--kind", "wall", "--mass", "24t", "--speed", &v, "--speed", &v][..], "missing.csv: No such file"),
+        (&[".", "--kind", "wall", "--mass", "24t", "--speed", &v, "--speed", &v][..], ".: this is a folder: give a file"),
+    ];
+    cases.into_iter().for_each(|(more, expected)| t(1, more, expected));
     crumple_ok(
         here,
         &with(&[]).iter().map(String::as_str).fold(adding(&[]), |mut a, s| {
@@ -782,16 +663,12 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
             a
         }),
     );
-    t_with(
-        1,
-        &[],
-        "group \"tests\" has a case \"nose\" already: replace it with --replace, or give another name with --case",
-    );
-    t_with(
-        1,
-        &["--force", "body", "--case", "b"],
-        "this curve has a body force, the cases of group \"tests\" have a contact one",
-    );
+    #[rustfmt::skip]
+    let cases = [
+        (&[][..], "group \"tests\" has a case \"nose\" already: replace it with --replace, or give another name with --case"),
+        (&["--force", "body", "--case", "b"][..], "this curve has a body force, the cases of group \"tests\" have a contact one"),
+    ];
+    cases.into_iter().for_each(|(more, expected)| t_with(1, more, expected));
     t(
         1,
         &["--kind", "closing", "--mass", "24t", "--speed", &v, "--case", "b", "--accept-energy"],

@@ -266,12 +266,11 @@ fn every_value_says_where_it_is_from() {
     assert!(above("filter").contains("read: its second line reads"), "{}", above("filter"));
     assert!(text.contains("# CANNOT BE DETERMINED: is this one body of a pair"));
     assert!(text.contains("\n# half_model = true\n"));
-    assert!(text.contains(
-        "# read: x_velocity of 900001 in the first state: -3333.33 mm/s\nspeed = \"12km/h\""
-    ));
-    assert!(
-        text.contains("# mass: computed: impulse of the force over the change of velocity, after")
+    says(
+        &text,
+        "# read: x_velocity of 900001 in the first state: -3333.33 mm/s\nspeed = \"12km/h\"",
     );
+    says(&text, "# mass: computed: impulse of the force over the change of velocity, after");
     assert!(text.lines().all(|line| line.chars().count() <= 110), "no line is too long");
     // The same as one document.
     let document = json(&crumple_ok(&here, "init --json -o other.toml"));
@@ -488,10 +487,8 @@ fn a_pair_without_forces_is_guessed() {
     );
     says(&document["fill_in"].to_string(), "other_mass of a: by their velocities 1.6");
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
-    assert!(
-        text.contains("\nkind = \"pair\"\n") && text.contains("\n# other_mass =     # fill in\n"),
-        "{text}"
-    );
+    says(&text, "\nkind = \"pair\"\n");
+    says(&text, "\n# other_mass =     # fill in\n");
     let speed = document["runs"][0]["speed_m_per_s"]["value"].as_f64().unwrap();
     assert!((speed / 16.0 - 1.0).abs() < 1e-3, "{speed}");
     // One mass for both is not what the velocities say.

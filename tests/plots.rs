@@ -191,42 +191,21 @@ fn every_kind_of_file_is_drawn() {
     let folder = demo_folder();
     let folder = folder.path();
     crumple_ok(folder, "simulate scenario.toml -o result.csv");
-    for (arguments, texts) in [
+    #[rustfmt::skip]
+    let cases = [
         ("curves.h5 --group lead-car-wall", &["FE at 72 km/h", "deflection [m]", "force [MN]"][..]),
-        (
-            "curves.h5 --group lead-car-wall --force body",
-            &["lead-car-wall: body force by wall speed"],
-        ),
-        (
-            "curves.h5 --group lead-car-pair --left-out 48km/h",
-            &["FE at 48 km/h", "closing speed [m/s]"],
-        ),
-        (
-            "lead.model --speed 50km/h",
-            &[
-                "FE at 48 km/h",
-                "FE at 60 km/h",
-                "maximum crush",
-                "empirical 90 % range from 5 left-out inner speeds",
-            ],
-        ),
+        ("curves.h5 --group lead-car-wall --force body", &["lead-car-wall: body force by wall speed"]),
+        ("curves.h5 --group lead-car-pair --left-out 48km/h", &["FE at 48 km/h", "closing speed [m/s]"]),
+        ("lead.model --speed 50km/h", &["FE at 48 km/h", "FE at 60 km/h", "maximum crush", "empirical 90 % range from 5 left-out inner speeds"]),
         ("lead50.json", &["lead-car-wall at 50 km/h: contact force by the model crush-law"]),
-        (
-            "lead50.json --force body",
-            &["lead-car-wall at 50 km/h: body force by the model crush-law"],
-        ),
+        ("lead50.json --force body", &["lead-car-wall at 50 km/h: body force by the model crush-law"]),
         ("scenario.toml --quantity energy", &["kinetic", "dissipated", "energy [MJ]", "time [ms]"]),
         ("result.csv --quantity crush", &["A1|wall", "deflection [m]"]),
         ("train-set.toml --train", &["A1", "A3", "FE", "best_local", "speed [m/s]"]),
-        (
-            "fe/lead-car-wall/36kmh/nodout --id 900001 --component x_velocity --units mm-t-s --cfc 60",
-            &["900001, CFC 60", "x_velocity [m/s]"],
-        ),
-        (
-            "fe/lead-car-wall/36kmh/crashT01 --section rwforc --component normal_force",
-            &["normal_force [unit of the file]"],
-        ),
-    ] {
+        ("fe/lead-car-wall/36kmh/nodout --id 900001 --component x_velocity --units mm-t-s --cfc 60", &["900001, CFC 60", "x_velocity [m/s]"]),
+        ("fe/lead-car-wall/36kmh/crashT01 --section rwforc --component normal_force", &["normal_force [unit of the file]"]),
+    ];
+    for (arguments, texts) in cases {
         let mut all = vec!["plot"];
         all.extend(arguments.split(' '));
         all.extend(["-o", "a.svg", "-o", "a.png"]);
@@ -259,21 +238,14 @@ fn wrong_wishes_are_refused() {
     fs::write(folder.join("bad.csv"), "time_s,v_m_per_s[A1]\n0,1\n1,x\n").unwrap();
     fs::write(folder.join("other.csv"), "time_s,b\n0,1\n").unwrap();
     let before = entries(folder);
-    for (code, arguments, says) in [
+    #[rustfmt::skip]
+    let cases = [
         (1, "curves.h5 -o a.svg", "has several groups: choose one with --group"),
         (1, "curves.h5 --group nothing -o a.svg", "nothing"),
         (2, "curves.h5 --group lead-car-wall -o a.jpg", "pictures are written as .svg or .png"),
-        (
-            1,
-            "curves.h5 --group lead-car-wall --left-out 50km/h -o a.svg",
-            "has no run at 50 km/h: its speeds are 12 km/h",
-        ),
+        (1, "curves.h5 --group lead-car-wall --left-out 50km/h -o a.svg", "has no run at 50 km/h: its speeds are 12 km/h"),
         (2, "lead.model -o a.svg", "name the speed of the model's curve with --speed"),
-        (
-            2,
-            "lead50.json --speed 50km/h -o a.svg",
-            "--speed is for a model: lead50.json is a predicted curve",
-        ),
+        (2, "lead50.json --speed 50km/h -o a.svg", "--speed is for a model: lead50.json is a predicted curve"),
         (2, "lead.model --speed 50km/h --id 3 -o a.svg", "--id is for a solver file"),
         (1, "bad.csv -o a.svg", "bad.csv: line 3, column 2: expected a number, found \"x\""),
         (1, "other.csv -o a.svg", "expected the columns of crumple simulate -o"),
@@ -281,7 +253,8 @@ fn wrong_wishes_are_refused() {
         (2, "lead.model --speed 50km/h -o lead.model", "pictures are written"),
         (2, "fe/lead-car-wall/36kmh/nodout --cfc 60 -o a.svg", "--units"),
         (2, "lead50.json -o a.svg --width 10", "expected a number from 80 to 5000"),
-    ] {
+    ];
+    for (code, arguments, says) in cases {
         let mut all = vec!["plot"];
         all.extend(arguments.split(' '));
         let error = crumple_fails(folder, code, &all);

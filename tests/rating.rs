@@ -231,64 +231,32 @@ fn wrong_input_says_where_and_what_to_do() {
         let error = crumple_fails(here, code, &[&["rate"], arguments].concat());
         assert!(error.starts_with(&format!("error: {message}")), "{arguments:?}: {error}");
     };
-    t(
-        &["a.csv", "b.csv"],
-        1,
-        "b.csv: there are several columns: name one of \"v\", \"a_m_per_s2[B1]\" after the file's name: b.csv:COLUMN",
-    );
-    t(
-        &["a.csv:w", "b.csv"],
-        1,
-        "a.csv: there is no column \"w\": name one of \"a_m_per_s2[A1]\" after the file's name: a.csv:COLUMN",
-    );
-    t(&["a.csv", "b.csv:v"], 1, "b.csv: line 2, column 2 (\"v\"): expected a number");
-    t(
-        &["a.csv", "text.csv"],
-        1,
-        "text.csv: line 3, column 2 (\"a\"): expected a number, found \"n/a\"",
-    );
-    t(&["a.csv", "nan.csv"], 1, "nan.csv: line 3, column 2 (\"a\"): expected a finite number");
-    t(
-        &["a.csv", "back.csv"],
-        1,
-        "back.csv: line 4, column 1 (\"t\"): time 0.1 does not come after 0.2: times must increase strictly",
-    );
-    t(&["a.csv", "few.csv"], 1, "few.csv: a: a signal needs at least 5 samples, found 2");
-    t(&["a.csv", "empty.csv"], 1, "empty.csv: the table is empty");
-    t(
-        &["a.csv", "late.csv"],
-        1,
-        "there are no common times: the reference goes from 0 s to 0.199 s, the prediction from 5 s to 5.4 s",
-    );
-    t(
-        &["a.csv", "a.csv", "--from=0.5s"],
-        1,
-        "the requested interval, from 0.5 s to 0.199 s, lies outside the common times",
-    );
-    t(&["a.csv", "none.csv"], 1, "none.csv: No such file");
-    t(&["a.csv", "none.csv:v"], 1, "none.csv: No such file");
-    t(
-        &["a.csv,time=h", "a.csv"],
-        2,
-        "invalid value 'a.csv,time=h' for '<A>': \"h\" is not a unit of time",
-    );
-    t(
-        &["a.csv,scale=0", "a.csv"],
-        2,
-        "invalid value 'a.csv,scale=0' for '<A>': \"0\" is not a factor",
-    );
+    #[rustfmt::skip]
+    let cases = [
+        (&["a.csv", "b.csv"][..], 1, "b.csv: there are several columns: name one of \"v\", \"a_m_per_s2[B1]\" after the file's name: b.csv:COLUMN"),
+        (&["a.csv:w", "b.csv"][..], 1, "a.csv: there is no column \"w\": name one of \"a_m_per_s2[A1]\" after the file's name: a.csv:COLUMN"),
+        (&["a.csv", "b.csv:v"][..], 1, "b.csv: line 2, column 2 (\"v\"): expected a number"),
+        (&["a.csv", "text.csv"][..], 1, "text.csv: line 3, column 2 (\"a\"): expected a number, found \"n/a\""),
+        (&["a.csv", "nan.csv"][..], 1, "nan.csv: line 3, column 2 (\"a\"): expected a finite number"),
+        (&["a.csv", "back.csv"][..], 1, "back.csv: line 4, column 1 (\"t\"): time 0.1 does not come after 0.2: times must increase strictly"),
+        (&["a.csv", "few.csv"][..], 1, "few.csv: a: a signal needs at least 5 samples, found 2"),
+        (&["a.csv", "empty.csv"][..], 1, "empty.csv: the table is empty"),
+        (&["a.csv", "late.csv"][..], 1, "there are no common times: the reference goes from 0 s to 0.199 s, the prediction from 5 s to 5.4 s"),
+        (&["a.csv", "a.csv", "--from=0.5s"][..], 1, "the requested interval, from 0.5 s to 0.199 s, lies outside the common times"),
+        (&["a.csv", "none.csv"][..], 1, "none.csv: No such file"),
+        (&["a.csv", "none.csv:v"][..], 1, "none.csv: No such file"),
+        (&["a.csv,time=h", "a.csv"][..], 2, "invalid value 'a.csv,time=h' for '<A>': \"h\" is not a unit of time"),
+        (&["a.csv,scale=0", "a.csv"][..], 2, "invalid value 'a.csv,scale=0' for '<A>': \"0\" is not a factor"),
+    ];
+    cases.into_iter().for_each(|(arguments, code, message)| t(arguments, code, message));
     let error = crumple_fails(here, 1, "rate a.csv note");
     says(&error, "a CSV file has the extension .csv, or its column after its name: note:COLUMN");
-    t(
-        &["a.csv", "a.csv", "--cfc=1000"],
-        1,
-        "a.csv: a_m_per_s2[A1]: its samples are 1.00e-3 s apart",
-    );
-    t(
-        &["a.csv", "a.csv", "--id=1"],
-        2,
-        "--id chooses a history of a solver file, but this is a CSV",
-    );
+    #[rustfmt::skip]
+    let cases = [
+        (&["a.csv", "a.csv", "--cfc=1000"][..], 1, "a.csv: a_m_per_s2[A1]: its samples are 1.00e-3 s apart"),
+        (&["a.csv", "a.csv", "--id=1"][..], 2, "--id chooses a history of a solver file, but this is a CSV"),
+    ];
+    cases.into_iter().for_each(|(arguments, code, message)| t(arguments, code, message));
     let nodout = fixture("fe/lead-car-wall/36kmh/nodout");
     let nodout = nodout.to_str().unwrap();
     t(&[nodout, nodout, "--id=1"], 1, &format!("{nodout}: nodout has no node 1"));

@@ -465,10 +465,8 @@ fn items_that_fail_are_rows_with_their_reason() {
     folder.put("s.toml", &text);
     folder.ok("sweep s.toml -q -o held.csv");
     let text = folder.text("held.csv");
-    assert!(
-        text.contains(",warned,")
-            && text.contains("beyond the end of its curve's data at 0.6000 m")
-    );
+    says(&text, ",warned,");
+    says(&text, "beyond the end of its curve's data at 0.6000 m");
 }
 
 #[test]
@@ -806,110 +804,46 @@ fn wrong_plans_are_named_by_file_and_key() {
         "unknown variant `sobol`, expected `random` or `latin_hypercube`",
     );
     t("results = [\"peak\"]\nvary = []", "unknown variant `peak`");
-    vary("what = \"spede\"", "unknown variant `spede`, expected one of `speed`, `mass`");
-    vary("what = \"speed\", value = [1]", "unknown field `value`");
-    vary("what = \"speed\", values = [\"1m/s\"]", "sweep.vary 1 (speed): name the train: train = ");
-    vary(
-        "what = \"speed\", train = \"C\", values = [\"1m/s\"]",
-        "there is no train \"C\": the scenario has A, B",
-    );
-    vary("what = \"speed\", train = \"A\", values = [\"1\"]", "values: speed \"1\" has no unit");
-    vary(
-        "what = \"gap\", curve = \"inner\", values = [\"-1mm\"]",
-        "values: -1mm is out of range: expected 0 or more",
-    );
-    vary(
-        "what = \"speed\", train = \"A\", vehicle = \"A1\"",
-        "vehicle does not go with what = \"speed\"",
-    );
-    vary("what = \"speed\", train = \"A\", values = [true]", "expected a number, or text");
-    vary(
-        "what = \"mass\", values = [\"1t\"]",
-        "give vehicle = \"…\", or vehicles = […] or \"all\"",
-    );
-    vary(
-        "what = \"mass\", vehicle = \"Z9\", values = [\"1t\"]",
-        "there is no vehicle \"Z9\": the scenario has A1, A2, B1, B2",
-    );
-    vary(
-        "what = \"mass\", vehicles = \"some\", values = [\"1t\"]",
-        "vehicles = \"some\": expected a list, or \"all\"",
-    );
-    vary(
-        "what = \"mass\", vehicles = 3, values = [\"1t\"]",
-        "expected a list of vehicles, or \"all\"",
-    );
-    vary(
-        "what = \"mass\", vehicles = [\"A1\", \"A1\"], values = [\"1t\"]",
-        "vehicles names \"A1\" twice",
-    );
-    vary(
-        "what = \"mass\", vehicle = \"A1\", factor = true, values = [\"1t\"]",
-        "values: \"1t\" is not a number",
-    );
-    vary(
-        "what = \"gap\", interface = \"A1|A2\", values = [\"1mm\"]",
-        "interface = \"A1|A2\": expected \"contact\"",
-    );
-    vary(
-        "what = \"gap\", curve = \"inner\", values = [\"1t\"]",
-        "length \"1t\" has the unknown unit \"t\"",
-    );
-    vary(
-        "what = \"gap\", interface = \"contact\", factor = true, values = [1]",
-        "the contact has no gap that a factor could change",
-    );
-    vary("what = \"band\", curve = \"nose\", values = [1]", "curve \"nose\" has no band");
-    vary(
-        "what = \"force\", curve = \"soft\", values = [1]",
-        "no interface has curve \"soft\", so varying it has no effect",
-    );
-    vary("what = \"force\", values = [1]", "name the curve: curve = ");
-    vary(
-        "what = \"curve\", curve = \"nose\", values = [\"hard\"]",
-        "there is no curve \"hard\": the scenario has inner, nose, soft",
-    );
-    vary("what = \"curve\", curve = \"nose\", from = 1, to = 2, steps = 2", "a curve needs values");
-    vary(
-        "what = \"force\", curve = \"nose\", distribution = \"cauchy\"",
-        "unknown variant `cauchy`",
-    );
-    vary(
-        "what = \"force\", curve = \"nose\", distribution = \"normal\", mean = 1, sd = 0",
-        "sd must be above 0",
-    );
-    vary(
-        "what = \"force\", curve = \"nose\", distribution = \"normal\", mean = 1, sd = 1, min = 3, max = 2",
-        "min must lie below max",
-    );
-    vary(
-        "what = \"force\", curve = \"nose\", distribution = \"uniform\", from = 1, to = 1",
-        "from must lie below to",
-    );
-    vary(
-        "what = \"force\", curve = \"nose\", distribution = \"triangular\", from = 1, mode = 3, to = 2",
-        "from, mode and to must rise",
-    );
-    vary(
-        "what = \"force\", curve = \"nose\", distribution = \"uniform\", from = 1, to = 2",
-        "add samples = … to [sweep]",
-    );
-    vary(
-        "what = \"force\", curve = \"nose\", from = 1, to = 2, steps = 1000000000000000000",
-        "the sweep has 1000000000000000000 items: 1000000000000 at most",
-    );
-    t(
-        "samples = 0\nvary = [ { what = \"force\", curve = \"nose\", distribution = \"uniform\", from = 1, to = 2 } ]",
-        "sweep.samples is 0",
-    );
-    t(
-        "sampling = \"latin_hypercube\"\nvary = [ { what = \"force\", curve = \"nose\", values = [1] } ]",
-        "sweep.sampling = \"latin_hypercube\" is given, but no variable has a distribution",
-    );
-    t(
-        "vary = [ { what = \"force\", curve = \"nose\", values = [1] }, { what = \"force\", curve = \"nose\", values = [2] } ]",
-        "sweep.vary 2 (force): force_factor[nose] is varied twice",
-    );
+    #[rustfmt::skip]
+    let cases = [
+        ("what = \"spede\"", "unknown variant `spede`, expected one of `speed`, `mass`"),
+        ("what = \"speed\", value = [1]", "unknown field `value`"),
+        ("what = \"speed\", values = [\"1m/s\"]", "sweep.vary 1 (speed): name the train: train = "),
+        ("what = \"speed\", train = \"C\", values = [\"1m/s\"]", "there is no train \"C\": the scenario has A, B"),
+        ("what = \"speed\", train = \"A\", values = [\"1\"]", "values: speed \"1\" has no unit"),
+        ("what = \"gap\", curve = \"inner\", values = [\"-1mm\"]", "values: -1mm is out of range: expected 0 or more"),
+        ("what = \"speed\", train = \"A\", vehicle = \"A1\"", "vehicle does not go with what = \"speed\""),
+        ("what = \"speed\", train = \"A\", values = [true]", "expected a number, or text"),
+        ("what = \"mass\", values = [\"1t\"]", "give vehicle = \"…\", or vehicles = […] or \"all\""),
+        ("what = \"mass\", vehicle = \"Z9\", values = [\"1t\"]", "there is no vehicle \"Z9\": the scenario has A1, A2, B1, B2"),
+        ("what = \"mass\", vehicles = \"some\", values = [\"1t\"]", "vehicles = \"some\": expected a list, or \"all\""),
+        ("what = \"mass\", vehicles = 3, values = [\"1t\"]", "expected a list of vehicles, or \"all\""),
+        ("what = \"mass\", vehicles = [\"A1\", \"A1\"], values = [\"1t\"]", "vehicles names \"A1\" twice"),
+        ("what = \"mass\", vehicle = \"A1\", factor = true, values = [\"1t\"]", "values: \"1t\" is not a number"),
+        ("what = \"gap\", interface = \"A1|A2\", values = [\"1mm\"]", "interface = \"A1|A2\": expected \"contact\""),
+        ("what = \"gap\", curve = \"inner\", values = [\"1t\"]", "length \"1t\" has the unknown unit \"t\""),
+        ("what = \"gap\", interface = \"contact\", factor = true, values = [1]", "the contact has no gap that a factor could change"),
+        ("what = \"band\", curve = \"nose\", values = [1]", "curve \"nose\" has no band"),
+        ("what = \"force\", curve = \"soft\", values = [1]", "no interface has curve \"soft\", so varying it has no effect"),
+        ("what = \"force\", values = [1]", "name the curve: curve = "),
+        ("what = \"curve\", curve = \"nose\", values = [\"hard\"]", "there is no curve \"hard\": the scenario has inner, nose, soft"),
+        ("what = \"curve\", curve = \"nose\", from = 1, to = 2, steps = 2", "a curve needs values"),
+        ("what = \"force\", curve = \"nose\", distribution = \"cauchy\"", "unknown variant `cauchy`"),
+        ("what = \"force\", curve = \"nose\", distribution = \"normal\", mean = 1, sd = 0", "sd must be above 0"),
+        ("what = \"force\", curve = \"nose\", distribution = \"normal\", mean = 1, sd = 1, min = 3, max = 2", "min must lie below max"),
+        ("what = \"force\", curve = \"nose\", distribution = \"uniform\", from = 1, to = 1", "from must lie below to"),
+        ("what = \"force\", curve = \"nose\", distribution = \"triangular\", from = 1, mode = 3, to = 2", "from, mode and to must rise"),
+        ("what = \"force\", curve = \"nose\", distribution = \"uniform\", from = 1, to = 2", "add samples = … to [sweep]"),
+        ("what = \"force\", curve = \"nose\", from = 1, to = 2, steps = 1000000000000000000", "the sweep has 1000000000000000000 items: 1000000000000 at most"),
+    ];
+    cases.into_iter().for_each(|(text, expected)| vary(text, expected));
+    #[rustfmt::skip]
+    let cases = [
+        ("samples = 0\nvary = [ { what = \"force\", curve = \"nose\", distribution = \"uniform\", from = 1, to = 2 } ]", "sweep.samples is 0"),
+        ("sampling = \"latin_hypercube\"\nvary = [ { what = \"force\", curve = \"nose\", values = [1] } ]", "sweep.sampling = \"latin_hypercube\" is given, but no variable has a distribution"),
+        ("vary = [ { what = \"force\", curve = \"nose\", values = [1] }, { what = \"force\", curve = \"nose\", values = [2] } ]", "sweep.vary 2 (force): force_factor[nose] is varied twice"),
+    ];
+    cases.into_iter().for_each(|(plan, expected)| t(plan, expected));
     // Without a plan, with one elsewhere, with arguments that make no sense.
     let folder = Folder::new("");
     let error = folder.fails(1, "sweep s.toml -o out.csv");

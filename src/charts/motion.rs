@@ -301,9 +301,8 @@ pub fn histories(
     if histories.len() > MOST {
         return Err(error!(
             Plot,
-            "{found} histories are too many for one picture, {most} at most: choose with --id and --component",
-            found = histories.len(),
-            most = MOST
+            "{found} histories are too many for one picture, {MOST} at most: choose with --id and --component",
+            found = histories.len()
         ));
     }
     if filter_class.is_some() && units.is_none() {
@@ -379,9 +378,8 @@ fn add(
     panel.series.push(Series::line(&entity, look, time.clone(), history.values.clone()));
     let Some((class, units)) = filter else { return Ok(()) };
     let time_s: Vec<f64> = time.iter().map(|t| t * units.time_s).collect();
-    let filtered = cfc::filter(class, &time_s, &history.values).map_err(|source| {
-        error!(Plot, "{history}: {source}", history = entity).caused_by(source)
-    })?;
+    let filtered = cfc::filter(class, &time_s, &history.values)
+        .map_err(|source| error!(Plot, "{entity}: {source}").caused_by(source))?;
     let name = format!("{entity}, CFC {class}");
     let line = Series::line(&name, look + 1, time, filtered.values);
     panel.series.push(line.shown(Shown::Emphasis));
@@ -403,9 +401,8 @@ mod tests {
         let all: Vec<&History> = std::iter::repeat_n(&history, MOST + 1).collect();
         let most = error!(
             Plot,
-            "{found} histories are too many for one picture, {most} at most: choose with --id and --component",
-            found = MOST + 1,
-            most = MOST
+            "{found} histories are too many for one picture, {MOST} at most: choose with --id and --component",
+            found = MOST + 1
         );
         assert_eq!(histories("", &all, None, None), Err(most));
         assert!(histories("", &all[1..], None, None).is_ok());

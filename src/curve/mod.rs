@@ -60,11 +60,7 @@ impl Curve {
             ));
         }
         if time < 2 {
-            return Err(error!(
-                Other,
-                "a curve needs at least 2 states, found {states}",
-                states = time
-            ));
+            return Err(error!(Other, "a curve needs at least 2 states, found {time}"));
         }
         let columns = [("time", &time_s), ("deflection", &deflection_m), ("force", &force_n)];
         for (column, values) in columns {

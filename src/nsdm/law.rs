@@ -284,8 +284,7 @@ impl Identifiability {
         if fits.len() < FEWEST {
             return Err(error!(
                 Comparison,
-                "{seeds} fits show no spread: at least {fewest} seeds are needed",
-                fewest = FEWEST,
+                "{seeds} fits show no spread: at least {FEWEST} seeds are needed",
                 seeds = fits.len()
             ));
         }

@@ -88,8 +88,7 @@ impl Target {
             let (velocity, acceleration) = (velocity.len(), acceleration.len());
             return Err(error!(
                 Comparison,
-                "columns differ in length: {time} times, {velocity} velocities, {acceleration} accelerations",
-                time = samples
+                "columns differ in length: {samples} times, {velocity} velocities, {acceleration} accelerations"
             ));
         }
         if samples < FEWEST_SAMPLES {
@@ -228,11 +227,7 @@ pub fn fit(target: &Target, settings: &FitSettings, seed: u64) -> Result<Fit, Er
         ));
     }
     if u32::try_from(generations).is_err() {
-        return Err(error!(
-            Comparison,
-            "{count} generations: expected fewer than 2^32",
-            count = generations
-        ));
+        return Err(error!(Comparison, "{generations} generations: expected fewer than 2^32"));
     }
     if !(weight_per_s2 >= 0.0 && weight_per_s2.is_finite()) {
         return Err(error!(

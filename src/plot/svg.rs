@@ -270,9 +270,8 @@ impl Drawing {
         let fits = |side: f64| (1.0..=f64::from(MOST)).contains(&side);
         let size = error!(
             Plot,
-            "a picture of {width} by {height} pixels cannot be drawn: expected 1 to {most} each way",
+            "a picture of {width} by {height} pixels cannot be drawn: expected 1 to {MOST} each way",
             height = height as u64,
-            most = MOST,
             width = width as u64
         );
         if !fits(width) || !fits(height) {

@@ -230,10 +230,7 @@ pub(super) fn units(
 
 /// An error of content, of the file at `path`.
 pub(super) fn content(path: &Path) -> impl Fn(Error) -> Error {
-    move |error| {
-        error!(CurveFile, "{path}: {source}", path = path.display(), source = error)
-            .caused_by(error)
-    }
+    move |error| error!(CurveFile, "{path}: {error}", path = path.display()).caused_by(error)
 }
 
 /// A place in a file, counted from 1; bytes from 0.

@@ -383,20 +383,15 @@ mod tests {
         fn t(line: &str, expected: Option<&str>) {
             assert_eq!(version(line.as_bytes()).as_deref(), expected, "{line:?}");
         }
-        t(
-            "                         ls-dyna smp.123264 s           date 01/12/2018",
-            Some("smp.123264 s"),
-        );
-        t(
-            "                    ls-dyna smp d R13 R13.1.1_27_8731a0 date 07/28/2023",
-            Some("smp d R13 R13.1.1_27_8731a0"),
-        );
-        t(
-            "                         ls-dyna (version 970)     date 1/1/2004",
-            Some("(version 970)"),
-        );
-        t("                    ls-dyna smp d R16", Some("smp d R16"));
-        t(" some other text", None);
+        #[rustfmt::skip]
+        let cases = [
+            ("                         ls-dyna smp.123264 s           date 01/12/2018", Some("smp.123264 s")),
+            ("                    ls-dyna smp d R13 R13.1.1_27_8731a0 date 07/28/2023", Some("smp d R13 R13.1.1_27_8731a0")),
+            ("                         ls-dyna (version 970)     date 1/1/2004", Some("(version 970)")),
+            ("                    ls-dyna smp d R16", Some("smp d R16")),
+            (" some other text", None),
+        ];
+        cases.into_iter().for_each(|(line, expected)| t(line, expected));
     }
 
     #[test]
