@@ -2,7 +2,7 @@
 //!
 //! # Which cases of a database belong to a study
 //!
-//! A case records its study by name, and by [`Origin`](crate::curve::Origin) the manifest, group and
+//! A case records its study by name, and by [`Origin`] the manifest, group and
 //! run that it was built from, by their names at that time.
 //!
 //! 1. The cases of a study are those of its name and group.

@@ -1,6 +1,6 @@
 //! Curve database: cases in HDF5, by group and impact speed.
 //!
-//! The layout is described in `schemas/curve_database.md`; [`hdf5`](crate::hdf5) reads and
+//! The layout is described in `schemas/curve_database.md`; `hdf5` reads and
 //! writes its parts. A file is always written as a whole and renamed into place,
 //! so an interrupted command leaves the old content readable.
 //!

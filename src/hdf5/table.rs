@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use hdf5_pure::{CharacterSet, Datatype, StringPadding, make_f64_type, make_i64_type};
 
-use super::skeleton::{Skeleton, write_all_at};
 use super::{AttrValue, Dataset, Fault, File, FileBuilder, OpenError, declared_bytes};
+use super::{Skeleton, write_all_at};
 use crate::error::{Error, error};
 use crate::file::write_at;
 

@@ -13,8 +13,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use crate::file::{write_at, write_whole};
-use crate::hdf5::skeleton::{Skeleton, write_all_at};
 use crate::hdf5::{self, AttrValue, DatasetBuilder, FileBuilder, OpenError};
+use crate::hdf5::{Skeleton, write_all_at};
 use crate::history::{EntityId, History, Side};
 use crate::solver::lsdyna::deck::Deck;
 use crate::solver::{self, Blocks, Selection, SolverFile, decks};

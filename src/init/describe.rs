@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::UserHints;
-use super::explain::FOLLOWS;
 use super::folders::{seen_from, speed_in};
 use super::measure::{self, Impact, MassEstimates, SAME_MASS, SAME_SPEED, is_near};
-use super::recipe::{CommonRecipe, names_centre_of_gravity, percent};
+use super::recipe::{CommonRecipe, FOLLOWS, names_centre_of_gravity, percent};
 use super::record::Record;
 use super::sources::MOTION;
 use super::units::digits;

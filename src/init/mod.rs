@@ -4,7 +4,6 @@
 //! and says so; unknown values are left to fill in.
 
 mod describe;
-mod explain;
 mod folders;
 mod measure;
 mod propose;

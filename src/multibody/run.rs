@@ -174,7 +174,7 @@ pub struct Run {
     pub ledger: Ledger,
     /// The step used, in s.
     pub step_s: f64,
-    /// What a user must know; see [`Self::all_warnings`] for those of the ledger too.
+    /// What a user must know; see `all_warnings` for those of the ledger too.
     pub warnings: Vec<String>,
 }
 

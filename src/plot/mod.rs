@@ -20,7 +20,6 @@ mod layout;
 mod style;
 mod svg;
 mod thin;
-mod ticks;
 
 pub(crate) use chart::PanelPlace;
 pub use chart::{

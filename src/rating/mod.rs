@@ -25,7 +25,6 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-pub(crate) mod deceleration;
 pub(crate) mod differences;
 pub(crate) mod iso18571;
 mod signal;
@@ -36,8 +35,7 @@ use serde::Serialize;
 use crate::error::Error;
 use crate::signal::l1_ratio;
 use crate::signal::peaks::{MatchedPeak, matched_peaks};
-pub(crate) use deceleration::Deceleration;
-pub(crate) use differences::{Cora, MagnitudePhase, MaxAbs, Pointwise};
+pub(crate) use differences::{Cora, Deceleration, MagnitudePhase, MaxAbs, Pointwise};
 use differences::{
     cora, integral_error, max_abs, peak_norm, pointwise, rms_ratio, russell, sprague_geers,
 };

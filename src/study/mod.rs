@@ -1,6 +1,6 @@
 //! Studies: which runs there are, and how each becomes a case.
 //!
-//! A manifest as written ([`Manifest`]) is checked once ([`Study`]); the files of a run are found
+//! A manifest as written (`Manifest`) is checked once ([`Study`]); the files of a run are found
 //! and hashed (`LocatedRun`); only if they changed are they read and the case extracted.
 
 mod check;

@@ -2,17 +2,19 @@
 //! together.
 
 mod add;
-mod check;
-mod export;
 mod join;
 mod list;
 mod rename;
 mod show;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::{CommandResult, Failure, GlobalOptions, Outcome, arguments, output, usage};
-use crate::curate::{Selection, SpeedRange};
+use crate::curate::{self, Selection, SpeedRange};
+use crate::curve::Case;
+use crate::database::Database;
+use crate::database::check::{self, Checked};
+use crate::plural::counted;
 pub(super) use list::{case_columns, case_row};
 
 /// List, show, check, add, rename, join, tag and export cases of a curve database
@@ -129,14 +131,14 @@ Tags and notes stay with a case when it is built again.")]
   crumple db export curves.h5 -o tables
   crumple db export curves.h5 --group lead-car-wall --originals -o tables
 docs/databases.md has recipes for pandas, polars, DuckDB, Parquet and xarray.")]
-    Export(export::Args),
+    Export(ExportArgs),
 }
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     match &args.command {
         Command::Ls(args) => list::run(args, options),
         Command::Show(args) => show::run(args, options),
-        Command::Check { database } => check::run(database, options),
+        Command::Check { database } => check_values(database, options),
         Command::Add(args) => add::run(args, options),
         Command::Rm(args) => rename::remove(args, options),
         Command::Rename(args) => rename::rename(args, options),
@@ -144,7 +146,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         Command::Copy(args) => join::copy(args, options),
         Command::Tag(args) => rename::tag(args, options),
         Command::Note(args) => rename::note(args, options),
-        Command::Export(args) => export::run(args, options),
+        Command::Export(args) => export(args, options),
     }
 }
 
@@ -184,4 +186,46 @@ impl Chosen {
             Ok(selection)
         }
     }
+}
+
+/// `crumple db check`: every stored value checked against the others.
+fn check_values(path: &Path, options: GlobalOptions) -> CommandResult {
+    let checked = check::check(path)?;
+    let Checked { cases, findings } = &checked;
+    options.show(&checked, |out| {
+        for f in findings {
+            writeln!(out, "{}/{}: {}", f.group, f.case, f.message)?;
+        }
+        let (cases, found) = (counted(*cases, "case"), counted(findings.len(), "finding"));
+        writeln!(out, "{cases} checked, {found}")
+    })?;
+    Ok(Outcome::warned_if(!findings.is_empty()))
+}
+
+/// Cases, and the folder for their tables.
+#[derive(clap::Args)]
+struct ExportArgs {
+    /// Curve database
+    database: PathBuf,
+    #[command(flatten)]
+    chosen: Chosen,
+    /// Folder to write to; created if it does not exist
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Also write originals.csv, the curves at the solver's rate
+    #[arg(long)]
+    originals: bool,
+}
+
+fn export(args: &ExportArgs, options: GlobalOptions) -> CommandResult {
+    let database = Database::read(&args.database)?;
+    let selection = args.chosen.selection();
+    let cases: Vec<&Case> = selection.find(&args.database, &database)?;
+    let files = curate::write_tables(&cases, &args.output, args.originals)?;
+    let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    let database = args.database.display().to_string();
+    let document = document! { database: database, cases: cases.len(), files: &files };
+    options
+        .show(&document, |out| files.iter().try_for_each(|file| writeln!(out, "wrote {file}")))?;
+    Ok(Outcome::Clean)
 }

@@ -6,7 +6,6 @@
 //! every kept history has one value per kept state.
 
 pub(in crate::solver) mod finish;
-mod table;
 
 use std::sync::Arc;
 
@@ -16,7 +15,7 @@ use super::lsdyna::line::{Field, Line, real, shown};
 use super::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::history::EntityId;
 use crate::plural::counted;
-use table::Table;
+use finish::Table;
 
 /// Values that states may lack, beyond a multiple of the values they have: more are no
 /// erosion but damage, and would fill the memory.

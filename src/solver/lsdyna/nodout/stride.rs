@@ -11,7 +11,7 @@
 //! A complete nodout state by state, for a consumer that writes each state immediately.
 //!
 //! `histories -o x.h5` of a large nodout never holds the file in memory. This module first verifies the frame of all states, so
-//! that their number is known. `hdf5/skeleton` then lets hdf5-pure encode a file whose large datasets are untouched
+//! that their number is known. `hdf5` then lets hdf5-pure encode a file whose large datasets are untouched
 //! zeros, and notes where the encoder places them. Finally the states are parsed and written to these
 //! places from all threads.
 
