@@ -144,7 +144,7 @@ fn histories_needs_a_section_and_selects() {
     says(&error, "it has no section \"secforc\": it has rwforc/forces");
     let csv = crumple_ok(
         here,
-        &["histories", path, "--section", "matsum", "--id", "101", "--component", "z_momentum"],
+        &format!("histories {path} --section matsum --id 101 --component z_momentum"),
     );
     assert_eq!(csv.lines().next(), Some("time,z_momentum[101]"));
     assert_eq!(csv.lines().count(), 1 + 88);

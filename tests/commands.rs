@@ -575,10 +575,8 @@ fn lsdyna_export_in_the_decks_units() {
 fn warnings_stand_in_text_and_json() {
     let folder = demo_folder();
     let codes = |speed: &str| -> Vec<String> {
-        let curve = json(&crumple_ok(
-            folder.path(),
-            &["predict", "lead.model", "--speed", speed, "--json"],
-        ));
+        let curve =
+            json(&crumple_ok(folder.path(), &format!("predict lead.model --speed {speed} --json")));
         let warnings = curve["warnings"].as_array().unwrap();
         warnings.iter().map(|w| w["code"].as_str().unwrap().to_string()).collect()
     };
@@ -612,17 +610,7 @@ fn energy_rule_takes_up_the_kinetic_energy() {
     for (mass, expected) in [("24t", 24e3), ("20t", 20e3)] {
         let curve = json(&crumple_ok(
             folder.path(),
-            &[
-                "predict",
-                "lead.model",
-                "--speed",
-                "50km/h",
-                "--mass",
-                mass,
-                "--max-crush",
-                "energy",
-                "--json",
-            ],
+            &format!("predict lead.model --speed 50km/h --mass {mass} --max-crush energy --json"),
         ));
         assert_eq!(curve["mass_kg"], expected);
         let ratio = curve["provenance"]["energy_over_kinetic"].as_f64().unwrap();

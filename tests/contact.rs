@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::common::{crumple_fails, crumple_in, crumple_ok, entries, fixture, says};
 use crumple::curve::Masses;
-use crumple::curve::{ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract};
+use crumple::curve::{Extracted, Measured, MeasuredForce, Setup, Stated, extract};
 use crumple::curve::{Recipe, RecordedMotion};
 use crumple::history::{EntityId, History};
 use crumple::solver::{self, Selection};
@@ -93,7 +93,7 @@ impl Run {
         self
     }
 
-    fn extract_with(&self, recipe: &str, stated: Stated) -> Result<Extracted, ExtractError> {
+    fn extract_with(&self, recipe: &str, stated: Stated) -> Result<Extracted, crumple::Error> {
         let recipe: Recipe = toml::from_str(recipe).unwrap();
         let is_body = recipe.force_is_body();
         let measured = Measured {

@@ -304,7 +304,7 @@ fn damage_of_a_solver_file_is_a_warning() {
     let whole = path.to_str().unwrap();
     let output = crumple_in(
         folder.path(),
-        &["rate", whole, "nodout", "--component=x_velocity", "--json", "--strict"],
+        &format!("rate {whole} nodout --component=x_velocity --json --strict"),
     );
     assert_eq!(output.status.code(), Some(3));
     assert!(String::from_utf8_lossy(&output.stderr).starts_with("warning: nodout: "));

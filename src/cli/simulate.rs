@@ -190,7 +190,7 @@ pub(super) fn write_channels(path: &Path, prepared: &Prepared, run: &Run) -> Res
     let bodies = prepared.chain.bodies();
     if bodies.len() > OBJECTS {
         return usage(format!(
-            "-o {}: ISO-MME names at most {OBJECTS} test objects, the chain has {} bodies: write_channels a .csv file",
+            "-o {}: ISO-MME names at most {OBJECTS} test objects, the chain has {} bodies: write a .csv file",
             path.display(),
             bodies.len()
         ));

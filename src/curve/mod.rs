@@ -26,9 +26,7 @@ use crate::unit::{Speed, UnitSystem};
 pub use body::BodyMotion;
 pub use energy::audit;
 pub use envelope::Envelope;
-pub use extract::{
-    ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, StatedContact, extract,
-};
+pub use extract::{Extracted, Measured, MeasuredForce, Setup, Stated, StatedContact, extract};
 pub use force_curve::{CurveUnloading, ForceCurve, Tail};
 pub use from_table::from_table;
 pub use loading::{Loading, unloading_stiffness};

@@ -66,7 +66,7 @@ impl ExportCurve {
                     softening = Some((own_peak_n, soft.peak_force_n()));
                     loading = soft;
                 }
-                Softened::ImpossibleRun => {
+                Softened::Impossible => {
                     return Err(error!(
                         Export,
                         "no steep rise can be reduced to {} at equal energy without changing the curve's end, or forces by more than a quarter: remove --soften",

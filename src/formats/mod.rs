@@ -34,7 +34,7 @@ pub use fmu::{FmiVersion, Spring, archive, binaries};
 pub use lsdyna::Material;
 pub use read::curve::{Metadata, ReadFile};
 pub(crate) use read::history;
-pub use read::{ColumnNames, READERS, ReadCurve, ReadOptions, Reader, read};
+pub use read::{ColumnNames, ReadCurve, ReadOptions, read, readers};
 
 /// One target: its name, file extensions, capabilities and writer.
 pub struct Format {

@@ -133,7 +133,7 @@ fn check_kinds(item: &Item, case: &Case, other: &Case) -> Result<(), Error> {
 
 fn of(item: &Item, settings: &Settings, group: Option<&Case>) -> Result<Case, Error> {
     check_name(item, "group", &settings.group)?;
-    let (curve, reader) = read::read(&item.path, &settings.read)?;
+    let (curve, format) = read::read(&item.path, &settings.read)?;
     let name = case_name(item)?;
     check_name(item, "case", &name)?;
     let (notes, warnings) = (Vec::new(), Vec::new());
@@ -161,7 +161,7 @@ fn of(item: &Item, settings: &Settings, group: Option<&Case>) -> Result<Case, Er
     };
     let (curves, quality) = from_table(&table, &impact)
         .map_err(|error| error.coded(ErrorCode::Import).of(item.path.display()))?;
-    let recipe = recipe(item, settings, &curve, reader.name, &impact);
+    let recipe = recipe(item, settings, &curve, format, &impact);
     let mut hash = blake3::Hasher::new();
     hash.update(recipe.as_bytes());
     for file in &curve.files {
@@ -172,7 +172,7 @@ fn of(item: &Item, settings: &Settings, group: Option<&Case>) -> Result<Case, Er
         absolute_path: Some(absolute(&file.path)),
         size_bytes: file.size_bytes,
         blake3: file.blake3.clone(),
-        format: reader.name.into(),
+        format: format.into(),
         solver: None,
         version: None,
         title: curve.title.clone(),

@@ -174,7 +174,7 @@ pub struct Run {
     pub ledger: Ledger,
     /// The step used, in s.
     pub step_s: f64,
-    /// What a user must know; see `all_warnings` for those of the ledger too.
+    /// What a user must know; see [`Self::all_warnings`] for those of the ledger too.
     pub warnings: Vec<String>,
 }
 
@@ -275,7 +275,7 @@ impl Run {
     }
 
     /// All that a user must know, as text.
-    pub(crate) fn all_warnings(&self) -> Vec<String> {
+    pub fn all_warnings(&self) -> Vec<String> {
         let mut warnings = self.ledger.warnings();
         warnings.extend(self.warnings.iter().cloned());
         warnings

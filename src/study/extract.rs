@@ -3,7 +3,7 @@
 use super::files::{Located, LocatedRun, RunDeck, force_file, shown_name};
 use crate::curve::contact::THRESHOLD;
 use crate::curve::extract::{
-    ExtractError, Extracted, Measured, MeasuredForce, Notes, Setup, extract,
+    ExtractError, Extracted, Measured, MeasuredForce, Notes, Setup, of_run,
 };
 use crate::curve::recipe::{DeflectionSource, ForceSource, Recipe};
 use crate::curve::{Case, CaseId, Conditions, Origin, Provenance, Quality, SourceFile};
@@ -84,7 +84,7 @@ impl LocatedRun<'_> {
             stated: study.stated(entry),
             others: &others,
         };
-        extract(&files.measured(units)?, &setup).map_err(|source| {
+        of_run(&files.measured(units)?, &setup).map_err(|source| {
             if let ExtractError::Curve(error) = &source
                 && error.is_about("sampling")
             {

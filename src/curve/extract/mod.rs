@@ -14,12 +14,13 @@ mod start;
 
 use super::recipe::{Filter, RecordedMotion, Sampling};
 use super::{Curve, EnergyAudit, ForceKind, Masses, Quality, RecordedCurves, energy, loading};
+use crate::error::{Error, ErrorCode};
 use crate::history::History;
 use crate::plural::counted;
 use crate::signal::cfc;
 use crate::unit::{Speed, SpeedKind, UnitSystem};
 use consistency::Motion;
-pub use error::ExtractError;
+pub(crate) use error::ExtractError;
 pub(crate) use record::Record;
 use record::sample;
 use start::{FromContact, ImpactSpeed, SpeedBy, Start};
@@ -43,8 +44,16 @@ pub struct Extracted {
 /// original rate), deflection from contact on, speed, resampling, audit and its bounds.
 ///
 /// # Errors
-/// [`ExtractError`] says which history cannot be used and what to change.
-pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, ExtractError> {
+/// It says which history cannot be used and what to change.
+pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, Error> {
+    of_run(measured, setup).map_err(|reason| Error::below(ErrorCode::Run, reason))
+}
+
+/// The same, for callers that decide by the reason.
+pub(crate) fn of_run(
+    measured: &Measured<'_>,
+    setup: &Setup<'_>,
+) -> Result<Extracted, ExtractError> {
     let (record, remarks) = Record::of(measured, setup)?;
     curve_of(record, remarks, setup)
 }

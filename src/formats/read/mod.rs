@@ -40,7 +40,7 @@ pub(crate) use tables::history;
 
 /// One format of curves.
 #[derive(Debug)]
-pub struct Reader {
+pub(crate) struct Reader {
     /// Its name.
     pub name: &'static str,
     /// Without the dot; the first is the usual one.
@@ -64,7 +64,7 @@ enum Read {
 
 /// Every format we read, in the order in which content is tried. To add one: write its module, add
 /// its line here.
-pub const READERS: &[Reader] = &[
+pub(crate) const READERS: &[Reader] = &[
     Reader {
         name: "mat",
         extensions: &["mat"],
@@ -218,13 +218,18 @@ pub(crate) fn is_folder_of_tests(path: &Path) -> bool {
     path.is_dir() && !iso_mme::tests(path).is_empty()
 }
 
-/// Reads the curve at `path`, a file, or for ISO-MME a test's folder.
+/// The names of the formats that are read.
+pub fn readers() -> impl Iterator<Item = &'static str> {
+    READERS.iter().map(|reader| reader.name)
+}
+
+/// Reads the curve at `path`, a file, or for ISO-MME a test's folder; with the name of its format.
 ///
 /// # Errors
 /// It names the file, the place in it, what was expected there and what to do.
-pub fn read(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static Reader), Error> {
+pub fn read(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static str), Error> {
     let (found, reader) = parse(path, options)?;
-    Ok((found.curve(path)?, reader))
+    Ok((found.curve(path)?, reader.name))
 }
 
 /// What a file holds before it becomes one curve.
@@ -338,7 +343,7 @@ pub(crate) fn driving(path: &Path, options: &ReadOptions) -> Result<DrivingFile,
 
 /// The reader that was named, else the first that knows the content, else that of the extension.
 fn reader(input: &Input<'_>) -> Result<&'static Reader, Error> {
-    let known = || READERS.iter().map(|r| r.name).collect::<Vec<_>>().join(", ");
+    let known = || readers().collect::<Vec<_>>().join(", ");
     if let Some(name) = &input.options.format {
         let found = READERS.iter().find(|r| r.name == name);
         return found.ok_or_else(|| {
