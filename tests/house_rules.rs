@@ -274,7 +274,6 @@ fn files_are_opened_where_their_kind_is_asked() {
     // These have asked themselves, or open what this program has made.
     let allowed = [
         "src/file/mod.rs",
-        "src/file/lock.rs",
         "src/file/write.rs",
         "src/solver/source.rs",
         "src/solver/decks.rs",
@@ -321,7 +320,7 @@ fn no_unwrap_outside_tests() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 72116), ("files", 280), ("public types", 191), ("error types", 9)];
+    [("lines", 72118), ("files", 280), ("public types", 192), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {

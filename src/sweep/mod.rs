@@ -40,7 +40,7 @@ pub use journal::{WriteOptions, merge, write, write_rows};
 pub use run::Chunk;
 pub(crate) use statistics::ColumnStatistics;
 use variables::Variable;
-pub(crate) use variables::VariableSummary;
+pub use variables::VariableSummary;
 
 /// A share of a sweep: block `index` of `count` blocks of neighbouring items.
 ///
@@ -194,7 +194,7 @@ impl Sweep {
     }
 
     /// The variables: columns and how many values they have.
-    pub(crate) fn variables(&self) -> Vec<VariableSummary> {
+    pub fn variables(&self) -> Vec<VariableSummary> {
         let variables = self.variables.iter().zip(&self.design.spreads);
         let summary = |(variable, spread): (&Variable, &Spread)| VariableSummary {
             column: variable.column.clone(),

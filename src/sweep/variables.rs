@@ -9,6 +9,7 @@ use crate::unit::{LengthText, MassText, SignedSpeedText};
 
 /// One column of varied values.
 pub(crate) struct Variable {
+    /// Name of its column.
     pub column: String,
     target: Target,
     /// Values multiply what is there.
@@ -32,7 +33,8 @@ enum Target {
 
 /// A variable for people to look at.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct VariableSummary {
+pub struct VariableSummary {
+    /// Name of its column.
     pub column: String,
     /// Values along the grid; `None` of a distribution.
     pub values: Option<u64>,
