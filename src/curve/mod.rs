@@ -32,7 +32,7 @@ pub use from_table::from_table;
 pub use loading::{Loading, unloading_stiffness};
 pub use recipe::{Filter, ForceSource, Recipe, RecordedMotion, Sampling};
 pub use retrace::{Impact, Table};
-pub(crate) use stopped_mass::StoppedMass;
+pub use stopped_mass::StoppedMass;
 
 /// A force–deflection history: what one run measured at an interface.
 ///

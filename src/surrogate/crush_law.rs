@@ -40,7 +40,7 @@ pub struct CrushLaw {
     pub of_impact: f64,
     /// The stopped mass, with the deviation of the runs' momentum.
     #[serde(flatten)]
-    pub(crate) stopped: StoppedMass,
+    pub stopped: StoppedMass,
     #[serde(skip)]
     forces: Cached<CrushForces>,
 }
