@@ -9,13 +9,13 @@ use serde::Serialize;
 use crate::error::{self, ErrorCode, Place};
 
 /// Exit code of a command that did its work.
-pub const DONE: u8 = 0;
+pub(crate) const DONE: u8 = 0;
 /// Exit code of a command that could not do its work, or only part of it.
-pub const FAILED: u8 = 1;
+pub(crate) const FAILED: u8 = 1;
 /// Exit code for arguments that make no sense or do not fit together.
-pub const USAGE: u8 = 2;
+pub(crate) const USAGE: u8 = 2;
 /// Exit code of a command that did its work, but with damage or warnings, under `--strict`.
-pub const DONE_WITH_WARNINGS: u8 = 3;
+pub(crate) const DONE_WITH_WARNINGS: u8 = 3;
 
 /// The exit codes with their meanings, as docs/error-codes.md has them.
 pub const EXIT_CODES: [(u8, &str); 4] = [
@@ -27,14 +27,14 @@ pub const EXIT_CODES: [(u8, &str); 4] = [
 
 /// What `--json` prints on standard output when a command fails.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ErrorDocument {
+pub(crate) struct ErrorDocument {
     /// The error.
-    pub error: ErrorReport,
+    pub(crate) error: ErrorReport,
 }
 
 /// One error.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct ErrorReport {
+pub(crate) struct ErrorReport {
     /// Its kind; a code never changes its meaning.
     pub code: ErrorCode,
     /// What standard error would have shown, without the excerpt.
@@ -97,7 +97,7 @@ pub(crate) fn causes(error: &(dyn Error + 'static)) -> Vec<String> {
 
 impl ErrorDocument {
     /// The document of an error.
-    pub fn new(error: &(dyn Error + 'static)) -> Self {
+    pub(crate) fn new(error: &(dyn Error + 'static)) -> Self {
         let message = error.to_string();
         let place = place(error);
         let error = ErrorReport {

@@ -166,7 +166,6 @@ pub(crate) fn time_gaps(time: &[f64]) -> Vec<TimeGap> {
 mod tests {
     use super::*;
 
-    /// Times with these intervals, from 0.
     fn times(intervals: impl IntoIterator<Item = f64>) -> Vec<f64> {
         let mut now = 0.0;
         let behind = intervals.into_iter().map(|interval| {

@@ -39,7 +39,7 @@ mod clock;
 
 mod guess;
 
-pub mod plural;
+mod plural;
 
 mod table;
 
@@ -53,11 +53,11 @@ pub mod solver;
 
 pub mod curve;
 
-pub mod manifest;
+mod manifest;
 
 pub mod study;
 
-pub mod hdf5;
+mod hdf5;
 
 pub mod history_hdf5;
 
@@ -69,7 +69,7 @@ pub mod init;
 
 pub mod dataset;
 
-pub mod curate;
+mod curate;
 
 mod piecewise;
 
@@ -85,21 +85,21 @@ pub mod nsdm;
 
 pub mod formats;
 
-pub mod import;
+mod import;
 
-pub mod plan;
+mod plan;
 
 pub mod scenario;
 
 pub mod sweep;
 
-pub mod rating;
+mod rating;
 
 pub mod assess;
 
 pub mod charts;
 
-pub mod report;
+mod report;
 
 pub mod failure;
 

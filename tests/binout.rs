@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::common::containers::{Written, binout_of};
 use crate::common::{
-    crumple_fails, crumple_in, crumple_ok, fixture, python, run_python, samples, shared,
+    crumple_fails, crumple_in, crumple_ok, fixture, python, run_python, samples, says, shared,
 };
 use crumple::history::EntityId;
 use crumple::solver::{ProblemCode, Selection, SolverFile, read, read_sections};
@@ -139,15 +139,12 @@ fn histories_needs_a_section_and_selects() {
     let path = path.to_str().unwrap();
     let here = Path::new(".");
     let error = crumple_fails(here, 1, &["histories", path]);
-    assert!(
-        error.contains("it has several sections: select one of rwforc/forces, glstat, matsum"),
-        "{error}"
-    );
+    says(&error, "it has several sections: select one of rwforc/forces, glstat, matsum");
     let error = crumple_fails(here, 1, &["histories", path, "--section", "secforc"]);
-    assert!(error.contains("it has no section \"secforc\": it has rwforc/forces"), "{error}");
+    says(&error, "it has no section \"secforc\": it has rwforc/forces");
     let csv = crumple_ok(
         here,
-        &["histories", path, "--section", "matsum", "--id", "101", "--component", "z_momentum"],
+        &format!("histories {path} --section matsum --id 101 --component z_momentum"),
     );
     assert_eq!(csv.lines().next(), Some("time,z_momentum[101]"));
     assert_eq!(csv.lines().count(), 1 + 88);
@@ -267,7 +264,7 @@ fn equal_ids_are_named_and_take_no_square_of_time() {
         let arguments = ["histories", path.to_str().unwrap(), "-o", output.to_str().unwrap()];
         let error = String::from_utf8(crumple_in(folder.path(), &arguments).stderr).unwrap();
         let expected = "nodout: 1 ids, the first 7, occur more than once in one state; rows beyond the first 20 are left out";
-        assert!(error.contains(expected), "{error}");
+        says(&error, expected);
         start.elapsed()
     };
     converted(1_000);
@@ -291,7 +288,7 @@ fn a_list_of_ids_is_bounded() {
     let file = section(&path, "nodout");
     assert_eq!(file.histories.len(), 0);
     let said = file.problems[0].to_string();
-    assert!(said.contains("has 4000001 values per state but a different number of ids"), "{said}");
+    says(&said, "has 4000001 values per state but a different number of ids");
 }
 
 /// Elements that erode, with two integration points each.
@@ -404,7 +401,7 @@ fn a_recipe_finds_text_or_binout() {
     let build = |files: &[(&str, Vec<u8>)]| -> serde_json::Value {
         let folder = tempfile::tempdir().unwrap();
         study(folder.path(), files);
-        let report = crumple_ok(folder.path(), &["build", "study.toml", "-o", "c.h5", "--json"]);
+        let report = crumple_ok(folder.path(), "build study.toml -o c.h5 --json");
         let report: serde_json::Value = serde_json::from_str(&report).unwrap();
         report["runs"][0]["case"].clone()
     };
@@ -414,7 +411,7 @@ fn a_recipe_finds_text_or_binout() {
         assert_eq!(from_text[key], from_binout[key], "{key}");
     }
     let notes = from_binout["notes"].to_string();
-    assert!(notes.contains("rwforc: read from section rwforc/forces of binout0000"), "{notes}");
+    says(&notes, "rwforc: read from section rwforc/forces of binout0000");
     let both = build(&[
         ("nodout", text("nodout")),
         ("rwforc", text("rwforc")),
@@ -436,11 +433,7 @@ fn a_recipe_finds_text_or_binout() {
     let both =
         build(&[("nodout", text("nodout")), ("rwforc", other.into_bytes()), ("binout", binout)]);
     let warnings = both["warnings"].to_string();
-    assert!(
-        warnings
-            .contains("rwforc and section rwforc/forces of binout differ; the text file was used"),
-        "{warnings}"
-    );
+    says(&warnings, "rwforc and section rwforc/forces of binout differ; the text file was used");
 }
 
 /// A container over two files, and one that ends within a record.
@@ -503,7 +496,7 @@ fn damage(seed: &[u8]) {
             }
         }
     }
-    let output = crumple_in(folder.path(), &["inspect", "binout"]);
+    let output = crumple_in(folder.path(), "inspect binout");
     assert!(output.status.code().is_some_and(|c| c < 4));
 }
 
@@ -580,16 +573,16 @@ fn job_ids_stand_before_names() {
     let build = |files: &[(&str, Vec<u8>)], code: i32| -> serde_json::Value {
         let folder = tempfile::tempdir().unwrap();
         study(folder.path(), files);
-        let output = crumple_in(folder.path(), &["build", "study.toml", "-o", "c.h5", "--json"]);
+        let output = crumple_in(folder.path(), "build study.toml -o c.h5 --json");
         assert_eq!(output.status.code(), Some(code), "{output:?}");
         if code > 0 {
             let said = [output.stdout, output.stderr].concat();
             return String::from_utf8(said).unwrap().into();
         }
-        let listed = crumple_ok(folder.path(), &["inspect", "12kmh"]);
+        let listed = crumple_ok(folder.path(), "inspect 12kmh");
         assert!(files.iter().all(|(name, _)| listed.contains(name)), "{listed}");
-        crumple_ok(folder.path(), &["init", "12kmh", "-o", "proposed.toml"]);
-        crumple_ok(folder.path(), &["build", "proposed.toml", "-o", "p.h5"]);
+        crumple_ok(folder.path(), "init 12kmh -o proposed.toml");
+        crumple_ok(folder.path(), "build proposed.toml -o p.h5");
         let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         report["runs"][0]["case"]["work_J"].clone()
     };
@@ -598,8 +591,7 @@ fn job_ids_stand_before_names() {
     assert_eq!(build(&jobs, 0), plain);
     assert_eq!(build(&[("HAT.v2.binout0000", binout_of(&run))], 0), plain);
     let two = [("a.nodout", text("nodout")), ("b.nodout", text("nodout")), jobs[1].clone()];
-    let said = build(&two, 1).to_string();
-    assert!(said.contains("has a.nodout and b.nodout: write in the recipe which one"), "{said}");
+    says(&build(&two, 1).to_string(), "has a.nodout and b.nodout: write in the recipe which one");
 }
 
 /// The binouts of one job are one tree, apart from those of another.

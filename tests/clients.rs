@@ -98,7 +98,7 @@ fn h5py_reads_what_db_show_prints() {
         build_fixture(folder.path(), group);
     }
     let read = run_python("read_database.py", &[folder.path().join("curves.h5").to_str().unwrap()]);
-    let shown = crumple_ok(folder.path(), &["db", "show", "curves.h5", "--json"]);
+    let shown = crumple_ok(folder.path(), "db show curves.h5 --json");
     let shown: Value = serde_json::from_str(&shown).unwrap();
     let cases = read["cases"].as_array().unwrap();
     assert_eq!(cases.len(), 20);
@@ -320,7 +320,7 @@ fn onnx_runtime_predicts_the_same() {
     build_fixture(here, "lead-car-wall");
     for choice in ["--paper", "--model=forest"] {
         crumple_ok(here, &["train", "curves.h5", "--group", "lead-car-wall", choice, "-o", "m"]);
-        crumple_ok(here, &["export", "m", "--to", "onnx", "-o", "m.onnx"]);
+        crumple_ok(here, "export m --to onnx -o m.onnx");
         let text = std::fs::read_to_string(here.join("m")).unwrap();
         let records = records_at_thresholds(&serde_json::from_str(&text).unwrap());
         assert!(records.nrows() > 1000);

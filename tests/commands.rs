@@ -3,13 +3,9 @@
 use std::path::Path;
 
 use crate::common::{
-    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, fixture, shared,
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, fixture, json, says, shared,
 };
 use serde_json::Value;
-
-fn json(text: &str) -> Value {
-    serde_json::from_str(text).unwrap()
-}
 
 const WALL: &str = "lead-car-wall";
 
@@ -51,8 +47,7 @@ fn histories_selects_ids_sides_and_components() {
 fn build_is_incremental_by_content() {
     let folder = tempfile::tempdir().unwrap();
     copy(&fixture("fe/lead-car-wall"), &folder.path().join("study"));
-    let build =
-        || json(&crumple_ok(folder.path(), &["build", "study/study.toml", "-o", "c.h5", "--json"]));
+    let build = || json(&crumple_ok(folder.path(), "build study/study.toml -o c.h5 --json"));
     let outcomes = |report: &Value| -> Vec<String> {
         let runs = report["runs"].as_array().unwrap();
         runs.iter().map(|r| r["outcome"].as_str().unwrap().to_string()).collect()
@@ -91,8 +86,7 @@ fn an_included_file_is_part_of_the_deck() {
     std::fs::write(run.join("main.k"), "*KEYWORD\n*INCLUDE\nmore.k\n*END\n").unwrap();
     let include = |comment: &str| {
         std::fs::write(run.join("more.k"), format!("*KEYWORD\n$ {comment}\n*END\n")).unwrap();
-        let report =
-            crumple_ok(folder.path(), &["build", "study/study.toml", "-o", "c.h5", "--json"]);
+        let report = crumple_ok(folder.path(), "build study/study.toml -o c.h5 --json");
         json(&report)["runs"][3]["outcome"].clone()
     };
     assert_eq!(include("one"), "built");
@@ -145,16 +139,13 @@ fn speed_is_taken_from_the_first_state_and_said() {
         let text = std::fs::read_to_string(&path).unwrap();
         let bare: Vec<&str> = text.lines().filter(|l| !l.starts_with("speed")).collect();
         std::fs::write(&path, bare.join("\n")).unwrap();
-        let report = json(&crumple_ok(
-            folder.path(),
-            &["build", "study/study.toml", "-o", "c.h5", "--json"],
-        ));
+        let report = json(&crumple_ok(folder.path(), "build study/study.toml -o c.h5 --json"));
         let case = &report["runs"][0]["case"];
         let speed = case["speed_m_per_s"].as_f64().unwrap();
         assert!((speed * 3.6 - first_speed).abs() < 1e-4, "{group}: {speed} m/s");
         let notes = case["notes"].to_string();
         let said = format!("speed: {first_speed} km/h taken from the record");
-        assert!(notes.contains(&said), "{notes}");
+        says(&notes, &said);
     }
 }
 
@@ -165,14 +156,10 @@ fn a_wrong_speed_in_the_manifest_is_noticed() {
     let path = folder.path().join("study/study.toml");
     let text = std::fs::read_to_string(&path).unwrap();
     std::fs::write(&path, text.replace("\"36km/h\"", "\"38km/h\"")).unwrap();
-    let output =
-        crumple_in(folder.path(), &["build", "study/study.toml", "-o", "c.h5", "--strict"]);
+    let output = crumple_in(folder.path(), "build study/study.toml -o c.h5 --strict");
     assert_eq!(output.status.code(), Some(3));
     let error = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        error.contains("36kmh: speed: the record states 36 km/h; the manifest's 38 km/h is used"),
-        "{error}"
-    );
+    says(&error, "36kmh: speed: the record states 36 km/h; the manifest's 38 km/h is used");
 }
 
 /// Energy audits of all bundled runs: W/E between 0.99 and 1.05, as the runs' physics has it.
@@ -182,7 +169,7 @@ fn energy_audits_of_all_groups() {
     for group in [WALL, "lead-car-pair", "vehicle-pair"] {
         build_fixture(folder.path(), group);
     }
-    let list = json(&crumple_ok(folder.path(), &["db", "ls", "curves.h5", "--json"]));
+    let list = json(&crumple_ok(folder.path(), "db ls curves.h5 --json"));
     let mut cases = 0;
     for (group, rows) in list["groups"].as_object().unwrap() {
         let speeds: Vec<f64> =
@@ -196,7 +183,7 @@ fn energy_audits_of_all_groups() {
         }
     }
     assert_eq!(cases, 20);
-    let check = crumple_ok(folder.path(), &["db", "check", "curves.h5"]);
+    let check = crumple_ok(folder.path(), "db check curves.h5");
     // At 3 km/h a step is a good part of the crush.
     let findings: Vec<&str> = check.lines().collect();
     assert!(
@@ -291,8 +278,7 @@ fn constant_force_through_the_whole_chain() {
             text += &format!("[[run]]\npath = \"v{speed}\"\nmass = \"24t\"\n");
         }
         std::fs::write(folder.path().join("study.toml"), text).unwrap();
-        let report =
-            json(&crumple_ok(folder.path(), &["build", "study.toml", "-o", "c.h5", "--json"]));
+        let report = json(&crumple_ok(folder.path(), "build study.toml -o c.h5 --json"));
         for (run, speed) in report["runs"].as_array().unwrap().iter().zip(speeds) {
             let case = &run["case"];
             let value = |key: &str| case[key].as_f64().unwrap();
@@ -305,9 +291,9 @@ fn constant_force_through_the_whole_chain() {
         }
     }
     // The forest's out-of-bag r² does not exist here, and the model still reads back.
-    crumple_ok(folder.path(), &["build", "study.toml", "-o", "c.h5"]);
-    crumple_ok(folder.path(), &["train", "c.h5", "--group", "g", "-o", "c.model"]);
-    crumple_ok(folder.path(), &["predict", "c.model", "--speed", "11m/s"]);
+    crumple_ok(folder.path(), "build study.toml -o c.h5");
+    crumple_ok(folder.path(), "train c.h5 --group g -o c.model");
+    crumple_ok(folder.path(), "predict c.model --speed 11m/s");
 }
 
 /// Two lead cars closing at 72 km/h are each like one against a wall at 36 km/h.
@@ -316,7 +302,7 @@ fn pair_and_wall_agree_by_symmetry() {
     let folder = tempfile::tempdir().unwrap();
     build_fixture(folder.path(), WALL);
     build_fixture(folder.path(), "lead-car-pair");
-    let list = json(&crumple_ok(folder.path(), &["db", "ls", "curves.h5", "--json"]));
+    let list = json(&crumple_ok(folder.path(), "db ls curves.h5 --json"));
     let crush = |group: &str, name: &str| {
         let rows = list["groups"][group].as_array().unwrap();
         rows.iter().find(|r| r["name"] == name).unwrap()["max_deflection_m"].as_f64().unwrap()
@@ -340,10 +326,7 @@ fn body_force_from_acceleration_and_from_velocity() {
             "force = {{ file = \"nodout\", node = 900001, component = \"{component}\", times = \"mass\" }}"
         );
         std::fs::write(&path, text.replace(contact, &body)).unwrap();
-        let report = json(&crumple_ok(
-            folder.path(),
-            &["build", "study/study.toml", "-o", "c.h5", "--json"],
-        ));
+        let report = json(&crumple_ok(folder.path(), "build study/study.toml -o c.h5 --json"));
         for run in report["runs"].as_array().unwrap() {
             let case = &run["case"];
             assert_eq!(case["force_kind"], "body");
@@ -490,19 +473,7 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
     let folder = demo_folder();
     let curve = json(&crumple_ok(
         folder.path(),
-        &[
-            "predict",
-            "lead.model",
-            "--speed",
-            "50km/h",
-            "--json",
-            "-o",
-            "a.json",
-            "-o",
-            "a.csv",
-            "-o",
-            "a.k",
-        ],
+        "predict lead.model --speed 50km/h --json -o a.json -o a.csv -o a.k",
     ));
     for key in [
         "deflection_m",
@@ -573,7 +544,7 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
 #[test]
 fn lsdyna_export_in_the_decks_units() {
     let folder = demo_folder();
-    crumple_ok(folder.path(), &["predict", "lead.model", "--speed", "50km/h", "-o", "a.json"]);
+    crumple_ok(folder.path(), "predict lead.model --speed 50km/h -o a.json");
     let deck = |units: &str| -> Vec<(f64, f64)> {
         let text = crumple_ok(
             folder.path(),
@@ -603,10 +574,8 @@ fn lsdyna_export_in_the_decks_units() {
 fn warnings_stand_in_text_and_json() {
     let folder = demo_folder();
     let codes = |speed: &str| -> Vec<String> {
-        let curve = json(&crumple_ok(
-            folder.path(),
-            &["predict", "lead.model", "--speed", speed, "--json"],
-        ));
+        let curve =
+            json(&crumple_ok(folder.path(), &format!("predict lead.model --speed {speed} --json")));
         let warnings = curve["warnings"].as_array().unwrap();
         warnings.iter().map(|w| w["code"].as_str().unwrap().to_string()).collect()
     };
@@ -619,7 +588,7 @@ fn warnings_stand_in_text_and_json() {
     assert!(codes("80km/h").contains(&"out_of_range".into()));
     let (code, human) = text("80km/h");
     assert_eq!(code, Some(3));
-    assert!(human.contains("80 km/h is 8 km/h above the highest training speed"), "{human}");
+    says(&human, "80 km/h is 8 km/h above the highest training speed");
     assert!(codes("10km/h").contains(&"out_of_range".into()));
     let train = ["train", "curves.h5", "--group", WALL];
     crumple_ok(folder.path(), &[&train[..], &forest[..]].concat());
@@ -640,17 +609,7 @@ fn energy_rule_takes_up_the_kinetic_energy() {
     for (mass, expected) in [("24t", 24e3), ("20t", 20e3)] {
         let curve = json(&crumple_ok(
             folder.path(),
-            &[
-                "predict",
-                "lead.model",
-                "--speed",
-                "50km/h",
-                "--mass",
-                mass,
-                "--max-crush",
-                "energy",
-                "--json",
-            ],
+            &format!("predict lead.model --speed 50km/h --mass {mass} --max-crush energy --json"),
         ));
         assert_eq!(curve["mass_kg"], expected);
         let ratio = curve["provenance"]["energy_over_kinetic"].as_f64().unwrap();
@@ -768,8 +727,7 @@ fn compare_at_all_speeds_with_one_fixed_curve() {
     let sum: f64 = comparisons.iter().map(|c| c["rows"][2]["velocity_l1"].as_f64().unwrap()).sum();
     assert!((mean - sum / 5.0).abs() < 1e-12);
     let own = [&base[..], &["--fixed-speed", "48km/h", "--speed", "48km/h"]].concat();
-    let error = crumple_fails(folder.path(), 1, &own);
-    assert!(error.contains("the speed that is left out: choose another one"), "{error}");
+    says(&crumple_fails(folder.path(), 1, &own), "the speed that is left out: choose another one");
 }
 
 #[test]
@@ -781,8 +739,11 @@ fn wall_curves_do_not_drive_pairs() {
         [[train]]\nname = \"B\"\nspeed = \"0m/s\"\nvehicles = [{ name = \"B1\", mass = \"24t\" }]\n\
         [contact]\ncurve = \"c\"\n";
     std::fs::write(folder.path().join("s.toml"), text).unwrap();
-    let error = crumple_fails(folder.path(), 1, &["simulate", "s.toml"]);
-    assert!(error.contains("curve \"c\" was measured at wall speeds, but interface A1|B1 needs one of closing speeds"), "{error}");
+    let error = crumple_fails(folder.path(), 1, "simulate s.toml");
+    says(
+        &error,
+        "curve \"c\" was measured at wall speeds, but interface A1|B1 needs one of closing speeds",
+    );
 }
 
 #[test]
@@ -893,7 +854,7 @@ fn scenarios_choose_the_force() {
     };
     let crush = |nose: &str| {
         scenario(nose);
-        let result = json(&crumple_ok(here, &["simulate", "s.toml", "--json"]));
+        let result = json(&crumple_ok(here, "simulate s.toml --json"));
         result["summary"]["interfaces"][0]["max_deflection_m"].as_f64().unwrap()
     };
     // FE's maximum crush is 0.8749 m; a contact force stops the body short of it.
@@ -910,7 +871,7 @@ fn scenarios_choose_the_force() {
     // A CSV file says itself which force it holds and how it unloads.
     let run = |nose: &str| {
         scenario(nose);
-        json(&crumple_ok(here, &["simulate", "s.toml", "--json"]))
+        json(&crumple_ok(here, "simulate s.toml --json"))
     };
     let rebound = |result: &Value| {
         let restitution = &result["summary"]["interfaces"][0]["restitution"];
@@ -920,29 +881,27 @@ fn scenarios_choose_the_force() {
     assert!((rebound(&of_csv) / rebound(&of_json) - 1.0).abs() < 1e-6);
     assert_eq!(of_csv["summary"]["interfaces"][0]["curve_force"], "body");
     assert_eq!(of_csv["warnings"], of_json["warnings"], "{}", of_csv["warnings"]);
-    crumple_ok(here, &["export", "a.json", "--force", "contact", "-o", "contact.csv"]);
+    crumple_ok(here, "export a.json --force contact -o contact.csv");
     let contact = run("file = \"contact.csv\"");
     assert_eq!(contact["summary"]["interfaces"][0]["curve_force"], "contact");
-    let warned = contact["warnings"].to_string();
-    assert!(warned.contains("it has a contact force only"), "{warned}");
+    says(&contact["warnings"].to_string(), "it has a contact force only");
     scenario("file = \"a.csv\", force = \"contact\"");
-    let error = crumple_fails(here, 1, &["simulate", "s.toml"]);
-    assert!(error.contains("force names another force than"), "{error}");
+    says(&crumple_fails(here, 1, "simulate s.toml"), "force names another force than");
     // One that says neither is taken for what moves the body, and unloads steeply: both said.
     let text = std::fs::read_to_string(here.join("a.csv")).unwrap();
     let bare: Vec<&str> = text.lines().filter(|l| !l.starts_with('#')).collect();
     std::fs::write(here.join("bare.csv"), bare.join("\n")).unwrap();
     let warned = run("file = \"bare.csv\"")["warnings"].to_string();
-    assert!(warned.contains("its file does not state which force it holds"), "{warned}");
+    says(&warned, "its file does not state which force it holds");
     assert!(warned.contains("it has no unloading stiffness: it unloads with its steepest rise"));
     scenario("file = \"bare.csv\"");
-    assert!(crumple_ok(here, &["simulate", "s.toml"]).contains("unknown"));
+    assert!(crumple_ok(here, "simulate s.toml").contains("unknown"));
     std::fs::write(here.join("bad.csv"), text.replace("force_kind: body", "force_kind: bodie"))
         .unwrap();
     scenario("file = \"bad.csv\"");
-    let error = crumple_fails(here, 1, &["simulate", "s.toml"]);
+    let error = crumple_fails(here, 1, "simulate s.toml");
     let told = "bad.csv: line 2: \"# force_kind: bodie\": expected \"body\" or \"contact\"";
-    assert!(error.contains(told), "{error}");
+    says(&error, told);
     // Standard output is one file's.
     let predict = ["predict", "a.model", "--speed", "48km/h", "--to", "csv", "-o", "-"];
     assert_eq!(crumple_ok(here, &predict), text);
@@ -953,16 +912,13 @@ fn scenarios_choose_the_force() {
     curve.as_object_mut().unwrap().remove("body_force_N");
     std::fs::write(here.join("old.json"), curve.to_string()).unwrap();
     scenario("file = \"old.json\", force = \"body\"");
-    let error = crumple_fails(here, 1, &["simulate", "s.toml"]);
-    assert!(error.contains("a contact force and no body force"), "{error}");
+    says(&crumple_fails(here, 1, "simulate s.toml"), "a contact force and no body force");
     let export = ["export", "old.json", "--to", "csv", "--force", "body"];
     assert!(crumple_fails(here, 1, &export).contains("no body force"));
-    let error = crumple_fails(here, 2, &["export", "old.json", "--to", "csv"]);
-    assert!(error.contains("use --force contact"), "{error}");
-    let error = crumple_fails(here, 1, &["export", "a.json", "--to", "json", "--units", "mm-t-s"]);
-    assert!(error.contains("json is always in SI"), "{error}");
-    let error = crumple_fails(here, 1, &["export", "a.json", "--to", "csv", "--units", "in-kg-s"]);
-    assert!(error.contains("lengths in mm, cm, m, forces in N, kN, MN"), "{error}");
+    says(&crumple_fails(here, 2, "export old.json --to csv"), "use --force contact");
+    says(&crumple_fails(here, 1, "export a.json --to json --units mm-t-s"), "json is always in SI");
+    let error = crumple_fails(here, 1, "export a.json --to csv --units in-kg-s");
+    says(&error, "lengths in mm, cm, m, forces in N, kN, MN");
 }
 
 /// With -q a result is not printed: only errors, and what was requested on standard output.
@@ -997,12 +953,9 @@ fn quiet_commands_print_nothing() {
             String::from_utf8_lossy(&output.stdout)
         );
     }
-    let printed = crumple_ok(
-        here,
-        &["predict", "m.model", "--speed", "50km/h", "-o", "-", "--to", "json", "-q"],
-    );
+    let printed = crumple_ok(here, "predict m.model --speed 50km/h -o - --to json -q");
     assert!(printed.starts_with('{'), "{printed}");
-    assert!(crumple_ok(here, &["db", "ls", "curves.h5", "-q", "--json"]).starts_with('{'));
-    let error = crumple_fails(here, 1, &["db", "show", "curves.h5", "--case", "x", "-q"]);
+    assert!(crumple_ok(here, "db ls curves.h5 -q --json").starts_with('{'));
+    let error = crumple_fails(here, 1, "db show curves.h5 --case x -q");
     assert!(error.starts_with("error: "), "{error}");
 }

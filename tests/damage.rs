@@ -1,7 +1,7 @@
 //! Cut and damaged files: complete states are returned, what is missing is named, nothing panics.
 
-use crate::common::{fixture, is_thorough, samples, samples_by_kind};
-use crumple::solver::{FORMATS, ProblemCode, Selection, SolverFile, read_from};
+use crate::common::{fixture, is_thorough, samples, samples_by_kind, says};
+use crumple::solver::{ProblemCode, Selection, SolverFile, formats, read_from};
 use proptest::prelude::*;
 
 fn read(format: &str, bytes: &[u8]) -> SolverFile {
@@ -100,11 +100,7 @@ fn a_missing_rotational_block_is_named() {
     let second_line = third[10..].windows(10).position(|w| w == b" n o d a l").unwrap() + 10;
     let file = read("nodout", &text[..starts[2] + second_line]);
     assert_eq!(file.time.len(), 2);
-    let message = file.problems[0].to_string();
-    assert!(
-        message.contains("2 of 2 rotational rows are missing, the first of 1100002"),
-        "{message}"
-    );
+    says(&file.problems[0].to_string(), "2 of 2 rotational rows are missing, the first of 1100002");
 }
 
 #[test]
@@ -203,7 +199,7 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
 /// The formats that are lines of text.
 fn text_formats() -> Vec<&'static str> {
     let binary = ["binout", "t01"]; // in tests of their own
-    FORMATS.iter().map(|f| f.name).filter(|name| !binary.contains(name)).collect()
+    formats().filter(|name| !binary.contains(name)).collect()
 }
 
 fn any_result(format: &str, bytes: &[u8]) {

@@ -4,10 +4,8 @@ use std::fs;
 use std::io::{self, BufRead};
 use std::path::Path;
 
-use crate::common::{crumple_ok, fixture, shared};
-use crumple::solver::{
-    Deck, DeckInterface, DeckPlace, ProblemCode, TitledEntity, Value, parse_deck,
-};
+use crate::common::{crumple_ok, fixture, says, shared};
+use crumple::solver::{Deck, DeckEntity, DeckPlace, ProblemCode, Value, parse_deck};
 use crumple::unit::UnitSystem;
 use proptest::prelude::*;
 
@@ -15,12 +13,9 @@ fn messages(deck: &Deck) -> Vec<String> {
     deck.problems.iter().map(ToString::to_string).collect()
 }
 
-fn named(list: &[TitledEntity]) -> Vec<(i64, Option<&str>)> {
-    list.iter().map(|n| (n.id, n.title.as_deref())).collect()
-}
-
-fn interfaces(list: &[DeckInterface]) -> Vec<(Option<i64>, Option<&str>)> {
-    list.iter().map(|n| (n.id, n.title.as_deref())).collect()
+/// Ids and titles; of interfaces that have ids.
+fn named(list: &[DeckEntity]) -> Vec<(i64, Option<&str>)> {
+    list.iter().map(|n| (n.id.unwrap(), n.title.as_deref())).collect()
 }
 
 /// A deck from its folder, includes from the same.
@@ -44,19 +39,19 @@ fn reads_our_decks() {
     ] {
         let d = deck_in(&folder, name);
         assert_eq!(messages(&d), [""; 0], "{name}");
-        let impact = d.impact_speed().unwrap();
-        assert_eq!((impact.speed, impact.at.line), (speed, line), "{name}");
+        let (impact, at) = d.impact_speed().unwrap();
+        assert_eq!((impact, at.line), (speed, line), "{name}");
         assert_eq!(d.units.unwrap().system, Some(UnitSystem::parse("mm-t-s").unwrap()));
         assert_eq!((d.parts.len(), d.history_nodes.len(), d.outputs.len()), (6, 12, 5));
-        assert_eq!(d.history_nodes[0].id, 900_001);
+        assert_eq!(d.history_nodes[0].id, Some(900_001));
         assert_eq!(named(&d.parts)[0], (1, Some("long_beam_stage1")));
-        assert_eq!(interfaces(&d.rigid_walls), [(Some(1), Some("rigid wall"))]);
-        assert_eq!(interfaces(&d.contacts), [(Some(1), Some("self contact"))]);
+        assert_eq!(named(&d.rigid_walls), [(1, Some("rigid wall"))]);
+        assert_eq!(named(&d.contacts), [(1, Some("self contact"))]);
         assert!(d.outputs.iter().all(|o| o.interval == Some(0.00075) && o.binary == Some(0)));
     }
 }
 
-fn ids(list: &[DeckInterface]) -> Vec<Option<i64>> {
+fn ids(list: &[DeckEntity]) -> Vec<Option<i64>> {
     list.iter().map(|i| i.id).collect()
 }
 
@@ -69,7 +64,7 @@ fn reads_decks_of_others() {
 
     let d = deck_in(&fixture("samples/lasso-python/keyword"), "lasso_sph_test.k");
     assert_eq!(messages(&d), [""; 0]);
-    assert_eq!(d.impact_speed().map(|s| (s.speed, s.at.line)), Some((50.0, 64)));
+    assert_eq!(d.impact_speed().map(|(speed, at)| (speed, at.line)), Some((50.0, 64)));
     assert_eq!((named(&d.parts), ids(&d.rigid_walls)), (vec![(101, None)], vec![Some(1)]));
 }
 
@@ -86,8 +81,7 @@ fn reads_decks_with_parameters_and_includes() {
 
     let d = deck_in(&folder, "pillars_bolted_connection_b.k");
     assert_eq!(messages(&d), [""; 0]);
-    let parts: Vec<_> = d.parts.iter().map(|p| p.id).collect();
-    assert_eq!(parts, [10, 20, 100, 110, 120, 101, 310]);
+    assert_eq!(ids(&d.parts), [10, 20, 100, 110, 120, 101, 310].map(Some));
     assert_eq!(named(&d.history_nodes), [(1_200_000, None), (1_100_002, None)]);
 
     let d = deck_in(&folder, "pillars_mainboltbexpl.k");
@@ -121,7 +115,7 @@ fn a_deck_that_is_no_plain_text_says_so() {
     for bytes in [[&[0xff, 0xfe], &wide[..]].concat(), wide.clone()] {
         fs::write(&path, bytes).unwrap();
         let error = crumple::solver::read_deck(&path).unwrap_err().to_string();
-        assert!(error.contains("main.k: this is UTF-16 text (convert it with iconv"), "{error}");
+        says(&error, "main.k: this is UTF-16 text (convert it with iconv");
     }
 }
 
@@ -194,13 +188,13 @@ fn reads_what_names_and_sizes_a_run() {
     let outputs: Vec<_> = d.outputs.iter().map(|o| (o.file, o.interval, o.binary)).collect();
     assert_eq!(outputs, [("nodout", Some(0.00075), Some(2)), ("rcforc", Some(1.0e-4), None)]);
     assert_eq!(named(&d.parts), [(5, Some("crossbeam, left")), (6, None)]);
-    assert_eq!(interfaces(&d.rigid_walls), [(Some(1), Some("rigid wall"))]);
-    assert_eq!(interfaces(&d.contacts), [(Some(7), Some("self contact"))]);
+    assert_eq!(named(&d.rigid_walls), [(1, Some("rigid wall"))]);
+    assert_eq!(named(&d.contacts), [(7, Some("self contact"))]);
     assert_eq!(d.history_nodes.len(), 10);
     assert_eq!(named(&d.history_nodes)[8..], [(4593, None), (201, Some("nose, upper"))]);
     assert_eq!(d.history_node_sets, [3, 4]);
-    let speed = d.impact_speed().unwrap();
-    assert_eq!((speed.speed, speed.at.line), (6944.444, 19));
+    let (speed, at) = d.impact_speed().unwrap();
+    assert_eq!((speed, at.line), (6944.444, 19));
     let mut crlf = deck(&text.replace('\n', "\r\n").replace("*PART", "*part  "));
     crlf.problems.clear();
     assert_eq!(crlf, d);
@@ -326,7 +320,7 @@ fn reads_the_long_format() {
     let long = "*CONTACT_TIED_ID\n                   3nose\n*DATABASE_NODOUT\n             \
                 0.00075                   2\n*DATABASE_HISTORY_NODE -\n        11        12\n";
     let d = deck(&format!("*KEYWORD LONG=Y\n{long}"));
-    assert_eq!(interfaces(&d.contacts), [(Some(3), Some("nose"))]);
+    assert_eq!(named(&d.contacts), [(3, Some("nose"))]);
     assert_eq!((d.outputs[0].interval, d.outputs[0].binary), (Some(0.00075), Some(2)));
     assert_eq!(named(&d.history_nodes), [(11, None), (12, None)]);
     let one = deck("*DATABASE_NODOUT +\n                0.25                   2\n");

@@ -1,7 +1,7 @@
 //! The engine of fixed steps: against the independent reference on random chains, its orders,
 //! dampers and resistance against closed forms, and what a run says of itself.
 
-use crate::common::within_tolerance;
+use crate::common::{says, within_tolerance};
 use crumple::curve::Envelope;
 use crumple::multibody::{
     Body, Chain, Damping, EnvelopeEnd, ForceLaw, Interface, Method, Record, Resistance, Run,
@@ -559,7 +559,7 @@ fn warnings_and_errors_name_the_interface() {
         let error = simulate(&with(EnvelopeEnd::Error), &settings).unwrap_err().to_string();
         let words: Vec<&str> = error.split(' ').collect();
         assert_eq!(words[..4], ["interface", "nose|wall", "is", "crushed"], "{error}");
-        assert!(error.contains("s, beyond the end of its curve's data (0.2000 m)"), "{error}");
+        says(&error, "s, beyond the end of its curve's data (0.2000 m)");
         let (deflection_m, time_s): (f64, f64) =
             (words[4].parse().unwrap(), words[7].parse().unwrap());
         // 0.2 m at 13.3 m/s, a little braked: after 15 ms; said within a step.

@@ -9,6 +9,7 @@ use std::process::Command;
 
 use crate::common::{
     crumple_fails, crumple_in, crumple_ok, demo_folder, entries, python, python_of, run_python,
+    says,
 };
 use crumple::curve::Tail;
 use crumple::formats::FORMATS;
@@ -125,7 +126,7 @@ fn own_run(folder: &Path, curve: &str, law: &str) -> String {
          [wall]\n[contact]\ncurve = \"nose\"\n"
     );
     fs::write(folder.join("one.toml"), scenario).unwrap();
-    crumple_ok(folder, &["simulate", "one.toml", "-q", "-o", "own.csv"]);
+    crumple_ok(folder, "simulate one.toml -q -o own.csv");
     folder.join("own.csv").display().to_string()
 }
 
@@ -247,7 +248,7 @@ fn bands_stand_beside_their_curves() {
         // Columns, to nine digits.
         export(here, "lead50.json", "band.csv", &[force, &["--tail", "none"]].concat());
         let csv = fs::read_to_string(here.join("band.csv")).unwrap();
-        assert!(csv.contains("\nd_m,force_N,lo,hi\n"), "{csv}");
+        says(&csv, "\nd_m,force_N,lo,hi\n");
         let rows = csv.lines().filter(|l| !l.starts_with('#')).skip(1);
         let rows: Vec<Vec<f64>> =
             rows.map(|row| row.split(',').map(|v| v.parse().unwrap()).collect()).collect();
@@ -319,7 +320,7 @@ fn a_missing_band_is_said() {
         let to = ["--to", to, "-o", "x"];
         let older = export_notes(here, "older.json", &to);
         let of_body = "written without a band: only that of the contact force is known (--force contact), until the model is trained again";
-        assert!(older.contains(of_body), "{older}");
+        says(&older, of_body);
         let of_contact = export_notes(here, "older.json", &[&to[..], &contact].concat());
         assert!(!of_contact.contains("band"), "{of_contact}");
         let group = ["--group", "lead-car-wall", "--case", "36kmh"];
@@ -327,12 +328,12 @@ fn a_missing_band_is_said() {
         assert!(!record.contains("band"), "a record has none");
         for force in [&contact[..], &[]] {
             let bare = export_notes(here, "bare.json", &[&to, force].concat());
-            assert!(bare.contains("written without a band: the model gives none here"), "{bare}");
+            says(&bare, "written without a band: the model gives none here");
         }
         // The body force has no rise that is too steep.
         let soft = [&to, &contact[..], &["--soften"]].concat();
         let soft = export_notes(here, "lead50.json", &soft);
-        assert!(soft.contains("written without a band: it is not that of a softened"), "{soft}");
+        says(&soft, "written without a band: it is not that of a softened");
     }
     assert!(!export_notes(here, "lead.model", &["--to", "table", "-o", "x"]).contains("band"));
 }
@@ -374,10 +375,7 @@ fn uneven_curves_for_lsdyna_are_noted() {
         crumple_ok(here, &arguments)
     };
     let record = notes(&["curves.h5", "--group", "lead-car-wall", "--case", "48kmh"]);
-    assert!(
-        record.contains("its points are unevenly spaced, so LCINT is 20000, the largest used"),
-        "{record}"
-    );
+    says(&record, "its points are unevenly spaced, so LCINT is 20000, the largest used");
     assert!(fs::read_to_string(here.join("x.k")).unwrap().contains("         0     20000\n"));
     assert!(!notes(&["lead50.json"]).contains("LCINT"));
 }
@@ -390,16 +388,13 @@ fn pyisomme_reads_the_channels() {
     let here = folder.path();
     let case = ["--group", "lead-car-wall", "--case", "36kmh", "--to", "iso-mme"];
     export(here, "curves.h5", "case", &case);
-    crumple_ok(here, &["simulate", "two-sets.toml", "-q", "-o", "run.mme"]);
+    crumple_ok(here, "simulate two-sets.toml -q -o run.mme");
     let read = |path: &str| {
         let path = here.join(path).display().to_string();
         run_python(python_of("CRUMPLE_PYTHON_ISOMME"), "exports_iso_mme.py", &[&path])
     };
     let case = read("case/lead-car-wall-36kmh.mme");
-    let shown = crumple_ok(
-        here,
-        &["db", "show", "curves.h5", "--group", "lead-car-wall", "--case", "36kmh", "--json"],
-    );
+    let shown = crumple_ok(here, "db show curves.h5 --group lead-car-wall --case 36kmh --json");
     let shown: Value = serde_json::from_str(&shown).unwrap();
     let shown = &shown["groups"]["lead-car-wall"][0];
     for (code, key) in [
@@ -410,7 +405,7 @@ fn pyisomme_reads_the_channels() {
         same_columns(&case[code], &shown[key]);
     }
     let run = read("run.mme/run.mme");
-    let csv = crumple_ok(here, &["simulate", "two-sets.toml", "-q", "-o", "-"]);
+    let csv = crumple_ok(here, "simulate two-sets.toml -q -o -");
     let mut lines = csv.lines();
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
     let rows: Vec<Vec<f64>> =
@@ -536,7 +531,7 @@ fn odd_curves_are_refused_by_every_format() {
         text.replacen("\"force_N\": [\n    0.0", "\"force_N\": [\n    NaN", 1),
     )
     .unwrap();
-    let error = crumple_fails(here, 1, &["export", "nan.json", "--to", "csv"]);
+    let error = crumple_fails(here, 1, "export nan.json --to csv");
     assert!(error.contains("nan.json") && error.contains("line"), "{error}");
 }
 
@@ -591,8 +586,7 @@ fn impossible_facts_are_refused() {
         let mut curve: Value = serde_json::from_str(&text).unwrap();
         curve[key] = json!(value);
         fs::write(here.join("odd.json"), curve.to_string()).unwrap();
-        let error =
-            crumple_fails(here, 1, &["export", "odd.json", "--to", "fmi2", "-o", "odd.fmu"]);
+        let error = crumple_fails(here, 1, "export odd.json --to fmi2 -o odd.fmu");
         assert!(error.contains(&format!("{key} is")), "{key}: {error}");
     }
 }
@@ -624,23 +618,7 @@ fn an_imported_curve_is_exported_as_it_was() {
         format!("displacement [mm],Force [kN]\n{}\n", rows.join("\n")),
     )
     .unwrap();
-    crumple_ok(
-        here,
-        &[
-            "db",
-            "add",
-            "legacy.h5",
-            "legacy.csv",
-            "--group",
-            "g",
-            "--speed",
-            "11m/s",
-            "--kind",
-            "wall",
-            "--mass",
-            "24t",
-        ],
-    );
+    crumple_ok(here, "db add legacy.h5 legacy.csv --group g --speed 11m/s --kind wall --mass 24t");
     export(here, "legacy.h5", "back.csv", &["--tail", "none"]);
     let units = UnitSystem::parse("SI").ok();
     let (back, _) =
@@ -675,13 +653,13 @@ fn what_is_said_of_an_import_and_what_its_file_says() {
         serde_json::from_str(&crumple_ok(here, &arguments)).unwrap()
     };
     let added = add("uneven.csv", "pair", &[]).to_string();
-    let shown = crumple_ok(here, &["db", "ls", "said.h5", "--json"]);
+    let shown = crumple_ok(here, "db ls said.h5 --json");
     assert!(shown.contains("\"other_mass_kg\": 22000.0"), "{added} {shown}");
     let said =
         add("pair.csv", "wall", &["--kind", "wall", "--unloading", "30MN/m", "--accept-energy"]);
     let said = said.to_string();
-    assert!(said.contains("the file states closing; wall is used"), "{said}");
-    assert!(said.contains("unloading stiffness: the file states"), "{said}");
+    says(&said, "the file states closing; wall is used");
+    says(&said, "unloading stiffness: the file states");
 }
 
 /// A whole group goes into one file or one folder; a model gives any speeds.
@@ -711,54 +689,30 @@ fn groups_and_several_speeds_are_exported_at_once() {
         let error = crumple_fails(here, code, arguments);
         assert!(error.contains(expected), "{arguments:?} said:\n{error}");
     };
-    t(
-        2,
-        &["export", "lead.model", "--to", "csv"],
-        "name the speeds of the model's curves with --speed",
-    );
-    t(
-        2,
-        &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv", "-o", "all.csv"],
-        "this export gives 7 files: name a folder",
-    );
-    t(2, &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv"], "gives 7 files");
-    t(
-        2,
-        &["export", "curves.h5", "--group", "lead-car-wall", "--speed", "37km/h", "--to", "csv"],
-        "has no case at 37 km/h: it has 12 km/h",
-    );
-    t(2, &["export", "lead50.json", "--to", "csv", "--speed", "50km/h"], "has one speed and mass");
-    t(1, &["export", "lead50.json", "--to", "mat", "--units", UNITS], "mat is always in SI");
-    t(
-        1,
-        &["export", "lead.model", "--speed", "36km/h,50km/h", "--to", "lsdyna", "--deck"],
-        "one curve",
-    );
-    t(2, &["export", "lead50.json", "--to", "iso-mme"], "iso-mme takes histories over time");
-    t(2, &["export", "lead50.json", "--to", "table"], "table takes a model");
+    #[rustfmt::skip]
+    let cases = [
+        (2, &["export", "lead.model", "--to", "csv"][..], "name the speeds of the model's curves with --speed"),
+        (2, &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv", "-o", "all.csv"][..], "this export gives 7 files: name a folder"),
+        (2, &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv"][..], "gives 7 files"),
+        (2, &["export", "curves.h5", "--group", "lead-car-wall", "--speed", "37km/h", "--to", "csv"][..], "has no case at 37 km/h: it has 12 km/h"),
+        (2, &["export", "lead50.json", "--to", "csv", "--speed", "50km/h"][..], "has one speed and mass"),
+        (1, &["export", "lead50.json", "--to", "mat", "--units", UNITS][..], "mat is always in SI"),
+        (1, &["export", "lead.model", "--speed", "36km/h,50km/h", "--to", "lsdyna", "--deck"][..], "one curve"),
+        (2, &["export", "lead50.json", "--to", "iso-mme"][..], "iso-mme takes histories over time"),
+        (2, &["export", "lead50.json", "--to", "table"][..], "table takes a model"),
+    ];
+    cases.into_iter().for_each(|(code, arguments, expected)| t(code, arguments, expected));
     // What a format has no use for is refused.
-    t(
-        2,
-        &["export", "lead50.json", "--to", "csv", "--deck"],
-        "--deck is for lsdyna, radioss, calculix",
-    );
-    t(
-        2,
-        &["export", "lead50.json", "--to", "mat", "--material", "s06"],
-        "--material is for lsdyna",
-    );
-    t(2, &["export", "lead50.json", "--to", "json", "--tail", "hold"], "--tail is for csv, lsdyna");
-    t(
-        2,
-        &["export", "lead.model", "--to", "onnx", "--speed", "50km/h"],
-        "holds a whole model: remove --speed",
-    );
-    t(2, &["export", "lead.model", "--to", "table", "--group", "x"], "a model has only one group");
-    t(
-        2,
-        &["export", "curves.h5", "--group", "lead-car-wall", "-o", "all.spr"],
-        "name a folder, and the kind of file with --to spr",
-    );
+    #[rustfmt::skip]
+    let cases = [
+        (&["export", "lead50.json", "--to", "csv", "--deck"][..], "--deck is for lsdyna, radioss, calculix"),
+        (&["export", "lead50.json", "--to", "mat", "--material", "s06"][..], "--material is for lsdyna"),
+        (&["export", "lead50.json", "--to", "json", "--tail", "hold"][..], "--tail is for csv, lsdyna"),
+        (&["export", "lead.model", "--to", "onnx", "--speed", "50km/h"][..], "holds a whole model: remove --speed"),
+        (&["export", "lead.model", "--to", "table", "--group", "x"][..], "a model has only one group"),
+        (&["export", "curves.h5", "--group", "lead-car-wall", "-o", "all.spr"][..], "name a folder, and the kind of file with --to spr"),
+    ];
+    cases.into_iter().for_each(|(arguments, expected)| t(2, arguments, expected));
     export(here, "curves.h5", "sprs", &["--group", "lead-car-wall", "--to", "spr"]);
     assert!(entries(&here.join("sprs")).iter().all(|name| name.ends_with(".spr")));
     // Two curves of one speed keep apart, in their files and in the names within.
@@ -797,7 +751,7 @@ fn the_targets_rebound_is_said() {
     let arguments =
         ["export", "curves.h5", "--group", "vehicle-pair", "--speed", "3km/h", "--to", "lsdyna"];
     let error = crumple_fails(here, 1, &[&arguments[..], &["--soften"]].concat());
-    assert!(error.contains("without changing the curve's end"), "{error}");
+    says(&error, "without changing the curve's end");
     // The softened curve keeps the energy.
     let work = |file: &str| {
         let units = UnitSystem::parse("SI").unwrap();

@@ -251,7 +251,7 @@ fn builds_survive_every_fault() {
     let study = study_of_one(here);
     hold(here, "build study.toml -o new.h5");
     // Into a database that has another group, and a case that is changed.
-    crumple_ok(here, &["db", "copy", "new.h5", "--group", "lead-car-wall", "--to-group", "other"]);
+    crumple_ok(here, "db copy new.h5 --group lead-car-wall --to-group other");
     let text = fs::read_to_string(&study).unwrap();
     fs::write(&study, text.replace("24t", "24.1t")).unwrap();
     hold(here, "build study.toml -o new.h5");
@@ -352,7 +352,7 @@ fn faults_hide_neither_files_nor_links() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     small_database(here);
-    crumple_ok(here, &["train", "curves.h5", "--model", "nearest", "-o", "a.model"]);
+    crumple_ok(here, "train curves.h5 --model nearest -o a.model");
     fs::write(here.join("real.json"), "{}").unwrap();
     std::os::unix::fs::symlink("real.json", here.join("link.json")).unwrap();
     let before = contents(here);

@@ -8,7 +8,7 @@ use std::io::{Cursor, Read};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::common::{build_fixture, python_of, root};
+use crate::common::{build_fixture, python_of, root, says};
 use crumple::curve::{CurveUnloading, Envelope, ForceCurve, ForceKind};
 use crumple::database::Database;
 use crumple::dataset::TrainingSet;
@@ -170,9 +170,7 @@ fn odd_names_make_sound_archives() {
             let facts: Value = serde_json::from_slice(&files["extra/crumple/facts.json"]).unwrap();
             assert_eq!(facts["name"], name);
             let page = String::from_utf8(files["documentation/index.html"].clone()).unwrap();
-            assert!(
-                page.contains("<tr><th>odd &lt;&amp;&gt;</th><td>&quot;quotes&quot;</td></tr>")
-            );
+            says(&page, "<tr><th>odd &lt;&amp;&gt;</th><td>&quot;quotes&quot;</td></tr>");
         }
     }
 }

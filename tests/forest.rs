@@ -351,20 +351,14 @@ fn stored_forests() {
     assert!(old.check().is_ok());
     assert_eq!(old.feature_importance(), None);
     assert_eq!(predicted(&old), predicted(&forest));
-    for (part, wrong, expected) in [
+    #[rustfmt::skip]
+    let cases = [
         ("/members/trees/0/first/1", 9.into(), "the samples of the leaves do not fit the trees"),
-        (
-            "/members/trees/1/members/0",
-            300.into(),
-            "the samples of the leaves do not fit the trees",
-        ),
+        ("/members/trees/1/members/0", 300.into(), "the samples of the leaves do not fit the trees"),
         ("/importance", vec![1.0].into(), "the shares of the features do not fit their number"),
-        (
-            "/trees/2/right/0",
-            3.into(),
-            "node 0 has children that do not stand side by side after it",
-        ),
-    ] {
+        ("/trees/2/right/0", 3.into(), "node 0 has children that do not stand side by side after it"),
+    ];
+    for (part, wrong, expected) in cases {
         let mut damaged = stored.clone();
         let wrong: serde_json::Value = wrong;
         *damaged.pointer_mut(part).unwrap() = wrong;
@@ -380,39 +374,18 @@ fn wrong_parameters_and_data_are_refused() {
     }
     let (x, y) = (array![[1.0], [2.0]], array![1.0, 2.0]);
     let new = ForestParams::new;
-    t(new(0), x.clone(), y.clone(), "a forest needs at least 1 tree, found 0");
-    t(
-        new(1).min_samples_leaf(0),
-        x.clone(),
-        y.clone(),
-        "min_samples_leaf must be at least 1, found 0",
-    );
-    t(new(1).max_depth(Some(0)), x.clone(), y.clone(), "max_depth must be at least 1, found 0");
-    t(
-        new(1).stop(StopRule::StdOverMean(f64::NAN)),
-        x.clone(),
-        y.clone(),
-        "the stop rule's threshold must be a finite number of at least 0, found NaN",
-    );
-    t(
-        new(1).features_per_split(FeaturesPerSplit::Count(2)),
-        x.clone(),
-        y.clone(),
-        "features per split are 2, but the records have 1 features",
-    );
-    t(
-        new(1).bootstrap(false).out_of_bag(true),
-        x.clone(),
-        y.clone(),
-        "out-of-bag error needs bootstrap samples: set bootstrap(true)",
-    );
-    t(
-        new(1),
-        array![[1.0], [f64::NAN]],
-        y.clone(),
-        "record 1, feature 0 is NaN: expected a finite number",
-    );
-    t(new(1), x.clone(), array![1.0, f64::INFINITY], "target 1 is inf: expected a finite number");
-    t(new(1), Array2::zeros((0, 1)), Array1::zeros(0), "there are no samples to fit");
-    t(new(1), Array2::zeros((2, 0)), y, "there are no features to split on");
+    #[rustfmt::skip]
+    let cases = [
+        (new(0), x.clone(), y.clone(), "a forest needs at least 1 tree, found 0"),
+        (new(1).min_samples_leaf(0), x.clone(), y.clone(), "min_samples_leaf must be at least 1, found 0"),
+        (new(1).max_depth(Some(0)), x.clone(), y.clone(), "max_depth must be at least 1, found 0"),
+        (new(1).stop(StopRule::StdOverMean(f64::NAN)), x.clone(), y.clone(), "the stop rule's threshold must be a finite number of at least 0, found NaN"),
+        (new(1).features_per_split(FeaturesPerSplit::Count(2)), x.clone(), y.clone(), "features per split are 2, but the records have 1 features"),
+        (new(1).bootstrap(false).out_of_bag(true), x.clone(), y.clone(), "out-of-bag error needs bootstrap samples: set bootstrap(true)"),
+        (new(1), array![[1.0], [f64::NAN]], y.clone(), "record 1, feature 0 is NaN: expected a finite number"),
+        (new(1), x.clone(), array![1.0, f64::INFINITY], "target 1 is inf: expected a finite number"),
+        (new(1), Array2::zeros((0, 1)), Array1::zeros(0), "there are no samples to fit"),
+        (new(1), Array2::zeros((2, 0)), y, "there are no features to split on"),
+    ];
+    cases.into_iter().for_each(|(params, x, y, expected)| t(params, x, y, expected));
 }

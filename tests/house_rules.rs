@@ -274,7 +274,6 @@ fn files_are_opened_where_their_kind_is_asked() {
     // These have asked themselves, or open what this program has made.
     let allowed = [
         "src/file/mod.rs",
-        "src/file/lock.rs",
         "src/file/write.rs",
         "src/solver/source.rs",
         "src/solver/decks.rs",
@@ -321,7 +320,7 @@ fn no_unwrap_outside_tests() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 73273), ("files", 349), ("public types", 238), ("error types", 9)];
+    [("lines", 72497), ("files", 280), ("public types", 194), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {
@@ -450,16 +449,7 @@ fn the_fuzzer_is_built_on_the_same_profile() {
 /// CRUMPLE_WRITE_SCHEMAS=1 cargo test --release --test all schemas
 #[test]
 fn schemas_are_those_of_the_types() {
-    let schemas = [
-        ("study.schema.json", schemars::schema_for!(crumple::study::Manifest)),
-        ("scenario.schema.json", schemars::schema_for!(crumple::scenario::Scenario)),
-        ("plan.schema.json", schemars::schema_for!(crumple::plan::PlanFile)),
-        ("predicted_curve.schema.json", schemars::schema_for!(crumple::surrogate::PredictedCurve)),
-        ("validation.schema.json", schemars::schema_for!(crumple::assess::Report)),
-        ("rating.schema.json", schemars::schema_for!(crumple::rating::Rating)),
-        ("error.schema.json", schemars::schema_for!(crumple::failure::ErrorDocument)),
-    ];
-    for (name, schema) in schemas {
+    for (name, schema) in crumple::cli::schemas() {
         let path = root().join("schemas").join(name);
         let text = serde_json::to_string_pretty(&schema).unwrap() + "\n";
         if std::env::var_os("CRUMPLE_WRITE_SCHEMAS").is_some() {

@@ -15,12 +15,8 @@ use crate::common::containers::binout_of;
 use crate::common::crash::{Crash, Force, History, Layout, MM_KG_MS, MM_T_S, Node, SI};
 use crate::common::{
     crumple_fails, crumple_in, crumple_ok, demo_folder, entries, fixture, is_thorough,
-    is_with_shared, samples_by_kind, shared,
+    is_with_shared, json, samples_by_kind, says, shared,
 };
-
-fn json(text: &str) -> Value {
-    serde_json::from_str(text).unwrap()
-}
 
 fn study(folder: &Path, name: &str) -> Table {
     fs::read_to_string(folder.join(name)).unwrap().parse().unwrap()
@@ -96,8 +92,8 @@ fn like_shipped(source: &Path, files: &[&str], options: &[&str]) -> Vec<Case> {
         assert!((speed / speed_of - 1.0).abs() < 1e-3, "{name}/{path}: {speed} km/h");
         assert!((mass / mass_of - 1.0).abs() < 1e-2, "{name}/{path}: {mass} t");
     }
-    crumple_ok(&here, &["build", "-q"]);
-    crumple_ok(&here, &["build", "shipped.toml", "-o", "shipped.h5", "-q"]);
+    crumple_ok(&here, "build -q");
+    crumple_ok(&here, "build shipped.toml -o shipped.h5 -q");
     let cases = |file: &str| Database::read(&here.join(file)).unwrap().cases(name).to_vec();
     let (ours, shipped) = (cases("curves.h5"), cases("shipped.h5"));
     assert_eq!(ours.len(), shipped.len());
@@ -191,7 +187,7 @@ fn a_binout_gives_the_proposal_of_its_texts() {
         said(&mut of_text, "its second line reads");
         said(&mut of_binout, "its version is");
         assert_eq!(of_text, of_binout, "{group_name}");
-        crumple_ok(&here, &["build", "-q"]);
+        crumple_ok(&here, "build -q");
     }
 }
 
@@ -204,7 +200,7 @@ const SLOW: [(&str, &str, f64); 3] = [
 
 /// A run alone tells its units by itself, with nothing to guess.
 fn tells_millimetres(run: &Path, km_per_h: f64) {
-    let document = json(&crumple_ok(run, &["init", "--json", "-o", "alone.toml"]));
+    let document = json(&crumple_ok(run, "init --json -o alone.toml"));
     let units = &document["units"];
     assert_eq!(units["value"], "mm-t-s", "{}: {units}", run.display());
     assert_eq!(units["evidence"], "computed", "{}: {units}", run.display());
@@ -253,7 +249,7 @@ fn comment_above<'a>(text: &'a str, key: &str) -> Vec<&'a str> {
 fn every_value_says_where_it_is_from() {
     let folder = group(&fixture("fe/lead-car-wall"), TEXTS);
     let here = folder.path().join("lead-car-wall");
-    let text = crumple_ok(&here, &["init", "-o", "-"]);
+    let text = crumple_ok(&here, "init -o -");
     assert_eq!(entries(&here).iter().filter(|name| *name == "study.toml").count(), 0);
     let above = |key: &str| comment_above(&text, key).join(" ").replace(" #  ", "");
     assert!(above("name").contains("guessed: name of the folder above the runs"));
@@ -263,22 +259,21 @@ fn every_value_says_where_it_is_from() {
         "SI would make an impact at 3333 m/s",
         "mm-kg-ms would make a crush that takes 53.3 µs",
     ] {
-        assert!(units.contains(why), "{units}");
+        says(&units, why);
     }
     assert!(above("kind").contains("guessed: one body moves, and a rigid wall stops it"));
     assert!(above("deflection").contains("node \"COG of the rigid trailing mass\""));
     assert!(above("filter").contains("read: its second line reads"), "{}", above("filter"));
     assert!(text.contains("# CANNOT BE DETERMINED: is this one body of a pair"));
     assert!(text.contains("\n# half_model = true\n"));
-    assert!(text.contains(
-        "# read: x_velocity of 900001 in the first state: -3333.33 mm/s\nspeed = \"12km/h\""
-    ));
-    assert!(
-        text.contains("# mass: computed: impulse of the force over the change of velocity, after")
+    says(
+        &text,
+        "# read: x_velocity of 900001 in the first state: -3333.33 mm/s\nspeed = \"12km/h\"",
     );
+    says(&text, "# mass: computed: impulse of the force over the change of velocity, after");
     assert!(text.lines().all(|line| line.chars().count() <= 110), "no line is too long");
     // The same as one document.
-    let document = json(&crumple_ok(&here, &["init", "--json", "-o", "other.toml"]));
+    let document = json(&crumple_ok(&here, "init --json -o other.toml"));
     assert_eq!(document["study"], "other.toml");
     assert_eq!(document["complete"], true);
     assert_eq!(document["units"]["value"], "mm-t-s");
@@ -295,25 +290,23 @@ fn every_value_says_where_it_is_from() {
 fn half_models_are_asked_for() {
     let folder = group(&fixture("fe/vehicle-pair"), TEXTS);
     let here = folder.path().join("vehicle-pair");
-    let output = crumple_in(&here, &["init"]);
+    let output = crumple_in(&here, "init");
     assert!(output.status.success());
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(said.contains("the folders' names state twice the recorded speeds"), "{said}");
+    says(&said, "the folders' names state twice the recorded speeds");
     let ours = study(&here, "study.toml");
     assert_eq!(ours["study"]["kind"].as_str(), Some("wall"));
     assert_eq!(by_path(&ours)[0].1, 6.0, "12kmh");
     fs::remove_file(here.join("study.toml")).unwrap();
-    let output = crumple_in(&here, &["init", "--half-model", "--strict"]);
+    let output = crumple_in(&here, "init --half-model --strict");
     assert_eq!(String::from_utf8(output.stderr).unwrap(), "");
     assert_eq!(output.status.code(), Some(0));
     // Two bodies are not a half model, one body is not a pair.
     let pair = group(&fixture("fe/lead-car-pair"), TEXTS);
     let there = pair.path().join("lead-car-pair");
-    let error = crumple_fails(&there, 1, &["init", "--half-model"]);
-    assert!(error.contains("two bodies move in these runs"), "{error}");
+    says(&crumple_fails(&there, 1, "init --half-model"), "two bodies move in these runs");
     fs::remove_file(here.join("study.toml")).unwrap();
-    let error = crumple_fails(&here, 1, &["init", "--kind", "pair"]);
-    assert!(error.contains("only one body moves in these runs"), "{error}");
+    says(&crumple_fails(&here, 1, "init --kind pair"), "only one body moves in these runs");
     assert_eq!(entries(&here).iter().filter(|name| *name == "study.toml").count(), 0);
 }
 
@@ -366,7 +359,7 @@ fn node_force_units_and_mass_are_found_in_any_units_and_direction() {
             let layout = Layout { units, axis, sign };
             write_car(layout, &folder.path().join("cars/50kmh"), &history, &car_nodes());
             let here = folder.path().join("cars");
-            let printed = crumple_ok(&here, &["init"]);
+            let printed = crumple_ok(&here, "init");
             let found = study(&here, "study.toml");
             let what = format!("{name} along {axis}:\n{printed}");
             assert_eq!(found["study"]["units"].as_str(), Some(name), "{what}");
@@ -383,7 +376,7 @@ fn node_force_units_and_mass_are_found_in_any_units_and_direction() {
             let run = &found["run"][0];
             assert!((number(&run["speed"], "km/h") / 50.0 - 1.0).abs() < 1e-3, "{what}");
             assert!((number(&run["mass"], "t") / 1.2 - 1.0).abs() < 1e-2, "{what}");
-            crumple_ok(&here, &["build", "-q"]);
+            crumple_ok(&here, "build -q");
         }
     }
 }
@@ -421,7 +414,7 @@ fn pairs_have_both_bodies() {
         ],
     );
     let here = folder.path().join("pair");
-    crumple_ok(&here, &["init"]);
+    crumple_ok(&here, "init");
     let found = study(&here, "study.toml");
     assert_eq!(found["study"]["kind"].as_str(), Some("pair"));
     let deflection = &found["recipe"]["deflection"];
@@ -434,15 +427,15 @@ fn pairs_have_both_bodies() {
     assert!((number(&run["mass"], "t") / 1.2 - 1.0).abs() < 1e-2);
     assert!((number(&run["other_mass"], "t") / 2.0 - 1.0).abs() < 1e-2);
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
-    assert!(text.contains("or side = \"surfb\", which has the same force"), "{text}");
-    assert!(text.contains("or node 9: follows the impulse within"), "{text}");
-    assert!(text.contains("or rcforc 1: \"box of truck\", bodies follow it within"), "{text}");
+    says(&text, "or side = \"surfb\", which has the same force");
+    says(&text, "or node 9: follows the impulse within");
+    says(&text, "or rcforc 1: \"box of truck\", bodies follow it within");
     // In the other order if that is requested.
-    crumple_ok(&here, &["init", "--node", "9", "--minus-node", "6", "-o", "turned.toml"]);
+    crumple_ok(&here, "init --node 9 --minus-node 6 -o turned.toml");
     let turned = study(&here, "turned.toml");
     assert_eq!(turned["recipe"]["deflection"]["node"].as_integer(), Some(9));
     assert!((number(&turned["run"][0]["mass"], "t") / 2.0 - 1.0).abs() < 1e-2);
-    crumple_ok(&here, &["build", "-q"]);
+    crumple_ok(&here, "build -q");
 }
 
 /// Bodies that meet each other and of which nothing but their motion is recorded.
@@ -474,7 +467,7 @@ fn a_pair_without_forces_is_guessed() {
     let (run, here) = (folder.path().join("pair/a"), folder.path().join("pair"));
     let layout = Layout { units: MM_T_S, axis: 1, sign: -1.0 };
     layout.nodout(&run, &history, &nodes);
-    let document = json(&crumple_ok(&here, &["init", "--json"]));
+    let document = json(&crumple_ok(&here, "init --json"));
     let kind = &document["kind"];
     assert_eq!(
         (kind["value"].as_str(), kind["evidence"].as_str()),
@@ -492,32 +485,29 @@ fn a_pair_without_forces_is_guessed() {
         (force["evidence"].as_str(), force["value"]["times"].as_str()),
         (Some("guessed"), Some("mass"))
     );
-    let fill_in = document["fill_in"].to_string();
-    assert!(fill_in.contains("other_mass of a: by their velocities 1.6"), "{fill_in}");
+    says(&document["fill_in"].to_string(), "other_mass of a: by their velocities 1.6");
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
-    assert!(
-        text.contains("\nkind = \"pair\"\n") && text.contains("\n# other_mass =     # fill in\n"),
-        "{text}"
-    );
+    says(&text, "\nkind = \"pair\"\n");
+    says(&text, "\n# other_mass =     # fill in\n");
     let speed = document["runs"][0]["speed_m_per_s"]["value"].as_f64().unwrap();
     assert!((speed / 16.0 - 1.0).abs() < 1e-3, "{speed}");
     // One mass for both is not what the velocities say.
-    let output = crumple_in(&here, &["init", "--mass", "1.2t", "-o", "one.toml"]);
+    let output = crumple_in(&here, "init --mass 1.2t -o one.toml");
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(said.contains("mass: by their velocities the other body is 1.6"), "{said}");
+    says(&said, "mass: by their velocities the other body is 1.6");
     let both = ["init", "--mass", "1.2t", "--other-mass", "2t", "-o", "both.toml"];
     assert_eq!(String::from_utf8(crumple_in(&here, &both).stderr).unwrap(), "");
-    crumple_ok(&here, &["build", "both.toml", "-q"]);
+    crumple_ok(&here, "build both.toml -q");
     let cases = Database::read(&here.join("curves.h5")).unwrap();
     let case = &cases.cases("pair")[0];
     assert!(case.curves.sampled.force_n().iter().copied().fold(0.0, f64::max) > 1e5);
     // What the caller says of the bodies is above it.
-    crumple_ok(&here, &["init", "--node", "8", "--minus-node", "6", "-o", "turned.toml"]);
+    crumple_ok(&here, "init --node 8 --minus-node 6 -o turned.toml");
     let turned = study(&here, "turned.toml");
     assert_eq!(turned["study"]["kind"].as_str(), Some("pair"));
     assert_eq!(turned["recipe"]["deflection"]["node"].as_integer(), Some(8));
-    let error = crumple_fails(&here, 1, &["init", "--half-model", "-o", "half.toml"]);
-    assert!(error.contains("two bodies move in these runs"), "{error}");
+    let error = crumple_fails(&here, 1, "init --half-model -o half.toml");
+    says(&error, "two bodies move in these runs");
 }
 
 /// A struck body that stands at first is one of a pair; two that are stopped by walls of their own
@@ -560,31 +550,25 @@ fn masses_are_never_made_up() {
     let run = folder.path().join("cars/50kmh");
     let here = folder.path().join("cars");
     layout.nodout(&run, &history, &car_nodes());
-    let output = crumple_in(&here, &["init"]);
+    let output = crumple_in(&here, "init");
     assert!(output.status.success());
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        said.contains("fill in mass of 50kmh: no force and no energy give it: use --mass"),
-        "{said}"
-    );
+    says(&said, "fill in mass of 50kmh: no force and no energy give it: use --mass");
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
-    assert!(text.contains("# NOT COMPLETE"), "{text}");
-    assert!(text.contains("\n# mass =     # fill in\n"), "{text}");
-    assert!(text.contains("times = \"mass\""), "{text}");
-    assert!(crumple_fails(&here, 1, &["build"]).contains("missing field `mass`"));
-    crumple_ok(&here, &["init", "--mass", "1.2t", "-o", "given.toml"]);
-    crumple_ok(&here, &["build", "given.toml", "-q"]);
+    says(&text, "# NOT COMPLETE");
+    says(&text, "\n# mass =     # fill in\n");
+    says(&text, "times = \"mass\"");
+    assert!(crumple_fails(&here, 1, "build").contains("missing field `mass`"));
+    crumple_ok(&here, "init --mass 1.2t -o given.toml");
+    crumple_ok(&here, "build given.toml -q");
     layout.glstat(&run, &history);
-    crumple_ok(&here, &["init", "-o", "energy.toml"]);
+    crumple_ok(&here, "init -o energy.toml");
     assert_eq!(study(&here, "energy.toml")["run"][0]["mass"].as_str(), Some("1.2t"));
     write_car(layout, &run, &history, &car_nodes());
-    crumple_ok(&here, &["init", "-o", "both.toml"]);
+    crumple_ok(&here, "init -o both.toml");
     let text = fs::read_to_string(here.join("both.toml")).unwrap();
-    assert!(text.contains("mass = \"1.2t\""), "{text}");
-    assert!(
-        text.contains("kinetic energy of the model at the start over ½v² (momentum gives"),
-        "{text}"
-    );
+    says(&text, "mass = \"1.2t\"");
+    says(&text, "kinetic energy of the model at the start over ½v² (momentum gives");
 }
 
 /// A section is used for the force only if nothing else is, and gives no mass.
@@ -598,19 +582,19 @@ fn a_section_is_the_last_choice() {
     let section = |id, title, along_n| Force { id, title, along_n, across_n: 0.0 };
     layout.nodout(&run, &history, &car_nodes());
     layout.secforc(&run, &history, &[section(5, "both boxes", inner)]);
-    let output = crumple_in(&here, &["init"]);
+    let output = crumple_in(&here, "init");
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(said.contains("the force is that of a section, which may carry only part"), "{said}");
-    assert!(said.contains("fill in mass of 50kmh: a section may carry only part"), "{said}");
+    says(&said, "the force is that of a section, which may carry only part");
+    says(&said, "fill in mass of 50kmh: a section may carry only part");
     let force = &study(&here, "study.toml")["recipe"]["force"];
     assert_eq!((force["file"].as_str(), force["id"].as_integer()), (Some("secforc"), Some(5)));
     assert_eq!(force["component"].as_str(), Some("x_force"));
     layout.glstat(&run, &history);
-    crumple_ok(&here, &["init", "-o", "energy.toml"]);
+    crumple_ok(&here, "init -o energy.toml");
     assert_eq!(study(&here, "energy.toml")["run"][0]["mass"].as_str(), Some("1.2t"));
-    crumple_ok(&here, &["build", "energy.toml", "-q"]);
+    crumple_ok(&here, "build energy.toml -q");
     write_car(layout, &run, &history, &car_nodes());
-    crumple_ok(&here, &["init", "-o", "wall.toml"]);
+    crumple_ok(&here, "init -o wall.toml");
     let force = &study(&here, "wall.toml")["recipe"]["force"];
     assert_eq!(force["file"].as_str(), Some("rwforc"));
 }
@@ -632,11 +616,11 @@ fn a_last_state_off_the_raster_is_cut() {
     let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
     write_car(layout, &folder.path().join("cars/50kmh"), &history, &car_nodes());
     let here = folder.path().join("cars");
-    crumple_ok(&here, &["init"]);
+    crumple_ok(&here, "init");
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
-    assert!(text.contains("filter = \"CFC60\""), "{text}");
-    assert!(text.contains("truncate = \"120.0005ms\""), "{text}");
-    crumple_ok(&here, &["build", "-q"]);
+    says(&text, "filter = \"CFC60\"");
+    says(&text, "truncate = \"120.0005ms\"");
+    crumple_ok(&here, "build -q");
 }
 
 /// A copy of the bundled runs at four speeds.
@@ -684,7 +668,7 @@ fn what_is_no_run_is_named_and_left_out() {
     fs::write(here.join("planned/main.k"), "*KEYWORD\n*TITLE\nnot run\n*END\n").unwrap();
     fs::create_dir_all(here.join("energies")).unwrap();
     fs::write(here.join("energies/glstat"), "").unwrap();
-    let document = json(&crumple_ok(&here, &["init", "--json"]));
+    let document = json(&crumple_ok(&here, "init --json"));
     let runs = document["runs"].as_array().unwrap();
     let names: Vec<&str> = runs.iter().map(|run| run["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["25kmh", "36kmh", "48kmh", "60kmh", "short"]);
@@ -712,8 +696,8 @@ fn what_is_no_run_is_named_and_left_out() {
         "it has no histories of nodes (a nodout, or a binout or T01 with one): it has glstat",
     );
     assert_eq!(out.len(), 7);
-    assert!(text.contains("\n# [[run]]\n# path = \"aborted\"\n"), "{text}");
-    crumple_ok(&here, &["build", "-q"]);
+    says(&text, "\n# [[run]]\n# path = \"aborted\"\n");
+    crumple_ok(&here, "build -q");
 }
 
 /// Keeps the first states of a text, as a killed solver leaves them.
@@ -730,23 +714,23 @@ fn a_run_that_died_early_says_where_its_record_ends() {
     let killed = here.join("killed");
     copy_run(&fixture("fe/lead-car-wall/72kmh"), &killed, TEXTS);
     keep(&killed.join("nodout"), "\n\n\n n o d a l   p r i n t", 20);
-    let document = json(&crumple_ok(&here, &["init", "--json"]));
+    let document = json(&crumple_ok(&here, "init --json"));
     assert_eq!(document["runs"].as_array().unwrap().len(), 4);
     let died = "it terminated early: the record ends at 14.253 ms, while the bodies still close at 93 % of their first speed";
     assert_eq!(left_out(&document), [("killed".into(), died.into())]);
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
-    assert!(text.contains("\n# [[run]]\n# path = \"killed\"\n"), "{text}");
+    says(&text, "\n# [[run]]\n# path = \"killed\"\n");
     // Alone its units are not known.
-    let error = crumple_fails(&here, 1, &["init", "killed", "-o", "killed.toml"]);
-    assert!(error.contains("  killed: it terminated early: the record ends at 0.0142"), "{error}");
-    assert!(error.contains("while the bodies still close at 93 %"), "{error}");
+    let error = crumple_fails(&here, 1, "init killed -o killed.toml");
+    says(&error, "  killed: it terminated early: the record ends at 0.0142");
+    says(&error, "while the bodies still close at 93 %");
     assert!(!here.join("killed.toml").exists());
     // A force that ends early ends the record, too.
     copy_run(&fixture("fe/lead-car-wall/72kmh"), &killed, &["nodout"]);
     let forces = fs::read_to_string(killed.join("rwforc")).unwrap();
     let whole: Vec<&str> = forces.split_inclusive('\n').take(9 + 20).collect();
     fs::write(killed.join("rwforc"), whole.concat()).unwrap();
-    let document = json(&crumple_ok(&here, &["init", "--json", "-o", "force.toml"]));
+    let document = json(&crumple_ok(&here, "init --json -o force.toml"));
     assert_eq!(left_out(&document), [("killed".into(), died.into())]);
 }
 
@@ -765,7 +749,7 @@ fn runs_of_another_recipe_are_reported_and_not_merged() {
     }
     let pair = fixture("fe/lead-car-pair/60kmh");
     copy_run(&pair, &here.join("pair"), TEXTS);
-    let document = json(&crumple_ok(&here, &["init", "--json"]));
+    let document = json(&crumple_ok(&here, "init --json"));
     let out = left_out(&document);
     let said = |folder: &str| &out.iter().find(|(path, _)| path == folder).unwrap().1;
     assert_eq!(
@@ -792,24 +776,21 @@ fn groups_in_one_folder_are_told_apart() {
         let below = format!("{group}/{run}");
         copy_run(&fixture("fe").join(&below), &folder.path().join(&below), TEXTS);
     }
-    let error = crumple_fails(folder.path(), 1, &["init"]);
-    assert!(
-        error.contains("lead-car-wall (2 runs), vehicle-pair (2 runs). Give one of them (crumple init lead-car-wall)"),
-        "{error}"
+    let error = crumple_fails(folder.path(), 1, "init");
+    says(
+        &error,
+        "lead-car-wall (2 runs), vehicle-pair (2 runs). Give one of them (crumple init lead-car-wall)",
     );
     assert_eq!(entries(folder.path()), ["lead-car-wall", "vehicle-pair"]);
     // As one group their masses show that they are none.
-    let output = crumple_in(folder.path(), &["init", "--group", "all"]);
+    let output = crumple_in(folder.path(), "init --group all");
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        said.contains("the runs' masses differ (20.2, 24 t): are they of one vehicle?"),
-        "{said}"
-    );
+    says(&said, "the runs' masses differ (20.2, 24 t): are they of one vehicle?");
     let found = study(folder.path(), "study.toml");
     assert_eq!(found["study"]["group"].as_str(), Some("all"));
     assert_eq!(found["run"][0]["path"].as_str(), Some("vehicle-pair/25kmh"));
     assert_eq!(found["run"][0]["name"].as_str(), Some("vehicle-pair_25kmh"));
-    crumple_ok(folder.path(), &["build", "-q"]);
+    crumple_ok(folder.path(), "build -q");
 }
 
 /// One run, given as a folder, as several, and from inside.
@@ -817,19 +798,19 @@ fn groups_in_one_folder_are_told_apart() {
 fn a_single_run_is_enough() {
     let (_folder, here) = four_runs();
     let above = here.parent().unwrap();
-    crumple_ok(above, &["init", "lead-car-wall/36kmh", "-o", "one.toml"]);
+    crumple_ok(above, "init lead-car-wall/36kmh -o one.toml");
     let one = study(above, "one.toml");
     assert_eq!(one["study"]["group"].as_str(), Some("lead-car-wall"));
     assert_eq!(one["run"][0]["path"].as_str(), Some("lead-car-wall/36kmh"));
     assert_eq!(one["run"][0]["name"].as_str(), Some("36kmh"));
-    crumple_ok(above, &["build", "one.toml", "-q"]);
+    crumple_ok(above, "build one.toml -q");
     let inside = here.join("36kmh");
-    crumple_ok(&inside, &["init"]);
+    crumple_ok(&inside, "init");
     let found = study(&inside, "study.toml");
     assert_eq!(found["run"][0]["path"].as_str(), Some("."));
     assert_eq!(found["run"][0]["name"].as_str(), Some("36kmh"));
-    crumple_ok(&inside, &["build", "-q"]);
-    crumple_ok(above, &["init", "lead-car-wall/25kmh", "lead-car-wall/48kmh", "-o", "two.toml"]);
+    crumple_ok(&inside, "build -q");
+    crumple_ok(above, "init lead-car-wall/25kmh lead-car-wall/48kmh -o two.toml");
     assert_eq!(study(above, "two.toml")["run"].as_array().unwrap().len(), 2);
 }
 
@@ -837,44 +818,40 @@ fn a_single_run_is_enough() {
 fn nothing_is_overwritten() {
     let (_folder, here) = four_runs();
     fs::write(here.join("study.toml"), "mine").unwrap();
-    let error = crumple_fails(&here, 1, &["init"]);
-    assert!(
-        error.contains(
-            "study.toml exists already and is not overwritten: name another with -o, or remove it"
-        ),
-        "{error}"
+    let error = crumple_fails(&here, 1, "init");
+    says(
+        &error,
+        "study.toml exists already and is not overwritten: name another with -o, or remove it",
     );
     assert_eq!(fs::read(here.join("study.toml")).unwrap(), b"mine");
-    crumple_fails(&here, 1, &["init", "-o", "25kmh"]);
-    let error = crumple_fails(&here, 2, &["init", "-o", "-", "--json"]);
-    assert!(error.contains("-o - and --json both write to standard output"), "{error}");
-    let error = crumple_fails(&here, 1, &["init", "-o", "none/study.toml"]);
-    assert!(error.contains("the folder none does not exist"), "{error}");
+    crumple_fails(&here, 1, "init -o 25kmh");
+    let error = crumple_fails(&here, 2, "init -o - --json");
+    says(&error, "-o - and --json both write to standard output");
+    says(&crumple_fails(&here, 1, "init -o none/study.toml"), "the folder none does not exist");
 }
 
 #[test]
 fn wrong_units_are_not_believed() {
     let (_folder, here) = four_runs();
-    let error = crumple_fails(&here, 1, &["init", "--units", "SI"]);
-    assert!(error.contains("crumple build would refuse it"), "{error}");
-    assert!(error.contains("units: SI as given would make an impact at 6944 m/s, which is not a crash; mm-t-s would fit"), "{error}");
+    let error = crumple_fails(&here, 1, "init --units SI");
+    says(&error, "crumple build would refuse it");
+    says(
+        &error,
+        "units: SI as given would make an impact at 6944 m/s, which is not a crash; mm-t-s would fit",
+    );
     assert!(!here.join("study.toml").exists());
-    crumple_fails(&here, 2, &["init", "--units", "mm-t-fortnight"]);
+    crumple_fails(&here, 2, "init --units mm-t-fortnight");
     // A deck that states them is read; one that cannot be right is named.
     let deck = |units: &str| {
         let text = format!("*KEYWORD\n$ units: {units}\n*TITLE\na deck\n*END\n");
         fs::write(here.join("36kmh/main.k"), text).unwrap();
     };
     deck("Mg mm s");
-    let text = crumple_ok(&here, &["init", "-o", "-"]);
-    assert!(
-        text.contains("# read: the deck main.k, line 2: \"Mg mm s\"; and the only usual system"),
-        "{text}"
-    );
+    let text = crumple_ok(&here, "init -o -");
+    says(&text, "# read: the deck main.k, line 2: \"Mg mm s\"; and the only usual system");
     deck("kg m s");
-    let output = crumple_in(&here, &["init"]);
-    let said = String::from_utf8(output.stderr).unwrap();
-    assert!(said.contains("states SI, which would make an impact at"), "{said}");
+    let output = crumple_in(&here, "init");
+    says(&String::from_utf8(output.stderr).unwrap(), "states SI, which would make an impact at");
     assert_eq!(study(&here, "study.toml")["study"]["units"].as_str(), Some("mm-t-s"));
 }
 
@@ -912,16 +889,15 @@ fn what_the_caller_knows_stands_above_what_is_found() {
     ] {
         assert!(text.contains(line), "{line} in\n{text}");
     }
-    crumple_ok(&here, &["build", "-q"]);
-    let error = crumple_fails(&here, 1, &["init", "--node", "4", "-o", "x.toml"]);
-    assert!(error.contains("it has no moving node 4; there"), "{error}");
-    let error = crumple_fails(&here, 2, &["init", "--force", "nodout:1", "-o", "x.toml"]);
-    assert!(error.contains("is not a force: write FILE:ID[:SIDE][:COMPONENT]"), "{error}");
-    crumple_fails(&here, 2, &["init", "--scenario", "--mass", "1t", "a.model"]);
-    let error = crumple_fails(&here, 1, &["init", "--force", "rcforc:9", "-o", "x.toml"]);
-    assert!(
-        error.contains("no run has a force rcforc 9 along the motion: there are rcforc 3, rcforc 4, rwforc 1, rwforc 7"),
-        "{error}"
+    crumple_ok(&here, "build -q");
+    says(&crumple_fails(&here, 1, "init --node 4 -o x.toml"), "it has no moving node 4; there");
+    let error = crumple_fails(&here, 2, "init --force nodout:1 -o x.toml");
+    says(&error, "is not a force: write FILE:ID[:SIDE][:COMPONENT]");
+    crumple_fails(&here, 2, "init --scenario --mass 1t a.model");
+    let error = crumple_fails(&here, 1, "init --force rcforc:9 -o x.toml");
+    says(
+        &error,
+        "no run has a force rcforc 9 along the motion: there are rcforc 3, rcforc 4, rwforc 1, rwforc 7",
     );
 }
 
@@ -934,7 +910,7 @@ fn of_several_files_with_one_history_one_is_chosen() {
     let here = folder.path().join("lead-car-wall");
     // The T01 of a run beside its text, as a run of its own.
     copy_run(&source.join("36kmh"), &here.join("copy"), T01);
-    let document = json(&crumple_ok(&here, &["init", "--json"]));
+    let document = json(&crumple_ok(&here, "init --json"));
     let notes: Vec<&str> =
         document["notes"].as_array().unwrap().iter().map(|n| n.as_str().unwrap()).collect();
     assert_eq!(
@@ -1008,7 +984,7 @@ fn real_files_that_are_no_impact_give_no_study() {
                 let run = folder.path().join("run");
                 fs::create_dir(&run).unwrap();
                 fs::copy(&file, run.join(name)).unwrap();
-                let error = crumple_fails(folder.path(), 1, &["init"]);
+                let error = crumple_fails(folder.path(), 1, "init");
                 let is_said =
                     error.contains("  run: it ") || error.contains("  run: nothing moves");
                 assert!(is_said, "{}: {error}", file.display());
@@ -1032,12 +1008,11 @@ fn scenarios_run_as_they_are_written() {
     ] {
         let arguments = [&["init", "--scenario"], models, &["-o", "new.toml"]].concat();
         crumple_ok(here, &arguments);
-        let result = json(&crumple_ok(here, &["simulate", "new.toml", "--json"]));
+        let result = json(&crumple_ok(here, "simulate new.toml --json"));
         let masses = result["summary"]["bodies"].as_array().unwrap().len();
         // A wall is a body of the result too, or not: only vehicles are counted.
         assert!(masses == bodies || masses + 1 == bodies, "{models:?}: {masses} bodies");
-        let error = crumple_fails(here, 1, &arguments);
-        assert!(error.contains("new.toml exists already"), "{error}");
+        says(&crumple_fails(here, 1, &arguments), "new.toml exists already");
         let scenario = study(here, "new.toml");
         let speed = number(&scenario["train"][0]["speed"], "km/h");
         assert!((12.0..=72.0).contains(&speed));
@@ -1045,14 +1020,13 @@ fn scenarios_run_as_they_are_written() {
         assert_eq!(scenario.contains_key("wall"), models[0] == "lead.model");
         fs::remove_file(here.join("new.toml")).unwrap();
     }
-    let document =
-        json(&crumple_ok(here, &["init", "--scenario", "lead.model", "-o", "s.toml", "--json"]));
+    let document = json(&crumple_ok(here, "init --scenario lead.model -o s.toml --json"));
     assert_eq!(document["scenario"], "s.toml");
     assert_eq!(document["trains"][0]["vehicles"][0]["mass_kg"]["evidence"], "read");
     let t = |code: i32, models: &[&str], expected: &str| {
         let error =
             crumple_fails(here, code, &[&["init", "--scenario", "-o", "t.toml"], models].concat());
-        assert!(error.contains(expected), "{error}");
+        says(&error, expected);
     };
     t(1, &["pair.model", "lead.model"], "lead.model: its speeds are wall speeds");
     t(2, &[], "a scenario takes one model or two, found 0");
@@ -1065,14 +1039,14 @@ fn inspect_takes_folders() {
     let (_folder, here) = four_runs();
     fs::write(here.join("25kmh/main.k"), "*KEYWORD\n*TITLE\na deck\n*END\n").unwrap();
     let above = here.parent().unwrap();
-    let text = crumple_ok(above, &["inspect", "lead-car-wall"]);
+    let text = crumple_ok(above, "inspect lead-car-wall");
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines[0], "lead-car-wall/25kmh");
     assert_eq!(lines[1], "file      holds  states  first time       last  entities  problems");
     assert_eq!(lines[2], "nodout   nodout     400         0.0  0.2992515         1         0");
     assert_eq!(lines[4], "main.k  keyword       0           -          -         0         0");
     assert_eq!(lines.len(), 4 + 5 + 3 * 4 - 4);
-    let document = json(&crumple_ok(above, &["inspect", "lead-car-wall", "--json"]));
+    let document = json(&crumple_ok(above, "inspect lead-car-wall --json"));
     let files = document["files"].as_array().unwrap();
     assert_eq!(files.len(), 9);
     assert_eq!(files[0]["path"], "lead-car-wall/25kmh/nodout");
@@ -1082,35 +1056,33 @@ fn inspect_takes_folders() {
     let nodout = here.join("36kmh/nodout");
     cut(&nodout, " n o d a l   p r i n t ", 100);
     fs::write(here.join("36kmh/binout_notes.txt"), "no binout").unwrap();
-    let output = crumple_in(above, &["inspect", "lead-car-wall/36kmh", "--strict"]);
+    let output = crumple_in(above, "inspect lead-car-wall/36kmh --strict");
     assert_eq!(output.status.code(), Some(3));
     assert!(
         String::from_utf8(output.stderr).unwrap().contains("binout_notes.txt: no solver output")
     );
     fs::create_dir(above.join("empty")).unwrap();
-    let error = crumple_fails(above, 1, &["inspect", "empty"]);
-    assert!(error.contains("empty: none of its folders holds solver files"), "{error}");
+    let error = crumple_fails(above, 1, "inspect empty");
+    says(&error, "empty: none of its folders holds solver files");
 }
 
 #[test]
 fn build_needs_no_arguments_beside_a_study() {
     let (_folder, here) = four_runs();
-    let error = crumple_fails(&here, 2, &["build"]);
-    assert!(
-        error.contains(
-            "there is no study.toml in this folder: name a study, or let crumple init write one"
-        ),
-        "{error}"
+    let error = crumple_fails(&here, 2, "build");
+    says(
+        &error,
+        "there is no study.toml in this folder: name a study, or let crumple init write one",
     );
-    crumple_ok(&here, &["init"]);
-    let printed = crumple_ok(&here, &["build"]);
+    crumple_ok(&here, "init");
+    let printed = crumple_ok(&here, "build");
     assert!(printed.ends_with("wrote curves.h5 (group lead-car-wall)\n"), "{printed}");
     assert!(here.join("curves.h5").is_file());
     let above = here.parent().unwrap();
     fs::remove_file(here.join("curves.h5")).unwrap();
-    let printed = crumple_ok(above, &["build", "lead-car-wall/study.toml"]);
+    let printed = crumple_ok(above, "build lead-car-wall/study.toml");
     assert!(printed.contains("wrote lead-car-wall/curves.h5"), "the database is beside the study");
-    let document = json(&crumple_ok(&here, &["build", "-o", "other.h5", "--json"]));
+    let document = json(&crumple_ok(&here, "build -o other.h5 --json"));
     assert_eq!(document["database"], "other.h5");
 }
 
@@ -1126,8 +1098,8 @@ fn a_texts_header_does_not_hide_the_binary_file() {
         let header: Vec<&str> = text.lines().take(2).collect();
         fs::write(here.join(run).join("nodout"), header.join("\n") + "\n").unwrap();
     }
-    crumple_ok(&here, &["init"]);
-    crumple_ok(&here, &["build", "-q"]);
+    crumple_ok(&here, "init");
+    crumple_ok(&here, "build -q");
 }
 
 /// A link that leads out of the folder is followed to a run, not through a whole disk.
@@ -1142,7 +1114,7 @@ fn links_out_of_the_folder_are_followed_to_runs_only() {
         symlink(fixture(&format!("fe/lead-car-wall/{run}")), here.join("runs").join(run)).unwrap();
     }
     symlink("/", here.join("runs/root")).unwrap();
-    let output = crumple_in(here, &["init", "runs", "-o", "-"]);
+    let output = crumple_in(here, "init runs -o -");
     let (text, said) =
         (String::from_utf8(output.stdout).unwrap(), String::from_utf8(output.stderr).unwrap());
     assert!(text.contains("36kmh"), "{text}{said}");

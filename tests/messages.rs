@@ -12,7 +12,9 @@ use std::process::Command;
 
 use serde_json::Value;
 
-use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, entries, fixture, root};
+use crate::common::{
+    build_fixture, crumple_fails, crumple_in, crumple_ok, entries, fixture, root, says,
+};
 
 macro_rules! pages {
     ($($name:ident: $page:literal;)*) => {
@@ -219,7 +221,7 @@ fn commands(help: &str) -> Vec<String> {
 #[test]
 fn global_options_have_their_heading_and_every_command_its_page() {
     let folder = tempfile::tempdir().unwrap();
-    crumple_ok(folder.path(), &["man", "-o", "man/man1"]);
+    crumple_ok(folder.path(), "man -o man/man1");
     let pages = folder.path().join("man/man1");
     let mut expected = 0;
     let mut left: Vec<Vec<String>> = vec![Vec::new()];
@@ -235,7 +237,7 @@ fn global_options_have_their_heading_and_every_command_its_page() {
         }
         let name = [&["crumple"], &words[..]].concat().join("-");
         let page = fs::read_to_string(pages.join(format!("{name}.1"))).unwrap();
-        assert!(page.contains(&format!(".TH {name} ")), "{page}");
+        says(&page, &format!(".TH {name} "));
         expected += 1;
         left.extend(commands(&help).into_iter().map(|sub| [&command[..], &[sub]].concat()));
     }
@@ -250,8 +252,8 @@ fn a_long_line_is_shown_in_part() {
     let text =
         format!("{{\"format\":\"crumple model\",\"forces\":[{}0]}}\n", "1.5,".repeat(10_000));
     fs::write(folder.path().join("m.model"), text).unwrap();
-    let error = crumple_fails(folder.path(), 1, &["simulate", "m.model"]);
-    assert!(error.contains("1 | {\"format\":\"crumple model\""), "{error}");
+    let error = crumple_fails(folder.path(), 1, "simulate m.model");
+    says(&error, "1 | {\"format\":\"crumple model\"");
     assert!(error.lines().all(|line| line.chars().count() <= 200), "{error}");
 }
 
@@ -290,7 +292,7 @@ fn sixty_columns_are_enough() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     build_fixture(here, "lead-car-wall");
-    let piped = crumple_ok(here, &["db", "ls", "curves.h5"]);
+    let piped = crumple_ok(here, "db ls curves.h5");
     assert!(piped.lines().any(|line| line.chars().count() > 60), "{piped}");
     for arguments in ["db ls curves.h5", "db show curves.h5 --group lead-car-wall --case 36kmh"] {
         for columns in [60, 72] {
@@ -303,7 +305,7 @@ fn sixty_columns_are_enough() {
             }
         }
     }
-    let whole = crumple_ok(here, &["db", "ls", "curves.h5"]);
+    let whole = crumple_ok(here, "db ls curves.h5");
     assert_eq!(on_a_terminal(here, 300, "db ls curves.h5"), whole);
     // Every cell is in the narrow one too.
     let narrow = on_a_terminal(here, 60, "db ls curves.h5");
@@ -311,10 +313,10 @@ fn sixty_columns_are_enough() {
         assert!(narrow.contains(word), "{word} is not in\n{narrow}");
     }
     let help = on_a_terminal(here, 60, "");
-    assert!(help.contains("The usual order of work"), "{help}");
+    says(&help, "The usual order of work");
     assert!(help.lines().all(|line| line.chars().count() <= 60), "{help}");
     fs::write(here.join("study.toml"), STUDY_OF_A_PAIR).unwrap();
     let error = on_a_terminal(here, 60, "build study.toml -o c.h5");
-    assert!(error.contains("5 | kind  = \"pair\"\n  |         ^^^^^^\n"), "{error}");
+    says(&error, "5 | kind  = \"pair\"\n  |         ^^^^^^\n");
     assert!(!has_colour(&error), "{error:?}");
 }

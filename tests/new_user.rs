@@ -7,7 +7,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use crate::common::containers::binout_of;
-use crate::common::{crumple_fails, crumple_in, crumple_ok, fixture, root, shared};
+use crate::common::{crumple_fails, crumple_in, crumple_ok, fixture, root, says, shared};
 use crate::readme::run;
 
 const TEXTS: &[&str] = &["nodout", "rwforc"];
@@ -119,8 +119,8 @@ fn the_usual_order_of_work_works() {
         crumple_ok(&here, &words.collect::<Vec<_>>());
     }
     let study = fs::read_to_string(here.join("study.toml")).unwrap();
-    assert!(study.contains("path = \"Läufe/Stoß 36 km h\""), "{study}");
-    assert!(study.contains("group = \"Läufe\""), "{study}");
+    says(&study, "path = \"Läufe/Stoß 36 km h\"");
+    says(&study, "group = \"Läufe\"");
     assert!(fs::read_to_string(here.join("report.html")).unwrap().contains("Stoß 48 km h"));
 }
 
@@ -131,7 +131,7 @@ fn a_killed_run_says_nothing_of_the_others() {
     let here = folder.path();
     copy(&fixture("fe/lead-car-wall/36kmh"), &here.join("runs/36kmh"), TEXTS);
     copy(&fixture("fe/lead-car-wall/48kmh"), &here.join("runs/48kmh"), TEXTS);
-    let alone = crumple_ok(here, &["init", "runs/36kmh", "--group", "runs", "-o", "alone.toml"]);
+    let alone = crumple_ok(here, "init runs/36kmh --group runs -o alone.toml");
     let nodout = here.join("runs/48kmh/nodout");
     let whole = fs::read(&nodout).unwrap();
     for states in [20, 40, 80] {
@@ -141,7 +141,7 @@ fn a_killed_run_says_nothing_of_the_others() {
         assert_eq!(String::from_utf8(output.stderr).unwrap(), "", "{states} states");
         let printed = String::from_utf8(output.stdout).unwrap();
         let died = "left out: runs/48kmh: it terminated early: the record ends at ";
-        assert!(printed.contains(died), "{printed}");
+        says(&printed, died);
         let without_its_run: Vec<&str> =
             printed.lines().filter(|line| !line.starts_with("left out: ")).collect();
         let expected = alone.replace("alone.toml", &format!("{states}.toml"));
@@ -151,12 +151,12 @@ fn a_killed_run_says_nothing_of_the_others() {
     // Another file of the same histories may hold more of them.
     let copied = binout_of(&fixture("fe/lead-car-wall/48kmh"));
     fs::write(here.join("runs/48kmh/binout0000"), copied).unwrap();
-    let printed = crumple_ok(here, &["init", "runs", "-o", "binout.toml"]);
+    let printed = crumple_ok(here, "init runs -o binout.toml");
     let hint = "; binout0000 holds it too, and is read where there is no nodout\n";
-    assert!(printed.contains(hint), "{printed}");
+    says(&printed, hint);
     fs::remove_file(here.join("runs/48kmh/binout0000")).unwrap();
     // The run that died is damage to whoever asks for it.
-    let strict = crumple_in(here, &["init", "runs", "-o", "strict.toml", "--strict"]);
+    let strict = crumple_in(here, "init runs -o strict.toml --strict");
     assert_eq!(strict.status.code(), Some(3));
     // A force that was cut early tells as little, and is called by its end, not by another recipe.
     fs::write(&nodout, &whole).unwrap();
@@ -164,12 +164,9 @@ fn a_killed_run_says_nothing_of_the_others() {
     let text = fs::read_to_string(&rwforc).unwrap();
     let first: Vec<&str> = text.split_inclusive('\n').take(40).collect();
     fs::write(&rwforc, first.concat()).unwrap();
-    let printed = crumple_ok(here, &["init", "runs", "-o", "force.toml"]);
-    assert!(
-        printed.contains("left out: runs/48kmh: it terminated early: the record ends at 22."),
-        "{printed}"
-    );
-    assert!(printed.contains("\n36kmh  36 km/h  24.00 t "), "{printed}");
+    let printed = crumple_ok(here, "init runs -o force.toml");
+    says(&printed, "left out: runs/48kmh: it terminated early: the record ends at 22.");
+    says(&printed, "\n36kmh  36 km/h  24.00 t ");
 }
 
 #[test]
@@ -181,7 +178,7 @@ fn what_is_not_as_it_should_be_is_said_with_what_to_do() {
     copy(&source.join("48kmh"), &here.join("runs/48kmh"), TEXTS);
     let fails = |arguments: &[&str], expected: &str| {
         let error = crumple_fails(here, 1, &[&["init"], arguments].concat());
-        assert!(error.contains(expected), "{error}");
+        says(&error, expected);
         assert!(!here.join("study.toml").exists(), "{arguments:?}");
     };
     // A wrong path is told with what is there.
@@ -196,8 +193,8 @@ fn what_is_not_as_it_should_be_is_said_with_what_to_do() {
     // A folder without anything, beside one with a run.
     fs::remove_dir_all(here.join("runs/48kmh")).unwrap();
     fs::create_dir(here.join("runs/48kmh")).unwrap();
-    let printed = crumple_ok(here, &["init", "runs"]);
-    assert!(printed.contains("left out: runs/48kmh: the folder is empty"), "{printed}");
+    let printed = crumple_ok(here, "init runs");
+    says(&printed, "left out: runs/48kmh: the folder is empty");
     assert!(
         printed.ends_with(
             "wrote study.toml (1 run): check the guessed values, then run crumple build\n"
@@ -205,6 +202,6 @@ fn what_is_not_as_it_should_be_is_said_with_what_to_do() {
     );
     // What is left to fill in is counted where the next step is named.
     fs::remove_file(here.join("runs/36kmh/rwforc")).unwrap();
-    let printed = crumple_ok(here, &["init", "runs", "-o", "mass.toml"]);
+    let printed = crumple_ok(here, "init runs -o mass.toml");
     assert!(printed.ends_with("wrote mass.toml (1 run): incomplete, 1 line to fill in or to give as an option; then run crumple build\n"), "{printed}");
 }

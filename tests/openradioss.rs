@@ -338,7 +338,7 @@ fn a_restart_goes_on_where_the_run_ended() {
     let alone = section(&at("runT02"), "nodout");
     assert_eq!(alone.time.len(), section(&at("wholeT01"), "nodout").time.len() - 80);
     // Both are one file of the run; without the first the beginning is missing.
-    let listed = crumple_ok(folder.path(), &["inspect", "."]);
+    let listed = crumple_ok(folder.path(), "inspect .");
     assert!(listed.contains("runT01") && !listed.contains("runT02"), "{listed}");
     fs::rename(at("runT02"), at("runT03")).unwrap();
     let message = section(&at("runT01"), "nodout").problems[0].to_string();

@@ -7,7 +7,7 @@ use std::path::Path;
 use crumple::assess::Choice;
 use crumple::assess::ComparisonSettings;
 use crumple::assess::compare_train;
-use crumple::charts::{self, HistoryOptions, Motion, Quantity};
+use crumple::charts::{self, Motion, Quantity};
 use crumple::curve::ForceKind;
 use crumple::database::Database;
 use crumple::multibody::simulate;
@@ -17,25 +17,22 @@ use crumple::solver::{self, Selection};
 use crumple::surrogate::{Model, Query, predict};
 use crumple::unit::UnitSystem;
 
-use crate::common::{crumple_fails, crumple_ok, demo_folder, entries, root};
+use crate::common::{crumple_fails, crumple_ok, demo_folder, entries, root, says};
 
 /// Every text lies within the picture, and no two texts touch.
 fn assert_texts_are_free(drawing: &Drawing, what: &str) {
     let boxes = drawing.text_boxes();
-    for (k, one) in boxes.iter().enumerate() {
-        let [left, top, right, bottom] = one.place;
+    for (k, &(one, place)) in boxes.iter().enumerate() {
+        let [left, top, right, bottom] = place;
         assert!(
             left >= 0.0 && top >= 0.0 && right <= drawing.width && bottom <= drawing.height,
-            "{what}: \"{}\" leaves the picture: {:?} of {} × {}",
-            one.text,
-            one.place,
+            "{what}: \"{one}\" leaves the picture: {place:?} of {} × {}",
             drawing.width,
             drawing.height
         );
-        for other in &boxes[..k] {
-            let [l, t, r, b] = other.place;
-            let is_apart = right <= l || r <= left || bottom <= t || b <= top;
-            assert!(is_apart, "{what}: \"{}\" and \"{}\" overlap", one.text, other.text);
+        for (other, [l, t, r, b]) in &boxes[..k] {
+            let is_apart = right <= *l || *r <= left || bottom <= *t || *b <= top;
+            assert!(is_apart, "{what}: \"{one}\" and \"{other}\" overlap");
         }
     }
 }
@@ -121,9 +118,8 @@ fn texts_of_all_charts_are_free() {
         let read = solver::read(&path, None, &Selection::all()).unwrap();
         let histories: Vec<_> = read.histories.iter().take(20).collect();
         let units = Some(UnitSystem::parse("mm-t-s").unwrap());
-        for options in [HistoryOptions { units, filter_class: Some(60) }, HistoryOptions::default()]
-        {
-            check(&charts::histories(file, &histories, options).unwrap(), file);
+        for (units, class) in [(units, Some(60)), (None, None)] {
+            check(&charts::histories(file, &histories, units, class).unwrap(), file);
         }
     }
 }
@@ -194,43 +190,22 @@ fn extreme_values_are_drawn() {
 fn every_kind_of_file_is_drawn() {
     let folder = demo_folder();
     let folder = folder.path();
-    crumple_ok(folder, &["simulate", "scenario.toml", "-o", "result.csv"]);
-    for (arguments, texts) in [
+    crumple_ok(folder, "simulate scenario.toml -o result.csv");
+    #[rustfmt::skip]
+    let cases = [
         ("curves.h5 --group lead-car-wall", &["FE at 72 km/h", "deflection [m]", "force [MN]"][..]),
-        (
-            "curves.h5 --group lead-car-wall --force body",
-            &["lead-car-wall: body force by wall speed"],
-        ),
-        (
-            "curves.h5 --group lead-car-pair --left-out 48km/h",
-            &["FE at 48 km/h", "closing speed [m/s]"],
-        ),
-        (
-            "lead.model --speed 50km/h",
-            &[
-                "FE at 48 km/h",
-                "FE at 60 km/h",
-                "maximum crush",
-                "empirical 90 % range from 5 left-out inner speeds",
-            ],
-        ),
+        ("curves.h5 --group lead-car-wall --force body", &["lead-car-wall: body force by wall speed"]),
+        ("curves.h5 --group lead-car-pair --left-out 48km/h", &["FE at 48 km/h", "closing speed [m/s]"]),
+        ("lead.model --speed 50km/h", &["FE at 48 km/h", "FE at 60 km/h", "maximum crush", "empirical 90 % range from 5 left-out inner speeds"]),
         ("lead50.json", &["lead-car-wall at 50 km/h: contact force by the model crush-law"]),
-        (
-            "lead50.json --force body",
-            &["lead-car-wall at 50 km/h: body force by the model crush-law"],
-        ),
+        ("lead50.json --force body", &["lead-car-wall at 50 km/h: body force by the model crush-law"]),
         ("scenario.toml --quantity energy", &["kinetic", "dissipated", "energy [MJ]", "time [ms]"]),
         ("result.csv --quantity crush", &["A1|wall", "deflection [m]"]),
         ("train-set.toml --train", &["A1", "A3", "FE", "best_local", "speed [m/s]"]),
-        (
-            "fe/lead-car-wall/36kmh/nodout --id 900001 --component x_velocity --units mm-t-s --cfc 60",
-            &["900001, CFC 60", "x_velocity [m/s]"],
-        ),
-        (
-            "fe/lead-car-wall/36kmh/crashT01 --section rwforc --component normal_force",
-            &["normal_force [unit of the file]"],
-        ),
-    ] {
+        ("fe/lead-car-wall/36kmh/nodout --id 900001 --component x_velocity --units mm-t-s --cfc 60", &["900001, CFC 60", "x_velocity [m/s]"]),
+        ("fe/lead-car-wall/36kmh/crashT01 --section rwforc --component normal_force", &["normal_force [unit of the file]"]),
+    ];
+    for (arguments, texts) in cases {
         let mut all = vec!["plot"];
         all.extend(arguments.split(' '));
         all.extend(["-o", "a.svg", "-o", "a.png"]);
@@ -263,21 +238,14 @@ fn wrong_wishes_are_refused() {
     fs::write(folder.join("bad.csv"), "time_s,v_m_per_s[A1]\n0,1\n1,x\n").unwrap();
     fs::write(folder.join("other.csv"), "time_s,b\n0,1\n").unwrap();
     let before = entries(folder);
-    for (code, arguments, says) in [
+    #[rustfmt::skip]
+    let cases = [
         (1, "curves.h5 -o a.svg", "has several groups: choose one with --group"),
         (1, "curves.h5 --group nothing -o a.svg", "nothing"),
         (2, "curves.h5 --group lead-car-wall -o a.jpg", "pictures are written as .svg or .png"),
-        (
-            1,
-            "curves.h5 --group lead-car-wall --left-out 50km/h -o a.svg",
-            "has no run at 50 km/h: its speeds are 12 km/h",
-        ),
+        (1, "curves.h5 --group lead-car-wall --left-out 50km/h -o a.svg", "has no run at 50 km/h: its speeds are 12 km/h"),
         (2, "lead.model -o a.svg", "name the speed of the model's curve with --speed"),
-        (
-            2,
-            "lead50.json --speed 50km/h -o a.svg",
-            "--speed is for a model: lead50.json is a predicted curve",
-        ),
+        (2, "lead50.json --speed 50km/h -o a.svg", "--speed is for a model: lead50.json is a predicted curve"),
         (2, "lead.model --speed 50km/h --id 3 -o a.svg", "--id is for a solver file"),
         (1, "bad.csv -o a.svg", "bad.csv: line 3, column 2: expected a number, found \"x\""),
         (1, "other.csv -o a.svg", "expected the columns of crumple simulate -o"),
@@ -285,7 +253,8 @@ fn wrong_wishes_are_refused() {
         (2, "lead.model --speed 50km/h -o lead.model", "pictures are written"),
         (2, "fe/lead-car-wall/36kmh/nodout --cfc 60 -o a.svg", "--units"),
         (2, "lead50.json -o a.svg --width 10", "expected a number from 80 to 5000"),
-    ] {
+    ];
+    for (code, arguments, says) in cases {
         let mut all = vec!["plot"];
         all.extend(arguments.split(' '));
         let error = crumple_fails(folder, code, &all);
@@ -339,7 +308,7 @@ fn curve_files_are_drawn() {
         assert!(picture.contains("deflection") && picture.contains("<path"), "{file}");
     }
     std::fs::write(here.join("notes"), "no\nnumbers\n").unwrap();
-    let error = crumple_fails(here, 1, &["plot", "notes", "-o", "n.svg"]);
-    assert!(error.contains("no solver output is recognised"), "{error}");
-    assert!(error.contains("as a curve: notes: the format of this file"), "{error}");
+    let error = crumple_fails(here, 1, "plot notes -o n.svg");
+    says(&error, "no solver output is recognised");
+    says(&error, "as a curve: notes: the format of this file");
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use crate::common::{crumple_fails, crumple_in, crumple_ok, fixture};
+use crate::common::{crumple_fails, crumple_in, crumple_ok, fixture, says};
 use serde_json::Value;
 
 /// Writes a table of `time` and `value` over samples of 1 ms.
@@ -135,20 +135,20 @@ fn units_and_factors_are_those_of_the_arguments() {
     write(here, "ms.csv", "time [ms],a_mm", 200, |t| {
         format!("{:?},{:?}", t * 1e3, -1e3 * pulse(t))
     });
-    let error = crumple_fails(here, 1, &["rate", "a.csv", "ms.csv"]);
+    let error = crumple_fails(here, 1, "rate a.csv ms.csv");
     assert_eq!(
         error,
         "error: ms.csv: line 1, column 1 (\"time [ms]\"): expected a time in s: write ms.csv,time=ms\n"
     );
     write(here, "us.csv", "Time [µS],a", 200, |t| format!("{:?},{:?}", t * 1e6, pulse(t)));
-    let error = crumple_fails(here, 1, &["rate", "a.csv", "us.csv"]);
-    assert!(error.contains("expected a time in s: write us.csv,time=us"), "{error}");
+    let error = crumple_fails(here, 1, "rate a.csv us.csv");
+    says(&error, "expected a time in s: write us.csv,time=us");
     let of = rate(here, &["a.csv", "ms.csv,scale=-1e-3,time=ms"]);
     assert!(of["l1_ratio"].as_f64().unwrap() < 1e-12, "{of}");
     assert_eq!(of["quantity"], "other", "only one name says acceleration");
     // Nothing in this header tells the unit.
     write(here, "t.csv", "t,a", 200, |t| format!("{:?},{:?}", t * 1e3, pulse(t)));
-    let error = crumple_fails(here, 1, &["rate", "a.csv", "t.csv"]);
+    let error = crumple_fails(here, 1, "rate a.csv t.csv");
     assert_eq!(
         error,
         "error: a.csv lasts 0.199 s and t.csv 199 s, if both count time in s: write the unit of each after its name, such as a.csv,time=s and t.csv,time=ms\n"
@@ -156,8 +156,11 @@ fn units_and_factors_are_those_of_the_arguments() {
     let said = ["a.csv,time=s", "t.csv,time=ms"];
     assert!(rate(here, &said)["l1_ratio"].as_f64().unwrap() < 1e-12);
     // Both in ms: nothing compares them, but a filter sees it.
-    let error = crumple_fails(here, 1, &["rate", "t.csv", "t.csv", "--cfc", "60"]);
-    assert!(error.contains("it lasts 199 s, so its times may be in ms: then write ,time=ms after the file's name; else use a lower class"), "{error}");
+    let error = crumple_fails(here, 1, "rate t.csv t.csv --cfc 60");
+    says(
+        &error,
+        "it lasts 199 s, so its times may be in ms: then write ,time=ms after the file's name; else use a lower class",
+    );
     let both = rate(here, &["t.csv,time=ms", "t.csv,time=ms", "--cfc", "60"]);
     assert_eq!(both["to_s"], 0.199);
 }
@@ -182,13 +185,13 @@ fn histories_of_other_programs() {
     assert_eq!(of["quantity"], "acceleration", "the title says so");
     is_tenth(&rate(here, &["a.crv", "a.csv:B900002"]));
     is_tenth(&rate(here, &["a.crv:A-1", "a.cur,time=ms"]));
-    let error = crumple_fails(here, 1, &["rate", "a.crv", "a.cur"]);
-    assert!(error.contains("a.cur: line 2, column 1 (\"Time <TIME/0.001>;\"): expected a time in s: write a.cur,time=ms"), "{error}");
-    let error = crumple_fails(here, 1, &["rate", "a.csv", "a.cur"]);
-    assert!(
-        error.contains("name one of \"A900001\", \"B900002\" after the file's name: a.csv:COLUMN"),
-        "{error}"
+    let error = crumple_fails(here, 1, "rate a.crv a.cur");
+    says(
+        &error,
+        "a.cur: line 2, column 1 (\"Time <TIME/0.001>;\"): expected a time in s: write a.cur,time=ms",
     );
+    let error = crumple_fails(here, 1, "rate a.csv a.cur");
+    says(&error, "name one of \"A900001\", \"B900002\" after the file's name: a.csv:COLUMN");
     // Whatever its name says.
     std::fs::rename(here.join("a.crv"), here.join("a")).unwrap();
     is_tenth(&rate(here, &["a", "a.cur,time=ms"]));
@@ -228,69 +231,32 @@ fn wrong_input_says_where_and_what_to_do() {
         let error = crumple_fails(here, code, &[&["rate"], arguments].concat());
         assert!(error.starts_with(&format!("error: {message}")), "{arguments:?}: {error}");
     };
-    t(
-        &["a.csv", "b.csv"],
-        1,
-        "b.csv: there are several columns: name one of \"v\", \"a_m_per_s2[B1]\" after the file's name: b.csv:COLUMN",
-    );
-    t(
-        &["a.csv:w", "b.csv"],
-        1,
-        "a.csv: there is no column \"w\": name one of \"a_m_per_s2[A1]\" after the file's name: a.csv:COLUMN",
-    );
-    t(&["a.csv", "b.csv:v"], 1, "b.csv: line 2, column 2 (\"v\"): expected a number");
-    t(
-        &["a.csv", "text.csv"],
-        1,
-        "text.csv: line 3, column 2 (\"a\"): expected a number, found \"n/a\"",
-    );
-    t(&["a.csv", "nan.csv"], 1, "nan.csv: line 3, column 2 (\"a\"): expected a finite number");
-    t(
-        &["a.csv", "back.csv"],
-        1,
-        "back.csv: line 4, column 1 (\"t\"): time 0.1 does not come after 0.2: times must increase strictly",
-    );
-    t(&["a.csv", "few.csv"], 1, "few.csv: a: a signal needs at least 5 samples, found 2");
-    t(&["a.csv", "empty.csv"], 1, "empty.csv: the table is empty");
-    t(
-        &["a.csv", "late.csv"],
-        1,
-        "there are no common times: the reference goes from 0 s to 0.199 s, the prediction from 5 s to 5.4 s",
-    );
-    t(
-        &["a.csv", "a.csv", "--from=0.5s"],
-        1,
-        "the requested interval, from 0.5 s to 0.199 s, lies outside the common times",
-    );
-    t(&["a.csv", "none.csv"], 1, "none.csv: No such file");
-    t(&["a.csv", "none.csv:v"], 1, "none.csv: No such file");
-    t(
-        &["a.csv,time=h", "a.csv"],
-        2,
-        "invalid value 'a.csv,time=h' for '<A>': \"h\" is not a unit of time",
-    );
-    t(
-        &["a.csv,scale=0", "a.csv"],
-        2,
-        "invalid value 'a.csv,scale=0' for '<A>': \"0\" is not a factor",
-    );
-    let error = crumple_fails(here, 1, &["rate", "a.csv", "note"]);
-    assert!(
-        error.contains(
-            "a CSV file has the extension .csv, or its column after its name: note:COLUMN"
-        ),
-        "{error}"
-    );
-    t(
-        &["a.csv", "a.csv", "--cfc=1000"],
-        1,
-        "a.csv: a_m_per_s2[A1]: its samples are 1.00e-3 s apart",
-    );
-    t(
-        &["a.csv", "a.csv", "--id=1"],
-        2,
-        "--id chooses a history of a solver file, but this is a CSV",
-    );
+    #[rustfmt::skip]
+    let cases = [
+        (&["a.csv", "b.csv"][..], 1, "b.csv: there are several columns: name one of \"v\", \"a_m_per_s2[B1]\" after the file's name: b.csv:COLUMN"),
+        (&["a.csv:w", "b.csv"][..], 1, "a.csv: there is no column \"w\": name one of \"a_m_per_s2[A1]\" after the file's name: a.csv:COLUMN"),
+        (&["a.csv", "b.csv:v"][..], 1, "b.csv: line 2, column 2 (\"v\"): expected a number"),
+        (&["a.csv", "text.csv"][..], 1, "text.csv: line 3, column 2 (\"a\"): expected a number, found \"n/a\""),
+        (&["a.csv", "nan.csv"][..], 1, "nan.csv: line 3, column 2 (\"a\"): expected a finite number"),
+        (&["a.csv", "back.csv"][..], 1, "back.csv: line 4, column 1 (\"t\"): time 0.1 does not come after 0.2: times must increase strictly"),
+        (&["a.csv", "few.csv"][..], 1, "few.csv: a: a signal needs at least 5 samples, found 2"),
+        (&["a.csv", "empty.csv"][..], 1, "empty.csv: the table is empty"),
+        (&["a.csv", "late.csv"][..], 1, "there are no common times: the reference goes from 0 s to 0.199 s, the prediction from 5 s to 5.4 s"),
+        (&["a.csv", "a.csv", "--from=0.5s"][..], 1, "the requested interval, from 0.5 s to 0.199 s, lies outside the common times"),
+        (&["a.csv", "none.csv"][..], 1, "none.csv: No such file"),
+        (&["a.csv", "none.csv:v"][..], 1, "none.csv: No such file"),
+        (&["a.csv,time=h", "a.csv"][..], 2, "invalid value 'a.csv,time=h' for '<A>': \"h\" is not a unit of time"),
+        (&["a.csv,scale=0", "a.csv"][..], 2, "invalid value 'a.csv,scale=0' for '<A>': \"0\" is not a factor"),
+    ];
+    cases.into_iter().for_each(|(arguments, code, message)| t(arguments, code, message));
+    let error = crumple_fails(here, 1, "rate a.csv note");
+    says(&error, "a CSV file has the extension .csv, or its column after its name: note:COLUMN");
+    #[rustfmt::skip]
+    let cases = [
+        (&["a.csv", "a.csv", "--cfc=1000"][..], 1, "a.csv: a_m_per_s2[A1]: its samples are 1.00e-3 s apart"),
+        (&["a.csv", "a.csv", "--id=1"][..], 2, "--id chooses a history of a solver file, but this is a CSV"),
+    ];
+    cases.into_iter().for_each(|(arguments, code, message)| t(arguments, code, message));
     let nodout = fixture("fe/lead-car-wall/36kmh/nodout");
     let nodout = nodout.to_str().unwrap();
     t(&[nodout, nodout, "--id=1"], 1, &format!("{nodout}: nodout has no node 1"));
@@ -311,7 +277,7 @@ fn degenerate_and_long_signals_are_rated() {
     let here = folder.path();
     write(here, "zero.csv", "t,v", 100, |t| format!("{t:?},0"));
     write(here, "one.csv", "t,v", 50, |t| format!("{t:?},1"));
-    let text = crumple_in(here, &["rate", "zero.csv", "one.csv", "--json", "--strict"]);
+    let text = crumple_in(here, "rate zero.csv one.csv --json --strict");
     assert_eq!(text.status.code(), Some(3), "a warning");
     let of: Value = serde_json::from_slice(&text.stdout).unwrap();
     assert_eq!((&of["l1_ratio"], &of["samples"]), (&Value::Null, &491.into()));
@@ -338,7 +304,7 @@ fn damage_of_a_solver_file_is_a_warning() {
     let whole = path.to_str().unwrap();
     let output = crumple_in(
         folder.path(),
-        &["rate", whole, "nodout", "--component=x_velocity", "--json", "--strict"],
+        &format!("rate {whole} nodout --component=x_velocity --json --strict"),
     );
     assert_eq!(output.status.code(), Some(3));
     assert!(String::from_utf8_lossy(&output.stderr).starts_with("warning: nodout: "));

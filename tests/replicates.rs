@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::common::{crumple_fails, crumple_ok, shared};
+use crate::common::{crumple_fails, crumple_ok, says, shared};
 use crate::models::{all_kinds, case, database_of, family, law};
 use crumple::assess::{Choice, train, validate};
 use crumple::assess::{Purpose, Selection};
@@ -229,35 +229,32 @@ fn every_command_takes_replicates() {
     let of = |name: &str, factor: f64| case(name, 12.0, MASS_KG, &|d, u| factor * law(d, u));
     cases.extend([of("a", 1.01), of("b", 0.99)]);
     database_of(&here.join("c.h5"), &[("made", cases.clone())]);
-    assert!(crumple_ok(here, &["db", "ls", "c.h5"]).contains("\nb "));
-    assert!(!crumple_ok(here, &["db", "check", "c.h5"]).contains("same speed"));
-    let printed = crumple_ok(here, &["validate", "c.h5", "--next", "-v"]);
+    assert!(crumple_ok(here, "db ls c.h5").contains("\nb "));
+    assert!(!crumple_ok(here, "db check c.h5").contains("same speed"));
+    let printed = crumple_ok(here, "validate c.h5 --next -v");
     let line = "made: scatter of 2 runs at 43.2 km/h: force 1.";
     assert!(printed.contains(line) && printed.contains(": no model can remove this part"));
     // Beside the means, and at the speed itself.
     assert_eq!(printed.matches("\nFE scatter (floor)").count(), 2, "{printed}");
     for force in ["contact", "body"] {
         let parts = format!("of the local {force} force (interpolation ±");
-        assert!(printed.contains(&parts), "{printed}");
+        says(&printed, &parts);
     }
-    let report: Value =
-        serde_json::from_str(&crumple_ok(here, &["validate", "c.h5", "--json"])).unwrap();
+    let report: Value = serde_json::from_str(&crumple_ok(here, "validate c.h5 --json")).unwrap();
     let scatter = &report["groups"][0]["scatter"];
     assert_eq!(scatter["speeds"][0]["runs"], serde_json::json!(["a", "b"]));
-    crumple_ok(here, &["train", "c.h5", "--group", "made", "-o", "m.model"]);
-    let text = crumple_ok(here, &["predict", "m.model", "--speed", "12m/s"]);
-    assert!(text.contains("scatter between repeated runs ±"), "{text}");
-    crumple_ok(here, &["export", "m.model", "--speed", "12m/s", "-o", "m.csv"]);
+    crumple_ok(here, "train c.h5 --group made -o m.model");
+    says(&crumple_ok(here, "predict m.model --speed 12m/s"), "scatter between repeated runs ±");
+    crumple_ok(here, "export m.model --speed 12m/s -o m.csv");
     let all = ["compare", "c.h5", "--group", "made", "--speed", "12m/s", "--nsdm-seeds", "0"];
     crumple_ok(here, &all);
-    crumple_ok(here, &["report", "c.h5", "-o", "r.html"]);
+    crumple_ok(here, "report c.h5 -o r.html");
     assert!(std::fs::read_to_string(here.join("r.html")).unwrap().contains("Repeated runs differ"));
     // Another recipe is not a replicate.
     cases[4].provenance.recipe = r#"{"recipe": {"filter": "CFC60"}}"#.into();
     database_of(&here.join("d.h5"), &[("made", cases)]);
-    crumple_fails(here, 1, &["validate", "d.h5"]);
-    let found = crumple_ok(here, &["db", "check", "d.h5"]);
-    assert!(found.contains("has the same speed as a, but another recipe"), "{found}");
+    crumple_fails(here, 1, "validate d.h5");
+    says(&crumple_ok(here, "db check d.h5"), "has the same speed as a, but another recipe");
 }
 
 /// Dents 5 % deeper, sheets 1 % thicker, friction 10 % higher: nominally one run.

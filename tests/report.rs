@@ -4,7 +4,9 @@ use std::fs;
 
 use crumple::database::Database;
 
-use crate::common::{crumple_fails, crumple_ok, demo_folder, entries, python_of, root, run_python};
+use crate::common::{
+    crumple_fails, crumple_ok, demo_folder, entries, python_of, root, run_python, says,
+};
 
 fn report(arguments: &[&str]) -> (tempfile::TempDir, String) {
     let folder = demo_folder();
@@ -21,9 +23,10 @@ fn the_demo_ends_with_a_small_page_that_needs_nothing() {
     let folder = demo_folder();
     let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
     assert!(page.len() <= 400_000, "{} bytes", page.len());
-    assert!(page.contains(
-        "content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'\""
-    ));
+    says(
+        &page,
+        "content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'\"",
+    );
     // Nothing is loaded: no address, and no attribute that could hold one.
     for address in ["http:", "https:", " src=", "<link", "@import", "url(http", "//cdn"] {
         assert!(!page.contains(address), "{address}");
@@ -107,10 +110,9 @@ fn a_group_of_one_run_has_a_page() {
     let (head, _) = text.split_once("[[run]]").unwrap();
     let run = format!("[[run]]\npath = '{}'\nmass = '24t'\n", study.join("36kmh").display());
     fs::write(folder.path().join("study.toml"), format!("{head}{run}")).unwrap();
-    crumple_ok(folder.path(), &["build", "study.toml", "-o", "one.h5"]);
-    crumple_ok(folder.path(), &["report", "one.h5", "-o", "one.html"]);
-    let page = fs::read_to_string(folder.path().join("one.html")).unwrap();
-    assert!(page.contains("FE at 36 km/h"), "{page}");
+    crumple_ok(folder.path(), "build study.toml -o one.h5");
+    crumple_ok(folder.path(), "report one.h5 -o one.html");
+    says(&fs::read_to_string(folder.path().join("one.html")).unwrap(), "FE at 36 km/h");
 }
 
 #[test]

@@ -7,7 +7,8 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::common::{
-    crumple_in, crumple_ok, fixture, is_with_shared, samples, samples_by_kind, shared,
+    crumple_fails, crumple_in, crumple_ok, fixture, is_with_shared, samples, samples_by_kind, says,
+    shared,
 };
 
 /// Columns of a CSV by name, and the times.
@@ -572,9 +573,7 @@ fn single_surface_contacts_are_named_and_have_no_histories() {
         .map(|w| w["id"].as_i64().unwrap())
         .collect();
     assert_eq!(without, [10001, 10013]);
-    let output = crumple_in(Path::new("."), &["histories", path, "--id", "10001"]);
-    assert_eq!(output.status.code(), Some(1));
-    let error = String::from_utf8(output.stderr).unwrap();
-    assert!(error.contains("interface 10001 is a single-surface contact"), "{error}");
-    assert!(error.contains("2:surfa \"Contact Force Between Sheets\""), "{error}");
+    let error = crumple_fails(Path::new("."), 1, &["histories", path, "--id", "10001"]);
+    says(&error, "interface 10001 is a single-surface contact");
+    says(&error, "2:surfa \"Contact Force Between Sheets\"");
 }

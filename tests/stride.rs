@@ -279,10 +279,10 @@ fn blocks_and_maps_give_the_same() {
         }
     }
     let here = folder.path();
-    let plain = crumple_ok(here, &["histories", "nodout", "--id", "1899"]);
-    assert_eq!(plain, crumple_ok(here, &["histories", "nodout", "--id", "1899", "--map"]));
-    crumple_ok(here, &["histories", "nodout", "-o", "a.h5"]);
-    crumple_ok(here, &["histories", "nodout", "-o", "b.h5", "--map"]);
+    let plain = crumple_ok(here, "histories nodout --id 1899");
+    assert_eq!(plain, crumple_ok(here, "histories nodout --id 1899 --map"));
+    crumple_ok(here, "histories nodout -o a.h5");
+    crumple_ok(here, "histories nodout -o b.h5 --map");
     let bytes = |name: &str| fs::read(here.join(name)).unwrap();
     assert!(bytes("a.h5") == bytes("b.h5"));
     // A damaged file takes the other way and leaves nothing behind.
@@ -291,8 +291,8 @@ fn blocks_and_maps_give_the_same() {
     text.replace_range(at + 10..at + 22, "************");
     fs::write(&path, text).unwrap();
     assert!(blocks(&path, None, &Selection::all()).unwrap().is_some(), "its frame is even");
-    crumple_ok(here, &["histories", "nodout", "-o", "c.h5"]);
-    crumple_fails(here, 3, &["histories", "nodout", "-o", "c.h5", "--strict"]);
+    crumple_ok(here, "histories nodout -o c.h5");
+    crumple_fails(here, 3, "histories nodout -o c.h5 --strict");
     assert_eq!(bytes("c.h5").len(), bytes("a.h5").len());
     let left: Vec<_> = fs::read_dir(here).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(left.len(), 4, "{left:?}");
@@ -307,7 +307,7 @@ fn h5py_finds_the_nodes_of_what_was_written_state_by_state() {
     let path = folder.path().join("nodout");
     fs::write(&path, written.text()).unwrap();
     assert!(blocks(&path, None, &Selection::all()).unwrap().is_some(), "an even file");
-    crumple_ok(folder.path(), &["histories", "nodout", "-o", "a.h5", "--units", "mm-t-s"]);
+    crumple_ok(folder.path(), "histories nodout -o a.h5 --units mm-t-s");
     let look = "import h5py\n\
         file = h5py.File('a.h5')\n\
         assert file['time'].attrs['units'] == 's'\n\

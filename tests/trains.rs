@@ -1,24 +1,20 @@
 //! Trains as users write them: shipped scenarios, split vehicles, couplers, dampers, forces that
 //! may drive an interface, speeds of the interfaces, the comparison with FE's run of a train.
 
-use crate::common::{crumple_fails, crumple_ok, demo_folder, root};
+use crate::common::{crumple_fails, crumple_ok, demo_folder, json, root, says};
 use serde_json::Value;
-
-fn json(text: &str) -> Value {
-    serde_json::from_str(text).unwrap()
-}
 
 /// Runs a scenario text in a folder of its own.
 fn run(text: &str) -> Value {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("s.toml"), text).unwrap();
-    json(&crumple_ok(folder.path(), &["simulate", "s.toml", "--json", "-q"]))
+    json(&crumple_ok(folder.path(), "simulate s.toml --json -q"))
 }
 
 fn fails(text: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("s.toml"), text).unwrap();
-    crumple_fails(folder.path(), 1, &["simulate", "s.toml"])
+    crumple_fails(folder.path(), 1, "simulate s.toml")
 }
 
 fn column(run: &Value, name: &str) -> Vec<f64> {
@@ -70,7 +66,7 @@ fn interfaces_have_their_own_speeds() {
     let text = std::fs::read_to_string(demo.join("eight-on-eight.toml")).unwrap();
     let speeds = |text: &str| -> Vec<f64> {
         std::fs::write(demo.join("local.toml"), text).unwrap();
-        let result = json(&crumple_ok(demo, &["simulate", "local.toml", "--json", "-q"]));
+        let result = json(&crumple_ok(demo, "simulate local.toml --json -q"));
         let interfaces = result["summary"]["interfaces"].as_array().unwrap().clone();
         interfaces.iter().map(|i| i["curve_speed_m_per_s"].as_f64().unwrap()).collect()
     };
@@ -209,19 +205,16 @@ fn the_force_must_suit_the_vehicles() {
     };
     let split = "{ name = \"A1\", mass = \"24t\", front = { mass = \"2t\", curve = \"link\" } }";
     std::fs::write(demo.join("force.toml"), text(split)).unwrap();
-    let error = crumple_fails(demo, 1, &["simulate", "force.toml"]);
-    assert!(
-        error.contains("curve \"nose\": interface A1|wall has a vehicle with a crush zone"),
-        "{error}"
-    );
+    let error = crumple_fails(demo, 1, "simulate force.toml");
+    says(&error, "curve \"nose\": interface A1|wall has a vehicle with a crush zone");
     let free = text(split).replace(", force = \"body\"", "");
     std::fs::write(demo.join("force.toml"), &free).unwrap();
-    let result = json(&crumple_ok(demo, &["simulate", "force.toml", "--json", "-q"]));
+    let result = json(&crumple_ok(demo, "simulate force.toml --json -q"));
     let force = |r: &Value, k: usize| r["summary"]["interfaces"][k]["curve_force"].clone();
     assert_eq!(force(&result, 1), "contact", "the split vehicle takes the contact force");
     let one = free.replace(", front = { mass = \"2t\", curve = \"link\" }", "");
     std::fs::write(demo.join("force.toml"), one).unwrap();
-    let result = json(&crumple_ok(demo, &["simulate", "force.toml", "--json", "-q"]));
+    let result = json(&crumple_ok(demo, "simulate force.toml --json -q"));
     assert_eq!(force(&result, 0), "body", "one mass takes the body force");
 }
 
@@ -259,8 +252,7 @@ fn wrong_trains_are_explained() {
     let zone = "vehicles = [ { name = \"A1\", mass = \"9t\", front = { mass = \"2t\", curve = \"nose\" } } ]";
     t(&gap, zone, "front of vehicle \"A1\" is joined to the body without one");
     let second = "[[train]]\nname = \"A\"\nspeed = \"0m/s\"\nvehicles = [ { name = \"B1\", mass = \"9t\" } ]";
-    let error = fails(&scenario(&nose, one, second));
-    assert!(error.contains("two trains are named \"A\""), "{error}");
+    says(&fails(&scenario(&nose, one, second)), "two trains are named \"A\"");
 }
 
 /// Velocities of every vehicle against FE's run of the train, by every method.
@@ -268,10 +260,7 @@ fn wrong_trains_are_explained() {
 fn the_train_set_is_compared_with_fe() {
     let demo = demo_folder();
     let demo = demo.path();
-    let text = crumple_ok(
-        demo,
-        &["compare", "--train", "train-set.toml", "--nsdm-seeds", "1", "--json", "-q"],
-    );
+    let text = crumple_ok(demo, "compare --train train-set.toml --nsdm-seeds 1 --json -q");
     let result = json(&text);
     assert!((result["until_s"].as_f64().unwrap() - 0.135).abs() < 1e-3);
     let rows = result["rows"].as_array().unwrap();
@@ -291,8 +280,8 @@ fn the_train_set_is_compared_with_fe() {
     assert!((speed(&rows[5], "A1|A2") * 3.6 - 9.86).abs() < 0.01);
     // FE's first vehicle is at 5 m/s forwards, whichever way it went in the solver.
     assert!((result["fe"]["A1"][0].as_f64().unwrap() - 5.0).abs() < 1e-9);
-    let error = crumple_fails(demo, 1, &["compare", "--train", "scenario.toml"]);
-    assert!(error.contains("the scenario has no [reference]"), "{error}");
+    let error = crumple_fails(demo, 1, "compare --train scenario.toml");
+    says(&error, "the scenario has no [reference]");
 }
 
 /// A gap in another unit, a coupler that leaves the crush out, a contact that repeats, and a reference
@@ -309,17 +298,13 @@ fn what_does_not_fit_in_a_train_is_said() {
     };
     let of =
         |inner: &str| run(&scenario(&curves(inner), vehicles, "[wall]").replace("300ms", "900ms"));
-    let far = said(&of("gap = \"32m\""));
-    assert!(far.contains("interface A1|A2 never touches: its gap of 32 m stays open"), "{far}");
+    says(&said(&of("gap = \"32m\"")), "interface A1|A2 never touches: its gap of 32 m stays open");
     let near = of("gap = \"32mm\"");
     assert!(!said(&near).contains("never touches"), "{}", said(&near));
     let coupled = of("gap = \"1mm\", tension = \"pull\"");
     let travel = said(&coupled);
-    assert!(
-        travel.contains("interface A1|A2: after a crush of 0.")
-            && travel.contains("of free travel"),
-        "{travel}"
-    );
+    says(&travel, "interface A1|A2: after a crush of 0.");
+    says(&travel, "of free travel");
     for run in [&near, &coupled] {
         for interface in run["summary"]["interfaces"].as_array().unwrap() {
             assert!(interface["restitution"].as_f64().is_none_or(|e| e <= 1.0), "{interface}");
@@ -335,8 +320,7 @@ fn what_does_not_fit_in_a_train_is_said() {
     };
     assert_eq!(compared(&text), "null");
     let swapped = text.replace("A2 = 900002, A3 = 900003", "A2 = 900003, A3 = 900002");
-    let swapped = compared(&swapped);
-    assert!(swapped.contains("FE's record of A2 matches A3 in the run"), "{swapped}");
+    says(&compared(&swapped), "FE's record of A2 matches A3 in the run");
     let late = compared(&text.replace("until =", "contact = \"8ms\"\nuntil ="));
     assert!(late.contains("fits better by") && late.contains("when it is shifted by +"), "{late}");
 }
@@ -379,7 +363,7 @@ fn mean_decelerations_are_those_of_the_histories() {
             }
         }
     }
-    let wall = json(&crumple_ok(demo, &["simulate", "scenario.toml", "--json", "-q"]));
+    let wall = json(&crumple_ok(demo, "simulate scenario.toml --json -q"));
     let g = wall["summary"]["bodies"][0]["mean_deceleration_g"].as_f64().unwrap();
     assert!((g - 10.65).abs() < 0.01, "{g} g from 50 km/h");
 }
@@ -412,9 +396,8 @@ fn a_run_that_ends_while_loading_is_said() {
     let folder = tempfile::tempdir().unwrap();
     let text = scenario(nose, cars, "").replace("300ms", "30ms");
     std::fs::write(folder.path().join("s.toml"), text).unwrap();
-    crumple_fails(folder.path(), 3, &["simulate", "s.toml", "--strict"]);
-    let text = crumple_ok(folder.path(), &["simulate", "s.toml"]);
-    assert!(text.contains(" g so far"), "{text}");
+    crumple_fails(folder.path(), 3, "simulate s.toml --strict");
+    says(&crumple_ok(folder.path(), "simulate s.toml"), " g so far");
 }
 
 /// No command writes over what its scenario reads.
@@ -428,12 +411,10 @@ fn inputs_of_a_scenario_are_kept() {
         ["simulate", "train-set.toml", "-o", "curves.h5"],
         ["sweep", "scenario.toml", "-o", "lead.model"],
     ] {
-        let error = crumple_fails(demo, 2, &command);
-        assert!(error.contains("names the input itself"), "{error}");
+        says(&crumple_fails(demo, 2, &command), "names the input itself");
     }
     assert_eq!(std::fs::read(demo.join("pair.model")).unwrap(), before);
-    let error = crumple_fails(demo, 2, &["simulate", "two-sets.toml", "-o", "out.h5"]);
-    assert!(error.contains("a run is written as CSV"), "{error}");
+    says(&crumple_fails(demo, 2, "simulate two-sets.toml -o out.h5"), "a run is written as CSV");
 }
 
 /// Rows of a sweep are what single runs give, wherever the varied curve stands.
@@ -452,7 +433,7 @@ fn sweeps_reach_every_place_of_a_curve() {
     let vary = "[sweep]\nvary = [ { what = \"curve\", curve = \"soft\", values = [\"soft\", \"hard\"] },\n\
                 { what = \"gap\", curve = \"pull\", values = [\"5mm\", \"200mm\"] } ]\n";
     std::fs::write(folder.path().join("s.toml"), format!("{text}{vary}")).unwrap();
-    crumple_ok(folder.path(), &["sweep", "s.toml", "-o", "s.csv", "-q"]);
+    crumple_ok(folder.path(), "sweep s.toml -o s.csv -q");
     let csv = std::fs::read_to_string(folder.path().join("s.csv")).unwrap();
     let mut lines = csv.lines().filter(|l| !l.starts_with('#'));
     let header: Vec<&str> = lines.next().unwrap().split(',').collect();
@@ -487,7 +468,7 @@ fn a_curve_file_of_any_format_drives_an_interface() {
         let curve = format!("nose = {{ file = '{file}', unloading = \"90MN/m\"{more} }}");
         let vehicles = "vehicles = [ { name = \"A1\", mass = \"24t\" } ]";
         std::fs::write(here.join("any.toml"), scenario(&curve, vehicles, "[wall]")).unwrap();
-        let run = json(&crumple_ok(here, &["simulate", "any.toml", "--json", "-q"]));
+        let run = json(&crumple_ok(here, "simulate any.toml --json -q"));
         let crush = run["summary"]["interfaces"][0]["max_deflection_m"].as_f64().unwrap();
         (crush, run["warnings"].to_string())
     };
@@ -550,7 +531,7 @@ fn leaving_the_data_is_said() {
     };
     let simulate = |curve: &str, mass: &str| -> Value {
         std::fs::write(here.join("far.toml"), text(curve, mass)).unwrap();
-        json(&crumple_ok(here, &["simulate", "far.toml", "--json", "-q"]))
+        json(&crumple_ok(here, "simulate far.toml --json -q"))
     };
     for (curve, end_m) in
         [("model = \"lead.model\"", largest), ("file = \"tail.csv\", force = \"body\"", crush_m)]
@@ -562,14 +543,11 @@ fn leaving_the_data_is_said() {
         let said = format!("beyond the end of its curve's data at {end_m:.4} m");
         assert!(run["warnings"].to_string().contains(&said), "{}", run["warnings"]);
         assert_eq!(run["summary"]["limits"]["beyond_data"], serde_json::json!(["A1|wall"]));
-        let printed = crumple_ok(here, &["simulate", "far.toml"]);
-        assert!(
-            printed.contains("unknown: A1|wall went beyond the data of its curve"),
-            "{printed}"
-        );
+        let printed = crumple_ok(here, "simulate far.toml");
+        says(&printed, "unknown: A1|wall went beyond the data of its curve");
         let stops = text(&format!("{curve}, end = \"error\""), "200t");
         std::fs::write(here.join("far.toml"), stops).unwrap();
-        let error = crumple_fails(here, 1, &["simulate", "far.toml"]);
+        let error = crumple_fails(here, 1, "simulate far.toml");
         assert!(error.contains("end = \"hold\"") && error.contains(&format!("({end_m:.4} m)")));
     }
     let run = simulate("model = \"lead.model\"", "20t");
@@ -592,7 +570,7 @@ fn curves_of_one_model_go_on_alike() {
             .replace("36km/h", "50km/h")
             .replace("300ms", "600ms");
         std::fs::write(here.join("push.toml"), text).unwrap();
-        let run = json(&crumple_ok(here, &["simulate", "push.toml", "--json", "-q"]));
+        let run = json(&crumple_ok(here, "simulate push.toml --json -q"));
         let interfaces = run["summary"]["interfaces"].as_array().unwrap().clone();
         let nose = interfaces.iter().find(|i| i["name"] == "A1|wall").unwrap();
         let number = |key: &str| nose[key].as_f64().unwrap();
@@ -616,7 +594,7 @@ fn curves_of_one_model_go_on_alike() {
     }
     let held = push("model = \"lead.model\", force = \"body\", end = \"hold\"");
     assert!(held.0 > 1.5 * crush_m && held.1 < 0.5 * force_n, "{held:?}");
-    crumple_ok(here, &["export", "lead50.json", "--tail", "hold", "-o", "held.csv", "-q"]);
+    crumple_ok(here, "export lead50.json --tail hold -o held.csv -q");
     alike("file = \"held.csv\"", held);
     alike("file = \"lead50.json\", force = \"body\", end = \"hold\"", held);
     // An edge of the band goes on as its curve does.
@@ -633,17 +611,16 @@ fn curves_of_one_model_go_on_alike() {
         let mut curve = whole.clone();
         curve["beyond"][key] = value;
         std::fs::write(here.join("odd.json"), curve.to_string()).unwrap();
-        let error = crumple_fails(here, 1, &["export", "odd.json", "-o", "odd.csv"]);
-        assert!(error.contains(said), "{error}");
+        says(&crumple_fails(here, 1, "export odd.json -o odd.csv"), said);
     }
     // Plots say from where on the runs' data have ended.
     let fast = ["predict", "lead.model", "--speed", "76km/h", "--extrapolate", "-o", "fast.json"];
     crumple_ok(here, &fast);
-    crumple_ok(here, &["plot", "fast.json", "-o", "fast.svg"]);
+    crumple_ok(here, "plot fast.json -o fast.svg");
     let beyond = "beyond the runs&#39; crush";
     let drawn = |name: &str| std::fs::read_to_string(here.join(name)).unwrap();
     assert!(drawn("fast.svg").contains(beyond));
-    crumple_ok(here, &["plot", "lead.model", "--speed", "50km/h", "-o", "usual.svg"]);
+    crumple_ok(here, "plot lead.model --speed 50km/h -o usual.svg");
     assert!(!drawn("usual.svg").contains(beyond));
 }
 
@@ -655,16 +632,16 @@ fn curves_of_a_scenario_are_bounded() {
     let vehicles = "vehicles = [ { name = \"A1\", mass = \"24t\" } ]";
     let fails = |curves: &str| {
         std::fs::write(here.join("many.toml"), scenario(curves, vehicles, "[wall]")).unwrap();
-        crumple_fails(here, 1, &["simulate", "many.toml"])
+        crumple_fails(here, 1, "simulate many.toml")
     };
     let many: Vec<String> =
         (0..1_001).map(|k| format!("nose{k} = {{ file = \"a.csv\" }}")).collect();
     let said = fails(&many.join("\n").replace("nose0 ", "nose "));
-    assert!(said.contains("[curves] has 1001 curves: expected at most 1000"), "{said}");
+    says(&said, "[curves] has 1001 curves: expected at most 1000");
     std::fs::File::create(here.join("a.csv")).unwrap().set_len(60 << 20).unwrap();
     let said = fails(&many[..40].join("\n").replace("nose0 ", "nose "));
     let expected = "the files of [curves] have 2400 MB together: expected at most 2048";
-    assert!(said.contains(expected), "{said}");
+    says(&said, expected);
 }
 
 /// A recorded curve that drives an impact of another speed or mass is warned of, as a model out of its
@@ -673,12 +650,12 @@ fn curves_of_a_scenario_are_bounded() {
 fn a_curve_of_another_impact_is_said() {
     let folder = demo_folder();
     let here = folder.path();
-    crumple_ok(here, &["export", "lead50.json", "--to", "csv", "-o", "lead50.csv"]);
+    crumple_ok(here, "export lead50.json --to csv -o lead50.csv");
     let warnings = |curve: &str, speed: &str, mass: &str| -> String {
         let vehicles = format!("vehicles = [ {{ name = \"A1\", mass = \"{mass}\" }} ]");
         let text = scenario(&format!("nose = {{ {curve} }}"), &vehicles, "[wall]");
         std::fs::write(here.join("other.toml"), text.replace("36km/h", speed)).unwrap();
-        json(&crumple_ok(here, &["simulate", "other.toml", "--json", "-q"]))["warnings"].to_string()
+        json(&crumple_ok(here, "simulate other.toml --json -q"))["warnings"].to_string()
     };
     let case = "database = \"curves.h5\", case = \"lead-car-wall/48kmh\"";
     for (curve, own) in [
@@ -691,8 +668,7 @@ fn a_curve_of_another_impact_is_said() {
         assert!(warnings(curve, "36km/h", "24t").contains(&said), "{curve}");
         assert!(!warnings(curve, own, "24t").contains("it is for "), "{curve}");
         if !curve.contains(".csv") {
-            let heavy = warnings(curve, own, "30t");
-            assert!(heavy.contains("it is for 24.00 t, but A1|wall moves 30.00 t"), "{heavy}");
+            says(&warnings(curve, own, "30t"), "it is for 24.00 t, but A1|wall moves 30.00 t");
         }
     }
 }

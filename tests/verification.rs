@@ -201,8 +201,8 @@ fn real_files(page: &mut String) {
             versions.insert(words.join(" ").replace(",", ""));
         }
     }
-    for format in solver::FORMATS {
-        kinds.entry(format.name.to_string()).or_default();
+    for format in solver::formats() {
+        kinds.entry(format.to_string()).or_default();
     }
     for (kind, (count, versions)) in kinds {
         let versions: Vec<String> = versions.into_iter().collect();

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::common::{
     build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, entries, fixture, python,
-    shared,
+    says, shared,
 };
 
 /// The run of each group that is studied.
@@ -42,7 +42,7 @@ impl Study {
     /// Builds, which must fail and leave nothing; returns the message.
     fn fails(&self) -> String {
         let before = entries(self.folder.path());
-        let error = crumple_fails(self.folder.path(), 1, &["build", "study.toml", "-o", "c.h5"]);
+        let error = crumple_fails(self.folder.path(), 1, "build study.toml -o c.h5");
         assert_eq!(entries(self.folder.path()), before, "nothing is left behind");
         error
     }
@@ -55,10 +55,7 @@ fn near_ids_come_first() {
     let path = folder.join("mlp6_113151_smp_d_1000nodes");
     let error =
         crumple_fails(Path::new("."), 1, &["histories", path.to_str().unwrap(), "--id", "1004"]);
-    assert!(
-        error.contains("nodout has no node 1004: the nearest of its ids are 1000, 999, 998"),
-        "{error}"
-    );
+    says(&error, "nodout has no node 1004: the nearest of its ids are 1000, 999, 998");
 }
 
 /// What inspect finds in a file that cannot be used is in build's message.
@@ -85,9 +82,9 @@ fn a_run_that_fails_says_what_is_wrong_with_its_files() {
     let inspected = crumple_ok(study.folder.path(), &["inspect", path.to_str().unwrap(), "--json"]);
     let inspected: serde_json::Value = serde_json::from_str(&inspected).unwrap();
     let first = inspected["files"][0]["problems"][0]["message"].as_str().unwrap();
-    assert!(error.contains("(damage in the run's files: rwforc: line "), "{error}");
-    assert!(error.contains(first), "{error}");
-    assert!(error.contains(" more, which crumple inspect lists)"), "{error}");
+    says(&error, "(damage in the run's files: rwforc: line ");
+    says(&error, first);
+    says(&error, " more, which crumple inspect lists)");
 }
 
 /// One bad run among good ones is reported; the others are built.
@@ -99,9 +96,8 @@ fn the_other_runs_go_on() {
     let absolute = text.replace("path  = \"", &format!("path  = \"{}/", source.display()));
     let absolute = absolute.replace("/36kmh\"", "/37kmh\"");
     fs::write(folder.path().join("study.toml"), absolute).unwrap();
-    let error = crumple_fails(folder.path(), 1, &["build", "study.toml", "-o", "c.h5"]);
-    assert!(error.contains("37kmh does not exist"), "{error}");
-    let list = crumple_ok(folder.path(), &["db", "ls", "c.h5", "--json"]);
+    says(&crumple_fails(folder.path(), 1, "build study.toml -o c.h5"), "37kmh does not exist");
+    let list = crumple_ok(folder.path(), "db ls c.h5 --json");
     let list: serde_json::Value = serde_json::from_str(&list).unwrap();
     assert_eq!(list["groups"]["lead-car-wall"].as_array().unwrap().len(), 6);
 }
@@ -113,12 +109,11 @@ fn a_cut_run_is_used_as_far_as_it_goes() {
     let path = study.folder.path().join("25kmh/nodout");
     let text = fs::read(&path).unwrap();
     fs::write(&path, &text[..text.len() - 250]).unwrap();
-    let output =
-        crumple_in(study.folder.path(), &["build", "study.toml", "-o", "c.h5", "--strict"]);
+    let output = crumple_in(study.folder.path(), "build study.toml -o c.h5 --strict");
     assert_eq!(output.status.code(), Some(3));
     let error = String::from_utf8(output.stderr).unwrap();
-    assert!(error.contains("state 400 at time 0.2992515"), "{error}");
-    assert!(error.contains("is not complete and is left out"), "{error}");
+    says(&error, "state 400 at time 0.2992515");
+    says(&error, "is not complete and is left out");
 }
 
 /// A run that ended before its largest crush is a lower bound: no reference, but a training curve.
@@ -154,7 +149,7 @@ fn a_second_writer_is_known_and_changes_nothing() {
     let study = fixture("fe/lead-car-pair/study.toml");
     let error =
         crumple_fails(folder.path(), 1, &["build", study.to_str().unwrap(), "-o", "curves.h5"]);
-    assert!(error.contains("is being written by another process: try again"), "{error}");
+    says(&error, "is being written by another process: try again");
     // A link to the database is the database.
     #[cfg(unix)]
     {
@@ -195,16 +190,13 @@ fn a_database_in_use_by_h5py_is_named() {
             [&["db", "ls", file][..], &["db", "check", file], &["build", study, "-o", file]]
         {
             let error = crumple_fails(here, 1, command);
-            assert!(
-                error.contains("another program has this HDF5 file open for writing"),
-                "{error}"
-            );
+            says(&error, "another program has this HDF5 file open for writing");
             assert!(error.contains("h5clear -s") && !error.contains("::"), "{error}");
         }
     }
     drop(writer.stdin.take());
     assert!(writer.wait().unwrap().success());
-    crumple_ok(here, &["db", "ls", "curves.h5"]);
+    crumple_ok(here, "db ls curves.h5");
 }
 
 /// Flipped bits in a database: an error or a result, never a panic.
@@ -242,8 +234,7 @@ fn foreign_files_of_h5py_are_refused() {
         with h5py.File(v + '.h5', 'w', libver=v) as f:\n        f['a'] = [1, 2, 3]\n        f.create_dataset('b', data=range(100), chunks=(10,), compression='gzip')\n";
     assert!(python().arg("-c").arg(script).current_dir(folder.path()).status().unwrap().success());
     for name in ["earliest.h5", "latest.h5"] {
-        let error = crumple_fails(folder.path(), 1, &["db", "ls", name]);
-        assert!(error.contains("is not a curve database"), "{error}");
+        says(&crumple_fails(folder.path(), 1, &["db", "ls", name]), "is not a curve database");
     }
 }
 
@@ -258,17 +249,17 @@ fn a_named_format_that_does_not_fit_is_an_error() {
             let error = crumple_fails(here, 1, &[command, nodout, "--format", format]);
             let expected =
                 format!("this is not a {format}: it looks like a nodout: read it as such");
-            assert!(error.contains(&expected), "{error}");
+            says(&error, &expected);
         }
     }
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("notes"), "a\nb\nc\n").unwrap();
-    let error = crumple_fails(folder.path(), 1, &["histories", "notes", "--format", "nodout"]);
-    assert!(error.contains("no solver output is recognised in it"), "{error}");
+    let error = crumple_fails(folder.path(), 1, "histories notes --format nodout");
+    says(&error, "no solver output is recognised in it");
     // A file that ends after its header tells no format: it is the one that was named.
     let header = " title\n                    ls-dyna smp d R14 R14.0 date 12/12/2022\n";
     fs::write(folder.path().join("out"), header).unwrap();
-    crumple_ok(folder.path(), &["inspect", "--strict", "out", "--format", "nodout"]);
+    crumple_ok(folder.path(), "inspect --strict out --format nodout");
 }
 
 /// A title may hold an escape sequence, which a terminal would obey.
@@ -297,7 +288,7 @@ fn text_of_files_is_printed_without_control_characters() {
         }
     }
     // JSON loses nothing.
-    let text = crumple_ok(folder.path(), &["inspect", "nodout", "--json"]);
+    let text = crumple_ok(folder.path(), "inspect nodout --json");
     let report: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(report["files"][0]["title"], "\x1b]0;owned\x07 \u{9b}31m title");
 }
@@ -318,11 +309,9 @@ fn histories_replace_no_other_hdf5_file() {
         assert_eq!(output.status.code(), Some(2));
         // As text on standard error, as JSON on standard output.
         let error = String::from_utf8([output.stdout, output.stderr].concat()).unwrap();
-        assert!(
-            error.contains(
-                "curves.h5 is an HDF5 file without histories, such as a curve database: name another file, or replace it with --force"
-            ),
-            "{error}"
+        says(
+            &error,
+            "curves.h5 is an HDF5 file without histories, such as a curve database: name another file, or replace it with --force",
         );
     }
     assert_eq!(fs::read(&database).unwrap(), before);
@@ -371,9 +360,6 @@ fn outputs_replace_no_other_kind_of_file() {
     let elsewhere = tempfile::tempdir().unwrap();
     fs::create_dir(elsewhere.path().join("crumple-demo")).unwrap();
     fs::write(elsewhere.path().join("crumple-demo/scenario.toml"), "# mine\n").unwrap();
-    let error = crumple_fails(elsewhere.path(), 2, &["demo"]);
-    assert!(
-        error.contains("scenario.toml exists and differs from what the demo writes"),
-        "{error}"
-    );
+    let error = crumple_fails(elsewhere.path(), 2, "demo");
+    says(&error, "scenario.toml exists and differs from what the demo writes");
 }

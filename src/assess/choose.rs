@@ -276,8 +276,8 @@ mod tests {
 
     #[test]
     fn the_default_is_the_simplest_that_follows_the_closing_speed() {
-        let (rate, linear): ((&str, &[f64]), (&str, &[f64])) =
-            (("rate", &[1.0]), ("linear", &[0.9]));
+        let rate: (&str, &[f64]) = ("rate", &[1.0]);
+        let linear: (&str, &[f64]) = ("linear", &[0.9]);
         assert_eq!(chosen(&[linear, rate]), "rate");
         assert_eq!(chosen(&[linear, rate, ("crush-law", &[1.1])]), "crush-law");
         // Cases that differ in more than speed leave forests alone.

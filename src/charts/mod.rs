@@ -19,14 +19,12 @@
 //! ```
 
 mod curves;
-mod histories;
 mod motion;
 
 use crate::unit::km_per_h;
 pub(crate) use curves::file_curve;
 pub use curves::{group_curves, left_out_at, prediction};
-pub use histories::{HistoryOptions, histories};
-pub use motion::{Motion, Quantity, train_speeds};
+pub use motion::{Motion, Quantity, histories, train_speeds};
 
 /// A speed in km/h with at most one digit after the point.
 fn speed(m_per_s: f64) -> String {

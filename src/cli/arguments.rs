@@ -1,10 +1,19 @@
-//! Arguments that several commands share.
+//! Arguments that several commands share, and the kind of an input file by its first bytes.
 
+use std::io::Read;
+use std::path::Path;
+
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+
+use super::Failure;
 use crate::curve::{ForceKind, Parameter};
+use crate::error::error;
+use crate::file;
+use crate::formats::read::{ColumnNames, ReadOptions};
+use crate::import::Settings;
 use crate::solver::{Selection, WantedId};
 use crate::surrogate::max_crush::MaxCrushRule;
-use crate::unit::{MASS, SPEED, UnitSystem};
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use crate::unit::{MASS, SPEED, STIFFNESS, SpeedKind, UnitSystem};
 
 /// A speed with its unit, in m/s.
 pub(super) fn speed(text: &str) -> Result<f64, String> {
@@ -75,3 +84,148 @@ pub(super) const FORCES: &[(&str, ForceKind, &str)] = &[
         "The force on the obstacle: for bodies whose crush zone is a separate mass",
     ),
 ];
+
+/// How a curve's file is read.
+#[derive(clap::Args)]
+pub(super) struct Reading {
+    /// Format of the file, if not recognised by its content (crumple db add --list)
+    #[arg(long)]
+    from: Option<String>,
+    /// Number or name of the curve in a file that holds several
+    #[arg(long)]
+    curve: Option<String>,
+    /// Deflection column of a table, by its header or its number from 1
+    #[arg(long, value_name = "COLUMN")]
+    deflection_column: Option<String>,
+    /// Force column
+    #[arg(long, value_name = "COLUMN")]
+    force_column: Option<String>,
+    /// Time column; none for force over deflection without times (quasi-static tests)
+    #[arg(long, value_name = "COLUMN")]
+    time_column: Option<String>,
+}
+
+/// How a file is read, and the impact that its curve belongs to.
+#[derive(clap::Args)]
+pub(super) struct CurveFile {
+    /// What the speed is measured against [default: as the file states, else the group's]
+    #[arg(long, value_parser = one_of(KINDS))]
+    kind: Option<SpeedKind>,
+    /// Mass of the other body of a pair [default: as the file states, else that of the body]
+    #[arg(long, value_parser = mass, allow_hyphen_values = true)]
+    other_mass: Option<f64>,
+    /// Unloading stiffness from the maximum deflection, such as 80MN/m [default: the file's]
+    #[arg(long, value_parser = stiffness, allow_hyphen_values = true)]
+    unloading: Option<f64>,
+    #[command(flatten)]
+    reading: Reading,
+    /// Accept curves whose energy is impossible for the speed and mass
+    #[arg(long)]
+    accept_energy: bool,
+}
+
+const KINDS: &[(&str, SpeedKind, &str)] = &[
+    ("wall", SpeedKind::Wall, "Of one body against a rigid wall"),
+    ("closing", SpeedKind::Closing, "Of two bodies against each other"),
+];
+
+fn stiffness(text: &str) -> Result<f64, String> {
+    STIFFNESS.parse_positive(text).map_err(|e| e.to_string())
+}
+
+impl Reading {
+    /// Whether any of the options is given.
+    pub(super) fn is_asked(&self) -> bool {
+        self.options() != ReadOptions::default()
+    }
+
+    /// The given options, and defaults for the rest.
+    pub(super) fn options(&self) -> ReadOptions {
+        ReadOptions {
+            format: self.from.clone(),
+            curve: self.curve.clone(),
+            columns: ColumnNames {
+                deflection: self.deflection_column.clone(),
+                force: self.force_column.clone(),
+                time: self.time_column.clone(),
+            },
+            ..ReadOptions::default()
+        }
+    }
+}
+
+impl CurveFile {
+    /// Whether any of the options is given.
+    pub(super) fn is_asked(&self) -> bool {
+        self.settings() != Settings::default()
+    }
+
+    /// The given options, and defaults for the rest.
+    pub(super) fn settings(&self) -> Settings {
+        Settings {
+            kind: self.kind,
+            other_mass_kg: self.other_mass,
+            unloading_stiffness_n_per_m: self.unloading,
+            read: self.reading.options(),
+            accept_energy: self.accept_energy,
+            ..Settings::default()
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum FileKind {
+    /// Curve database.
+    Database,
+    /// Model.
+    Model,
+    /// Predicted curve.
+    Curve,
+    /// Scenario.
+    Scenario,
+    /// Result of a multi-body run.
+    Result,
+    /// Anything else: what a solver has written, if it is known at all.
+    Solver,
+}
+
+/// Bytes in which a file says what it is.
+const HEAD: u64 = 4096;
+/// With these every HDF5 file begins.
+const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
+
+impl FileKind {
+    pub(super) fn of(path: &Path) -> Result<Self, Failure> {
+        let mut head = Vec::new();
+        file::open(path)
+            .and_then(|f| f.take(HEAD).read_to_end(&mut head))
+            .map_err(|e| error!(CurveFile, "{path}: {e}", path = path.display()).caused_by(e))?;
+        if head.starts_with(HDF5) {
+            return Ok(Self::Database);
+        }
+        let text = String::from_utf8_lossy(&head);
+        let text = text.trim_start_matches('\u{feff}');
+        let is_toml = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+        Ok(match () {
+            () if text.trim_start().starts_with('{') && text.contains("\"crumple model\"") => {
+                Self::Model
+            }
+            () if text.trim_start().starts_with('{') => Self::Curve,
+            () if is_toml => Self::Scenario,
+            () if text.starts_with("time_s,") => Self::Result,
+            () => Self::Solver,
+        })
+    }
+
+    /// As a message calls it.
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Database => "a database",
+            Self::Model => "a model",
+            Self::Curve => "a predicted curve",
+            Self::Scenario => "a scenario",
+            Self::Result => "a result",
+            Self::Solver => "read as a solver file",
+        }
+    }
+}

@@ -12,8 +12,8 @@ use crate::plural::counted;
 use crate::table::Table;
 
 use super::db::{case_columns, case_row};
-use super::progress::Bar;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, output, usage};
+use super::output::{self, Bar};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, usage};
 
 /// Read all runs of a study, extract their curves and write the database
 #[derive(clap::Args)]

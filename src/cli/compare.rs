@@ -16,8 +16,8 @@ use crate::table::Table;
 use crate::unit::{Shown, km_per_h};
 
 use super::arguments::{self, one_of};
-use super::progress::Bar;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, output, usage};
+use super::output::{self, Bar};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, usage};
 
 /// Compare FE with FDRM, NSDM, DDTCM and the best model, all in the same multi-body model
 #[derive(clap::Args)]

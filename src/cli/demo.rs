@@ -11,19 +11,18 @@ use crate::build::{self, BuiltRun, RunOutcome};
 use crate::curve::Case;
 use crate::database::Database;
 use crate::file::{self, not_written, write_at, write_whole};
-use crate::formats;
 use crate::multibody::Run;
 use crate::report::{MethodSpeeds, ReportSettings, report};
-use crate::scenario;
 use crate::surrogate::leave_one_out::Validation;
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
 use crate::table::Table;
 use crate::unit::{M_PER_S_PER_KM_PER_H, Shown, km_per_h};
+use crate::{formats, scenario};
 use include_dir::{Dir, include_dir};
 
-use super::progress::Bar;
+use super::output::{self, Bar};
 use super::validate::print_validation;
-use super::{CommandResult, Failure, GlobalOptions, output, usage};
+use super::{CommandResult, Failure, GlobalOptions, usage};
 
 /// Run the whole workflow on bundled FE runs: database, models, prediction, multi-body run, exports
 #[derive(clap::Args)]

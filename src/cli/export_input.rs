@@ -5,14 +5,13 @@ use std::path::{Path, PathBuf};
 use crate::curve::{Case, Quality};
 use crate::database::Database;
 use crate::dataset::is_same_speed;
-use crate::formats::read::is_folder_of_tests;
-use crate::formats::read::json;
+use crate::formats::read::{is_folder_of_tests, json};
 use crate::import::{self, Item, Settings};
 use crate::surrogate::{Model, PredictedCurve, Query, predict};
 use crate::unit::km_per_h;
 
+use super::arguments::FileKind;
 use super::export::{Args, Which};
-use super::file_kind::FileKind;
 use super::{Failure, usage};
 
 /// The input of an export.

@@ -4,13 +4,13 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crate::file::write_whole;
-use crate::history_hdf5::{Beside, convert, encode};
+use crate::history_hdf5::{convert, encode};
 use crate::solver::{self, Access, Selection, SolverFile, WantedId, decks};
 use crate::unit::UnitSystem;
 
 use super::arguments::{selection, units};
-use super::progress::Bar;
-use super::{CommandResult, Failure, GlobalOptions, is_stdout, keep_input, output, usage};
+use super::output::{self, Bar};
+use super::{CommandResult, Failure, GlobalOptions, is_stdout, keep_input, usage};
 
 /// Write the histories of a solver file as CSV, JSON or HDF5, in the solver's units
 #[derive(clap::Args)]
@@ -57,13 +57,13 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let output = args.output.as_deref().filter(|path| !is_stdout(path));
     let is_hdf5 = is_hdf5(args, output)?;
     let deck = is_hdf5.then(|| decks::deck_next_to(&args.file)).flatten().map(|(_, deck)| deck);
-    let beside = Beside { units: args.units, deck: deck.as_ref() };
+    let (units, deck) = (args.units, deck.as_ref());
     // JSON on standard output next to a file needs the values themselves.
     let straight = output.filter(|_| is_hdf5 && !options.json);
     let format = args.format.as_deref();
     let bar = Bar::new(options, "reading");
     let file = match straight {
-        Some(path) => convert(&args.file, format, &selection, &beside, path)?,
+        Some(path) => convert(&args.file, format, &selection, units, deck, path)?,
         None => solver::read(&args.file, format, &selection)?,
     };
     drop(bar);
@@ -76,7 +76,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         Some(path) => {
             let _bar = Bar::new(options, "writing");
             if is_hdf5 {
-                write_whole(path, &encode(&file, &beside, Some(&args.file))?)?;
+                write_whole(path, &encode(&file, units, deck, Some(&args.file))?)?;
             } else {
                 let mut csv = Vec::new();
                 write_csv(&mut csv, &file)?;

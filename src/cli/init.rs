@@ -10,9 +10,8 @@ use crate::study::StudyKind;
 use crate::table::Table;
 use crate::unit::{Shown, UnitSystem, km_per_h};
 
-use super::arguments;
-use super::progress::Bar;
-use super::{CommandResult, GlobalOptions, Outcome, is_stdout, output};
+use super::output::{self, Bar};
+use super::{CommandResult, GlobalOptions, Outcome, arguments, is_stdout};
 
 /// Examine run folders and write a commented study; or write a scenario for models
 #[derive(clap::Args)]

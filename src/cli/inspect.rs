@@ -1,19 +1,18 @@
-//! `crumple inspect`: what a solver file holds.
+//! `crumple inspect`: what a solver file, a deck or a file of crumple holds.
 
+use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crate::error::Error;
-use crate::solver::decks;
-use crate::solver::lsdyna::deck::Deck;
-use crate::solver::{self, Access, Selection, SolverFile};
-use crate::table::Table;
 use serde::Serialize;
 
-use super::deck_report::{self, SHOWN, list, titled};
 use super::{CommandResult, Failure, GlobalOptions, Outcome, failed_at, output};
-use crate::solver::decks::Search;
+use crate::error::Error;
+use crate::solver::decks::{self, Search};
+use crate::solver::lsdyna::deck::{Deck, DeckEntity};
 use crate::solver::runs::{output_files, run_folders};
+use crate::solver::{self, Access, Selection, SolverFile, Value};
+use crate::table::Table;
 
 /// Show what solver files hold: format, version, entities, components, states, damage
 #[derive(clap::Args)]
@@ -173,7 +172,7 @@ fn document(section: &Section) -> impl Serialize {
         components: file.components.iter().map(|c| &**c).collect::<Vec<_>>(),
         problems: &file.problems,
         notes if_any: &file.notes,
-        deck if_any: deck_report::document(section.titles_from.as_ref(), section.deck.as_ref()),
+        deck if_any: deck_document(section.titles_from.as_ref(), section.deck.as_ref()),
     }
 }
 
@@ -212,7 +211,7 @@ fn print(out: &mut dyn Write, section: &Section) -> io::Result<()> {
         writeln!(out, "  titles      {count} taken from the deck {}", path.display())?;
     }
     if let Some(deck) = &section.deck {
-        deck_report::print(out, deck)?;
+        print_deck(out, deck)?;
     }
     match section.times() {
         _ if section.deck.is_some() => {}
@@ -269,4 +268,92 @@ fn asked(paths: &[PathBuf]) -> Result<Vec<Asked>, Failure> {
         }
     }
     Ok(asked)
+}
+
+/// Where titles were taken from, and what a deck says of its run, in its units.
+pub(super) fn deck_document(
+    titles_from: Option<&(PathBuf, usize)>,
+    deck: Option<&Deck>,
+) -> impl Serialize {
+    let parameters = deck.map(|deck| {
+        let all = deck.parameters.iter();
+        all.map(|(name, value)| document! { name: name, value: value }).collect::<Vec<_>>()
+    });
+    document! {
+        titles_from if_any: titles_from.map(|(path, _)| path.display().to_string()),
+        titles if_any: titles_from.map(|(_, count)| count),
+        units if_any: deck.and_then(|deck| Some(deck.units.as_ref()?.text.trim())),
+        impact_speed if_any: deck.and_then(|deck| Some(deck.impact_speed()?.0)),
+        outputs if_any: deck.map(|deck| &deck.outputs),
+        history_nodes if_any: deck.map(|deck| &deck.history_nodes),
+        contacts if_any: deck.map(|deck| &deck.contacts),
+        rigid_walls if_any: deck.map(|deck| &deck.rigid_walls),
+        parts if_any: deck.map(|deck| &deck.parts),
+        parameters if_any: parameters,
+        includes if_any: deck.map(|deck| &deck.includes),
+    }
+}
+
+pub(super) fn print_deck(out: &mut dyn Write, deck: &Deck) -> io::Result<()> {
+    if let Some(units) = &deck.units {
+        writeln!(out, "  units       {}", units.text.trim())?;
+    }
+    if let Some((speed, _)) = deck.impact_speed() {
+        writeln!(out, "  speed       {speed} (initial velocity, in the deck's units)")?;
+    }
+    let outputs: Vec<String> = deck
+        .outputs
+        .iter()
+        .map(|o| o.interval.map_or(o.file.to_string(), |dt| format!("{} each {dt}", o.file)))
+        .collect();
+    if !outputs.is_empty() {
+        writeln!(out, "  outputs     {}", outputs.join(", "))?;
+    }
+    list(out, "nodes", deck.history_nodes.iter().map(titled_entity))?;
+    for (what, interfaces) in [("contacts", &deck.contacts), ("walls", &deck.rigid_walls)] {
+        list(out, what, interfaces.iter().map(titled_entity))?;
+    }
+    list(out, "parts", deck.parts.iter().map(titled_entity))?;
+    let parameters = deck.parameters.iter().map(|(name, value)| match value {
+        Value::Real(value) => format!("{name} = {value:?}"),
+        Value::Integer(value) => format!("{name} = {value}"),
+        Value::Text(value) => format!("{name} = \"{value}\""),
+        Value::Unknown => format!("{name} = (not known)"),
+    });
+    list(out, "parameters", parameters)?;
+    for include in &deck.includes {
+        let missing = if include.found { "" } else { "  (not found)" };
+        writeln!(out, "  include     {}{missing}", include.name)?;
+    }
+    Ok(())
+}
+
+fn titled_entity(of: &DeckEntity) -> String {
+    titled(of.id.map_or("(no id)".into(), |id| id.to_string()), &of.title)
+}
+
+pub(super) fn titled(id: impl Display, title: &Option<String>) -> String {
+    format!("{id}{}", title.as_ref().map_or(String::new(), |title| format!("  {title}")))
+}
+
+/// Entries printed in full; of longer lists the rest is counted.
+pub(super) const SHOWN: usize = 20;
+
+/// Entries below their number.
+pub(super) fn list(
+    out: &mut dyn Write,
+    what: &str,
+    entries: impl ExactSizeIterator<Item = String>,
+) -> io::Result<()> {
+    let count = entries.len();
+    if count > 0 {
+        writeln!(out, "  {what:<11} {count}")?;
+    }
+    for entry in entries.take(SHOWN) {
+        writeln!(out, "    {entry}")?;
+    }
+    match count.checked_sub(SHOWN) {
+        Some(more @ 1..) => writeln!(out, "    … and {more} more (--json lists all)"),
+        _ => Ok(()),
+    }
 }

@@ -8,23 +8,17 @@ mod output;
 mod arguments;
 mod build;
 mod compare;
-mod curve_file;
 mod db;
-mod deck_report;
 mod demo;
 mod export;
 mod export_input;
-mod export_output;
-mod file_kind;
 mod histories;
 mod init;
 mod inspect;
 mod plot;
 mod predict;
-mod progress;
 mod rate;
 mod report;
-mod run_channels;
 mod shell;
 mod simulate;
 mod sweep;
@@ -40,13 +34,12 @@ use std::process::ExitCode;
 #[cfg(unix)]
 use std::sync::Arc;
 
-use crate::database;
 use crate::error::ErrorCode;
 use crate::failure::{self, DONE, DONE_WITH_WARNINGS, ErrorDocument, FAILED, USAGE};
 use crate::file::{self, is_same};
-use crate::solver;
+use crate::{database, solver};
+use arguments::FileKind;
 use clap::{FromArgMatches, Parser, Subcommand};
-use file_kind::FileKind;
 use serde::Serialize;
 
 #[derive(Parser)]
@@ -63,7 +56,7 @@ const GLOBAL: &str = "Global options";
 
 /// Options that every command takes.
 #[derive(clap::Args, Clone, Copy)]
-pub struct GlobalOptions {
+pub(crate) struct GlobalOptions {
     /// Print one JSON document on standard output instead of text
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub json: bool,
@@ -108,7 +101,7 @@ enum Command {
 
 /// How a command ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Outcome {
+pub(crate) enum Outcome {
     Clean,
     /// Done, with damage in the input or warnings about the result.
     Warned,
@@ -123,9 +116,9 @@ impl Outcome {
 }
 
 /// Why a command did not do its work.
-pub type Failure = Box<dyn Error>;
+pub(crate) type Failure = Box<dyn Error>;
 
-pub type CommandResult = Result<Outcome, Failure>;
+pub(crate) type CommandResult = Result<Outcome, Failure>;
 
 /// Refuses to write over what is read.
 fn keep_input(input: &Path, output: &Path) -> Result<(), Failure> {
@@ -229,7 +222,7 @@ impl GlobalOptions {
     }
 
     /// A warning on standard error.
-    pub fn warn(self, text: &str) {
+    pub(crate) fn warn(self, text: &str) {
         if !self.quiet {
             output::eprint_line(&format!("warning: {text}"));
         }
@@ -293,6 +286,19 @@ fn arguments() -> Result<Cli, ExitCode> {
         }
         ExitCode::from(if error.use_stderr() { USAGE } else { DONE })
     })
+}
+
+/// The JSON schemas of the files and documents, by their names in `schemas/`.
+pub fn schemas() -> [(&'static str, schemars::Schema); 7] {
+    [
+        ("study.schema.json", schemars::schema_for!(crate::study::Manifest)),
+        ("scenario.schema.json", schemars::schema_for!(crate::scenario::Scenario)),
+        ("plan.schema.json", schemars::schema_for!(crate::plan::PlanFile)),
+        ("predicted_curve.schema.json", schemars::schema_for!(crate::surrogate::PredictedCurve)),
+        ("validation.schema.json", schemars::schema_for!(crate::assess::Report)),
+        ("rating.schema.json", schemars::schema_for!(crate::rating::Rating)),
+        ("error.schema.json", schemars::schema_for!(ErrorDocument)),
+    ]
 }
 
 /// The document of an error; without standard output its message.

@@ -1,18 +1,18 @@
 //! Standard output and standard error: text, tables and JSON documents; a closed pipe is not
 //! an error. Everything printed goes through here, where control characters are taken out:
-//! a title in a solver file may hold an escape sequence, which a terminal would obey.
+//! a title in a solver file may hold an escape sequence, which a terminal would obey. Progress is shown on a terminal only.
 
 use std::borrow::Cow;
 use std::error::Error;
 use std::io::{self, BufWriter, IsTerminal, Write};
+use std::time::Duration;
 
+use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use crate::error::Place;
-
-use crate::table::{Cell, Table};
-
 use super::{CommandResult, Failure, GlobalOptions, Outcome};
+use crate::error::Place;
+use crate::table::{Cell, Table};
 use terminal_size::{Width, terminal_size_of};
 
 /// An object for JSON with these fields in this order, made where it is printed; a field marked
@@ -353,6 +353,59 @@ fn size(stream: &impl std::os::fd::AsFd) -> Option<usize> {
 #[cfg(windows)]
 fn size(stream: &impl std::os::windows::io::AsHandle) -> Option<usize> {
     terminal_size_of(stream).map(|(Width(width), _)| width.into()).filter(|width| *width > 0)
+}
+
+/// A spinner that names the step just done, or a bar over a known number of items; gone when it is dropped.
+pub(super) struct Bar(Option<ProgressBar>);
+
+impl Bar {
+    pub(super) fn new(options: GlobalOptions, what: &'static str) -> Self {
+        Self::visible(options, || {
+            let bar = ProgressBar::new_spinner().with_message(what);
+            bar.enable_steady_tick(Duration::from_millis(100));
+            bar
+        })
+    }
+
+    /// With the time that is left.
+    pub(super) fn over(options: GlobalOptions, items: u64) -> Self {
+        Self::visible(options, || {
+            let bar = ProgressBar::new(items);
+            let template = "{wide_bar} {human_pos}/{human_len}, {per_sec}, {eta} left";
+            match ProgressStyle::with_template(template) {
+                Ok(style) => bar.with_style(style),
+                Err(_) => bar,
+            }
+        })
+    }
+
+    fn visible(options: GlobalOptions, make: impl FnOnce() -> ProgressBar) -> Self {
+        Self((!options.quiet && std::io::stderr().is_terminal()).then(make))
+    }
+
+    pub(super) fn step(&self, done: &str) {
+        if let Some(bar) = &self.0 {
+            bar.set_message(plain(done).into_owned());
+        }
+    }
+
+    /// Sets how many items are done; what was done before the first call says nothing of the time left.
+    pub(super) fn set(&self, done: u64, is_first: bool) {
+        if let Some(bar) = &self.0 {
+            bar.set_position(done);
+            if is_first {
+                bar.reset_eta();
+            }
+        }
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.0 {
+            bar.finish_and_clear();
+        }
+    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use crate::assess::ComparisonSettings;
 use crate::assess::choose::Purpose;
 use crate::assess::train::compare_train;
 use crate::assess::validate::Choice;
-use crate::charts::{self, HistoryOptions, Motion, Quantity};
+use crate::charts::{self, Motion, Quantity};
 use crate::curve::ForceKind;
 use crate::database::Database;
 use crate::file::{self, write_all_whole};
@@ -18,13 +18,11 @@ use crate::solver::{self, WantedId};
 use crate::surrogate::{Model, ModelCase, PredictedCurve, Query, predict};
 use crate::unit::{UnitSystem, km_per_h};
 
-use super::arguments::{self, one_of, selection, units};
-use super::curve_file::Reading;
-use super::file_kind::FileKind;
-use super::progress::Bar;
+use super::arguments::{self, FileKind, Reading, one_of, selection, units};
+use super::output::{self, Bar};
 use super::{
-    CommandResult, Failure, GlobalOptions, Outcome, failed_at, is_stdout, keep_input, output,
-    usage, usage_error,
+    CommandResult, Failure, GlobalOptions, Outcome, failed_at, is_stdout, keep_input, usage,
+    usage_error,
 };
 
 /// Draw curves, predictions, runs and histories as SVG or PNG
@@ -325,6 +323,6 @@ fn of_solver_file(args: &Args, options: GlobalOptions) -> Result<Chart, Failure>
         None => args.file.display().to_string(),
     };
     let histories: Vec<_> = file.histories.iter().collect();
-    let options = HistoryOptions { units: args.units, filter_class: args.cfc };
-    charts::histories(&title, &histories, options).map_err(|e| failed_at(&args.file, e))
+    charts::histories(&title, &histories, args.units, args.cfc)
+        .map_err(|e| failed_at(&args.file, e))
 }

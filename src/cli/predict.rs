@@ -11,8 +11,7 @@ use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{Model, PredictedCurve, Query, predict};
 use crate::unit::{Shown, km_per_h};
 
-use super::arguments::{self, MAX_CRUSH_RULES, one_of};
-use super::file_kind::FileKind;
+use super::arguments::{self, FileKind, MAX_CRUSH_RULES, one_of};
 use super::{CommandResult, GlobalOptions, is_stdout, keep_input, output, usage};
 
 /// Predict the force-deflection curve at a speed, with energy audit and warnings

@@ -7,15 +7,13 @@ use super::arguments::one_of;
 use super::histories::check_section;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, failed, output, usage, usage_error};
 use crate::error::Error;
-use crate::file;
-use crate::formats;
-use crate::rating::deceleration::Deceleration;
-use crate::rating::differences::MagnitudePhase;
+use crate::rating::differences::{Deceleration, MagnitudePhase};
 use crate::rating::iso18571::Iso18571;
 use crate::rating::{self, Quantity, Rating, RatingSettings, Signal};
 use crate::solver::{self, Selection, WantedId};
 use crate::table::Table;
 use crate::unit::TIME;
+use crate::{file, formats};
 
 /// Maximum number of bytes of a table that is rated: some million rows.
 const MAX_TABLE_BYTES: u64 = 256 << 20;

@@ -6,10 +6,9 @@ use crate::database::Database;
 use crate::file::write_whole;
 use crate::report::{MethodSpeeds, ReportSettings, report};
 
-use super::arguments::{self, one_of};
-use super::file_kind::FileKind;
-use super::progress::Bar;
-use super::{CommandResult, GlobalOptions, Outcome, keep_input, keep_inputs, output};
+use super::arguments::{self, FileKind, one_of};
+use super::output::{self, Bar};
+use super::{CommandResult, GlobalOptions, Outcome, keep_input, keep_inputs};
 
 /// Write one self-contained HTML page: curves, validation, predictions, methods, train results
 #[derive(clap::Args)]

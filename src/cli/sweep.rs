@@ -12,10 +12,10 @@ use std::time::Instant;
 use crate::sweep::{self, ColumnStatistics, Report, Shard, Sweep, WriteOptions};
 use crate::table::Table;
 
-use super::progress::Bar;
+use super::output::{self, Bar};
 use super::{
     CommandResult, Failure, GlobalOptions, Outcome, failed, is_stdout, keep_input, keep_inputs,
-    output, usage,
+    usage,
 };
 
 /// Run a scenario many times with varied speeds, masses, gaps and curves; a row of results each

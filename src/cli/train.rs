@@ -14,9 +14,8 @@ use crate::surrogate::{MODELS, ModelKind, WarningCode};
 use crate::unit::{Shown, SpeedKind, km_per_h};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
-use super::arguments::one_of;
-use super::file_kind::FileKind;
-use super::progress::Bar;
+use super::arguments::{FileKind, one_of};
+use super::output::Bar;
 use super::validate::print_validation;
 use super::{CommandResult, Failure, GlobalOptions, keep_input, usage};
 

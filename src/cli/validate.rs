@@ -20,8 +20,8 @@ use crate::surrogate::max_crush::MaxCrushRule;
 use crate::table::Table;
 use crate::unit::km_per_h;
 
-use super::progress::Bar;
-use super::{CommandResult, GlobalOptions, Outcome, output, usage};
+use super::output::{self, Bar};
+use super::{CommandResult, GlobalOptions, Outcome, usage};
 
 /// Leave out every speed in turn, predict it with every model, and compare with FE
 #[derive(clap::Args)]

@@ -4,8 +4,7 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use super::Selection;
-use super::labels::merge_labels;
-use super::names::check;
+use super::labels::{check, merge_labels};
 use crate::curve::Case;
 use crate::database::{self, CasePath, Database};
 use crate::error::{Error, error};

@@ -5,16 +5,12 @@
 //! file in the old one's place: a killed program leaves the one or the other, and a second writer
 //! gets an error.
 
-mod compare;
 mod join;
 mod labels;
-mod names;
 mod selection;
 mod tables;
 
-pub(crate) use compare::{Difference, compare};
 pub(crate) use join::{Joined, OnConflict, copy, merge};
-pub(crate) use labels::{Labels, label};
-pub(crate) use names::{remove, rename_case, rename_group};
+pub(crate) use labels::{Labels, label, remove, rename_case, rename_group};
 pub(crate) use selection::{Selection, SpeedRange};
-pub(crate) use tables::write_tables;
+pub(crate) use tables::{Difference, compare, write_tables};

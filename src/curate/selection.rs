@@ -136,7 +136,6 @@ impl Selection {
     }
 }
 
-/// The case of this name, or of this group and name.
 fn one_named<'a>(path: &Path, name: &str, cases: &[&'a Case]) -> Result<&'a Case, Error> {
     let is_named = |case: &&&Case| match name.split_once('/') {
         Some((group, name)) => case.id.group == group && case.id.name == name,

@@ -73,7 +73,7 @@ pub(crate) struct EnergyBalance {
     "{found}: such an impact is impossible; {}. Correct the manifest, or take the run as it is with accept_energy = true",
     cause.of_run()
 )]
-pub struct ImpossibleRun {
+pub(crate) struct ImpossibleRun {
     found: String,
     cause: Cause,
 }

@@ -25,11 +25,7 @@ impl Envelope {
             return Err(error!(Other, "{deflections} deflections but {forces} forces"));
         }
         if deflections < 2 {
-            return Err(error!(
-                Other,
-                "an envelope needs at least 2 points, found {points}",
-                points = deflections
-            ));
+            return Err(error!(Other, "an envelope needs at least 2 points, found {deflections}"));
         }
         for (i, (&deflection_m, &force_n)) in deflection_m.iter().zip(&force_n).enumerate() {
             if !(deflection_m.is_finite() && force_n.is_finite()) {
@@ -132,7 +128,7 @@ impl Envelope {
 
     /// The deflection at which the envelope has absorbed `energy_j`; beyond its end the
     /// last force holds. `None` if it never does.
-    pub fn deflection_for_work(&self, energy_j: f64) -> Option<f64> {
+    pub(crate) fn deflection_for_work(&self, energy_j: f64) -> Option<f64> {
         let end = self.work_j.len() - 1;
         match self.work_j.iter().position(|&w| w >= energy_j) {
             Some(0) => Some(0.0),

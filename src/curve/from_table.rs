@@ -66,11 +66,7 @@ pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves,
         ));
     }
     if deflection < 2 {
-        return Err(error!(
-            Other,
-            "a curve needs at least 2 states, found {states}",
-            states = deflection
-        ));
+        return Err(error!(Other, "a curve needs at least 2 states, found {deflection}"));
     }
     match table.time_s {
         Some(time_s) => recorded(table, time_s, impact),

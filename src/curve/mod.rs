@@ -15,7 +15,6 @@ pub(crate) mod recipe;
 pub(crate) mod replicates;
 pub(crate) mod retrace;
 pub(crate) mod stopped_mass;
-pub(crate) mod tail;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -27,15 +26,13 @@ use crate::unit::{Speed, UnitSystem};
 pub use body::BodyMotion;
 pub use energy::audit;
 pub use envelope::Envelope;
-pub use extract::input::{DeckSpeed, StatedContact};
-pub use extract::{ExtractError, Extracted, Measured, MeasuredForce, Setup, Stated, extract};
-pub use force_curve::{CurveUnloading, ForceCurve};
+pub use extract::{Extracted, Measured, MeasuredForce, Setup, Stated, StatedContact, extract};
+pub use force_curve::{CurveUnloading, ForceCurve, Tail};
 pub use from_table::from_table;
 pub use loading::{Loading, unloading_stiffness};
 pub use recipe::{Filter, ForceSource, Recipe, RecordedMotion, Sampling};
 pub use retrace::{Impact, Table};
 pub use stopped_mass::StoppedMass;
-pub use tail::Tail;
 
 /// A force–deflection history: what one run measured at an interface.
 ///
@@ -61,11 +58,7 @@ impl Curve {
             ));
         }
         if time < 2 {
-            return Err(error!(
-                Other,
-                "a curve needs at least 2 states, found {states}",
-                states = time
-            ));
+            return Err(error!(Other, "a curve needs at least 2 states, found {time}"));
         }
         let columns = [("time", &time_s), ("deflection", &deflection_m), ("force", &force_n)];
         for (column, values) in columns {
@@ -126,7 +119,6 @@ impl ForceKind {
         }
     }
 
-    /// The kind of that name.
     pub(crate) fn parse(name: &str) -> Option<Self> {
         [Self::Contact, Self::Body].into_iter().find(|kind| kind.name() == name)
     }

@@ -105,7 +105,6 @@ impl StoppedMass {
         (self.deflection_m[i], all_kg)
     }
 
-    /// Stopped mass in kg at a deflection in m.
     pub(crate) fn at(&self, deflection_m: f64) -> f64 {
         let (d, m) = (&self.deflection_m, &self.stopped_kg);
         if deflection_m < d[d.len() - 1] {

@@ -256,7 +256,6 @@ pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, Error> {
     file.finish().map_err(not_encoded)
 }
 
-/// A database file that was opened.
 pub(crate) struct Opened<'a> {
     pub path: &'a Path,
     pub file: File,

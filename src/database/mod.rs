@@ -1,6 +1,6 @@
 //! Curve database: cases in HDF5, by group and impact speed.
 //!
-//! The layout is described in `schemas/curve_database.md`; [`hdf5`](crate::hdf5) reads and
+//! The layout is described in `schemas/curve_database.md`; `hdf5` reads and
 //! writes its parts. A file is always written as a whole and renamed into place,
 //! so an interrupted command leaves the old content readable.
 //!
@@ -24,10 +24,8 @@
 
 pub(crate) mod check;
 mod edit;
-mod foreign;
 mod group;
 mod layout;
-pub(crate) mod names;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt;
@@ -53,10 +51,8 @@ pub struct Database {
 
 /// A case by its names; no name has a `/`.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct CasePath {
-    /// Its group.
+pub(crate) struct CasePath {
     pub group: String,
-    /// Its name in the group.
     pub name: String,
 }
 
@@ -99,7 +95,7 @@ impl Database {
     /// # Errors
     /// As for [`Database::read`] and [`Database::group_or_only`], and if the
     /// group has no such case.
-    pub fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, Error> {
+    pub(crate) fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, Error> {
         let opened = layout::open(path)?;
         if let Some((group, found)) = opened.find(group, case) {
             let FoundCase { case, hashes, .. } = opened.case(&group, case, &found)?;
@@ -122,7 +118,7 @@ impl Database {
     /// something of others would be lost; the old file is unchanged.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         if is_file(path)? {
-            let foreign = foreign::found(&layout::open(path)?)?;
+            let foreign = edit::found(&layout::open(path)?)?;
             if !foreign.is_empty() {
                 return edit::write_keeping(self, path, &foreign);
             }
@@ -140,7 +136,7 @@ impl Database {
     /// # Errors
     /// It lists the groups there are;
     /// `path` is for the message.
-    pub fn group_or_only<'a>(
+    pub(crate) fn group_or_only<'a>(
         &'a self,
         path: &Path,
         asked: Option<&str>,
@@ -322,7 +318,7 @@ impl Database {
 
     /// The mass that the crush zone of a group stops at each deflection, as its cases are now; `None` if
     /// there is no such group, or it does not follow from them.
-    pub fn stopped_mass(&self, group: &str) -> Option<StoppedMass> {
+    pub(crate) fn stopped_mass(&self, group: &str) -> Option<StoppedMass> {
         group::stopped_mass(group, self.cases(group))
     }
 
@@ -354,8 +350,8 @@ pub(crate) fn record_hash(case: &Case) -> Result<String, Error> {
 
 /// What other programs have put into the file at `path`, as a message lists it; `None` if nothing.
 pub(crate) fn foreign_items(path: &Path) -> Result<Option<String>, Error> {
-    let items = foreign::found(&layout::open(path)?)?;
-    Ok((!items.is_empty()).then(|| foreign::listed(&items)))
+    let items = edit::found(&layout::open(path)?)?;
+    Ok((!items.is_empty()).then(|| edit::listed(&items)))
 }
 
 /// Whether the file at `path` is a curve database.
@@ -397,4 +393,25 @@ fn damaged(path: &Path, place: &str, detail: impl fmt::Display) -> Error {
 /// Turns a curve that breaks its invariant into a database error.
 fn damaged_curve(path: &Path, place: &str, error: Error) -> Error {
     damaged(path, place, error)
+}
+
+/// Longest name of a case or group, in bytes.
+const MAX_NAME: usize = 200;
+
+/// Why a text is not a name of a group or case, as a message says it of "it".
+pub(crate) fn check_name(name: &str) -> Result<(), &'static str> {
+    if name.trim().is_empty() || name == "." || name == ".." {
+        Err("it is blank")
+    } else if name.contains(|c: char| c.is_control() || c == '/') {
+        Err("it may not contain \"/\" or control characters")
+    } else if name.len() > MAX_NAME {
+        Err("it has more than 200 bytes")
+    } else {
+        Ok(())
+    }
+}
+
+/// The name as a message shows it.
+pub(crate) fn shown(name: &str) -> String {
+    name.chars().take(MAX_NAME).collect()
 }

@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::guess;
-pub use place::Place;
+pub(crate) use place::Place;
 pub(crate) use place::{Document, KeyPath};
 
 /// Why something could not be done: its text names what is wrong, where, and what to do.
@@ -74,7 +74,7 @@ impl Error {
     }
 
     /// The place in a text file that it is about, where one is known.
-    pub fn place(&self) -> Option<&Place> {
+    pub(crate) fn place(&self) -> Option<&Place> {
         self.0.place.as_ref()
     }
 

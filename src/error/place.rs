@@ -10,7 +10,7 @@ use toml::de::{DeArray, DeString, DeTable, DeValue};
 
 /// A place in a TOML file, written as `file:line:column`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
+pub(crate) struct Place {
     path: PathBuf,
     // Boxed, because errors are returned by value everywhere.
     spot: Option<Box<Spot>>,

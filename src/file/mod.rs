@@ -1,7 +1,6 @@
 //! Files: only regular files are read, up to a size limit; written so that a reader sees the
 //! old content or the new, never half of it.
 
-mod lock;
 mod write;
 
 use std::fs::{self, File};
@@ -10,12 +9,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::Error;
-pub use lock::WriterLock;
-pub(crate) use write::not_written;
-pub(crate) use write::write_all_whole;
-pub use write::write_at;
-pub(crate) use write::write_by_path;
-pub(crate) use write::write_whole;
+pub use write::{WriterLock, write_at};
+pub(crate) use write::{not_written, write_all_whole, write_by_path, write_whole};
 
 /// Whether content is read that is not what was written, by the fingerprint next to it. The command line
 /// sets it once, as it would a level of logging; a library's caller is refused such content.
@@ -150,7 +145,6 @@ pub(crate) fn absolute(path: &Path) -> String {
     std::path::absolute(path).unwrap_or_else(|_| path.into()).display().to_string()
 }
 
-/// The folder that `path` is in.
 pub(crate) fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,

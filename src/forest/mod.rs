@@ -22,7 +22,6 @@
 #[allow(clippy::module_inception, reason = "the forest itself, beside its parts")]
 mod forest;
 mod grow;
-mod members;
 mod onnx;
 mod params;
 mod splitter;

@@ -35,8 +35,7 @@ impl RegressionForest<f64> {
             let named = description.features.len();
             return Err(error!(
                 Export,
-                "{named} features are named, the forest was fitted to {fitted}",
-                fitted = features
+                "{named} features are named, the forest was fitted to {features}"
             ));
         }
         let columns = description.features.join(",");

@@ -3,7 +3,7 @@
 use super::Options;
 use super::text::nine_digits;
 use super::thin::{Softened, from_origin, softened};
-use crate::curve::tail::with_tail;
+use crate::curve::force_curve::with_tail;
 use crate::curve::{Envelope, ForceCurve, ForceKind, Tail};
 use crate::error::{Error, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
@@ -66,7 +66,7 @@ impl ExportCurve {
                     softening = Some((own_peak_n, soft.peak_force_n()));
                     loading = soft;
                 }
-                Softened::ImpossibleRun => {
+                Softened::Impossible => {
                     return Err(error!(
                         Export,
                         "no steep rise can be reduced to {} at equal energy without changing the curve's end, or forces by more than a quarter: remove --soften",
@@ -122,7 +122,7 @@ impl ExportCurve {
     ///
     /// # Errors
     /// If the result is not a valid curve.
-    pub fn begun_at_origin(&self) -> Result<Self, Error> {
+    pub(crate) fn begun_at_origin(&self) -> Result<Self, Error> {
         Ok(match from_origin(&self.loading, self.end)? {
             Some((loading, end)) => self.clone().through(loading, end),
             None => self.clone(),
@@ -130,7 +130,7 @@ impl ExportCurve {
     }
 
     /// What softening has changed, in one line.
-    pub fn softening_note(&self) -> Option<String> {
+    pub(crate) fn softening_note(&self) -> Option<String> {
         let (before, after) = self.softening?;
         Some(format!(
             "{}: rises steeper than {} have been made less steep, with the same energy up to the maximum crush; the peak force changes from {} to {}",
@@ -142,7 +142,7 @@ impl ExportCurve {
     }
 
     /// Why there is no band, in one line; nothing for a recorded curve, which needs none.
-    pub fn no_band_note(&self) -> Option<String> {
+    pub(crate) fn no_band_note(&self) -> Option<String> {
         Some(format!("{}: written without a band: {}", self.headline(), self.no_band?))
     }
 
@@ -188,7 +188,7 @@ impl ExportCurve {
     }
 
     /// Mass that moves along the deflection, in kg: the reduced one of a pair.
-    pub fn effective_mass_kg(&self) -> f64 {
+    pub(crate) fn effective_mass_kg(&self) -> f64 {
         let mass = self.predicted.mass_kg;
         self.other_mass_kg().map_or(mass, |other| mass * other / (mass + other))
     }
@@ -240,7 +240,7 @@ impl ExportCurve {
 
     /// Notes for a target that unloads with the steepest rise if that is more than the
     /// curve's own stiffness.
-    pub fn steepest_notes(&self, target: &str, other: &str) -> Vec<String> {
+    pub(crate) fn steepest_notes(&self, target: &str, other: &str) -> Vec<String> {
         let (own, steepest) = (self.stiffness_n_per_m(), self.loading.max_slope());
         let unloading = TargetUnloading::Line(own.max(steepest));
         let mut notes = vec![self.restitution_note(target, unloading)];
@@ -255,7 +255,7 @@ impl ExportCurve {
     }
 
     /// Description of the curve in one line, for headers and titles.
-    pub fn headline(&self) -> String {
+    pub(crate) fn headline(&self) -> String {
         let group = self.predicted.provenance.group.replace(char::is_control, " ");
         let run = own_name(&self.predicted).map_or(String::new(), |name| format!(", {name}"));
         format!(
@@ -272,7 +272,7 @@ impl ExportCurve {
     }
 
     /// Group and speed as an identifier of letters, digits and underscores.
-    pub fn identifier(&self) -> String {
+    pub(crate) fn identifier(&self) -> String {
         identifier(&self.file_stem())
     }
 

@@ -9,7 +9,6 @@ mod calculix;
 mod csv;
 mod export_curve;
 pub(crate) mod fmu;
-mod fmu_export;
 pub(crate) mod iso_mme;
 mod json;
 mod lsdyna;
@@ -33,9 +32,9 @@ pub use export_curve::ExportCurve;
 pub(crate) use export_curve::TargetUnloading;
 pub use fmu::{FmiVersion, Spring, archive, binaries};
 pub use lsdyna::Material;
-pub use read::curve::{Metadata, Place, ReadFile};
+pub use read::curve::{Metadata, ReadFile};
 pub(crate) use read::history;
-pub use read::{ColumnNames, READERS, ReadCurve, ReadOptions, Reader, read};
+pub use read::{ColumnNames, ReadCurve, ReadOptions, read, readers};
 
 /// One target: its name, file extensions, capabilities and writer.
 pub struct Format {
@@ -142,14 +141,14 @@ pub const FORMATS: &[Format] = &[
         &["fmu"],
         "FMU of FMI 2.0, model exchange and co-simulation, complete law with memory, SI",
         Tail::Bottom,
-        Writer::Each(fmu_export::write_fmi2),
+        Writer::Each(fmu::write_fmi2),
     ),
     Format::new(
         "fmi3",
         &["fmu"],
         "the same for FMI 3.0",
         Tail::Bottom,
-        Writer::Each(fmu_export::write_fmi3),
+        Writer::Each(fmu::write_fmi3),
     ),
     Format::new(
         "modelica",

@@ -165,7 +165,7 @@ impl Table {
         ] {
             out.create_dataset(name).with_f64_data(values);
         }
-        out.finish().map_err(|e| error!(Export, "cannot encode the table: {detail}", detail = e))
+        out.finish().map_err(|e| error!(Export, "cannot encode the table: {e}"))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Numbers, titles and lines as text of other tools' files.
+//! Numbers, titles, names and lines as text of other tools' files.
 
 use std::fmt::{Arguments, Write};
 
@@ -44,6 +44,46 @@ impl Lines {
     }
 }
 
+/// Longest identifier: importers unpack into folders of that name, and paths have their limits.
+const LONGEST: usize = 60;
+
+/// A C identifier made from a name: its ASCII letters and digits, and one `_` for what lies between.
+pub(crate) fn identifier(name: &str) -> String {
+    let mut plain = String::new();
+    for c in name.chars() {
+        match c {
+            c if c.is_ascii_alphanumeric() => plain.push(c),
+            _ if plain.ends_with('_') || plain.is_empty() => {}
+            _ => plain.push('_'),
+        }
+    }
+    // It must not begin with a digit, be empty, or be a word of C.
+    let begins_well = plain.starts_with(|c: char| c.is_ascii_alphabetic());
+    let is_long_enough = plain.len() > 8;
+    if !(begins_well && (is_long_enough || plain.contains('_'))) {
+        plain = format!("spring_{plain}");
+    }
+    plain.truncate(LONGEST);
+    plain.trim_end_matches('_').to_string()
+}
+
+/// Text for XML and HTML, within quotes or not. What XML cannot hold at all becomes a space.
+pub(crate) fn escaped(text: &str) -> String {
+    let mut safe = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => safe.push_str("&amp;"),
+            '<' => safe.push_str("&lt;"),
+            '>' => safe.push_str("&gt;"),
+            '"' => safe.push_str("&quot;"),
+            '\'' => safe.push_str("&apos;"),
+            c if c.is_control() || c == '\u{fffe}' || c == '\u{ffff}' => safe.push(' '),
+            c => safe.push(c),
+        }
+    }
+    safe
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -60,5 +100,28 @@ mod tests {
     fn titles_are_plain() {
         assert_eq!(title("$*lead, car é", 80), "lead  car  ");
         assert_eq!(title(&"x".repeat(200), 80).len(), 80);
+    }
+
+    #[test]
+    fn identifiers_are_plain() {
+        fn t(name: &str, expected: &str) {
+            assert_eq!(identifier(name), expected, "{name:?}");
+        }
+        t("lead-car-wall 50 km/h (wall)", "lead_car_wall_50_km_h_wall");
+        t("Stoß <&> vorn", "Sto_vorn");
+        t("900001", "spring_900001");
+        t("int", "spring_int");
+        t("volatile", "spring_volatile");
+        t("", "spring");
+        t("äöü", "spring");
+        assert_eq!(identifier(&"a".repeat(200)).len(), LONGEST);
+    }
+
+    #[test]
+    fn texts_of_xml_are_escaped() {
+        assert_eq!(
+            escaped("a<b & 'c' \"d\"\u{1b}[0m"),
+            "a&lt;b &amp; &apos;c&apos; &quot;d&quot; [0m"
+        );
     }
 }

@@ -151,7 +151,7 @@ pub(crate) enum Softened {
     Nothing,
     Curve(Envelope),
     /// The energy could only be kept by changing the curve's end, or forces by more than a quarter.
-    ImpossibleRun,
+    Impossible,
 }
 
 /// The envelope with no rise steeper than `stiffness_n_per_m` and the same energy to its point
@@ -167,7 +167,7 @@ pub(crate) fn softened(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> 
         (c.force_n()[end] - curve.force_n()[end]).abs() <= SAME_END * curve.force_n()[end]
     };
     let is_soft = |c: &Envelope| c.max_slope() <= stiffness_n_per_m * (1.0 + 1e-6);
-    found.filter(|c| is_soft(c) && keeps_end(c)).map_or(Softened::ImpossibleRun, Softened::Curve)
+    found.filter(|c| is_soft(c) && keeps_end(c)).map_or(Softened::Impossible, Softened::Curve)
 }
 
 fn soften(curve: &Envelope, stiffness_n_per_m: f64, end: usize) -> Option<Envelope> {
@@ -324,6 +324,6 @@ mod tests {
         assert_eq!(soft.force_n()[0], 0.0);
         assert_eq!(soft.force_n()[381..], curve().force_n()[381..]);
         assert_eq!(softened(&curve(), 700e6, 400), Softened::Nothing);
-        assert_eq!(softened(&curve(), 1e6, 400), Softened::ImpossibleRun);
+        assert_eq!(softened(&curve(), 1e6, 400), Softened::Impossible);
     }
 }

@@ -2,20 +2,33 @@
 //!
 //! The names below are all that the program uses of that crate: a replacement has to provide
 //! these.
+//!
+//! A skeleton is an HDF5 file whose large datasets get their values later, in any order and from any thread.
+//!
+//! The library encodes a file in memory, data included. Here each large dataset is given
+//! untouched zeros, which take no memory, after a mark; where the
+//! encoder passes on the marked bytes, their place in the file is noted and nothing is
+//! written.
+//!
+//! This relies on behaviour that hdf5-pure does not guarantee: it passes the raw values of
+//! a dataset to its writer in one piece, as they were given to it, if they have 8 KiB or more
+//! (fewer it gathers with others in the buffer of a `BufWriter`). The crate's version is pinned
+//! exactly, and the test below fails when that changes. [`Skeleton::write`] notices it too, and
+//! its callers then report it or write in another way.
 
-pub(crate) mod skeleton;
 pub(crate) mod table;
 
-use std::fs;
-use std::io;
+use std::io::Write;
 use std::path::Path;
 use std::sync::{Arc, OnceLock};
+use std::{fs, io};
 
 use crate::file;
 pub(crate) use hdf5_pure::{
     AttrValue, Dataset, DatasetBuilder, Error, File, FileAccessProperties, FileBuilder,
     FileLocking, FormatError, Group, ReadSeekSource, Source,
 };
+use hdf5_pure::{Datatype, make_f64_type};
 
 /// Why a file is not opened as HDF5.
 #[derive(Debug, thiserror::Error)]
@@ -89,4 +102,167 @@ pub(crate) fn open(path: &Path) -> Result<(File, Fault), OpenError> {
 pub(crate) fn declared_bytes(dataset: &Dataset) -> Result<u64, Error> {
     let size = dataset.element_size()?.max(8);
     Ok(dataset.shape()?.iter().fold(size, |bytes, &n| bytes.saturating_mul(n)))
+}
+
+/// First bytes of the values that come later; the number of the dataset follows.
+const MARK: &[u8; 16] = b"VALUESCOMELATER!";
+const MARK_BYTES: usize = 24;
+
+/// The datasets that get their values later.
+#[derive(Default)]
+pub(crate) struct Skeleton {
+    lengths: Vec<usize>,
+}
+
+impl Skeleton {
+    /// Gives a dataset of doubles its shape and its place.
+    pub(crate) fn reserve(&mut self, dataset: &mut DatasetBuilder, rows: usize, columns: usize) {
+        let shape = [rows as u64, columns as u64];
+        self.reserve_values(dataset, make_f64_type(), size_of::<f64>(), &shape);
+    }
+
+    /// Gives a dataset of values of `size` bytes its shape and its place. Of fewer than 8 KiB the
+    /// place is not found, and [`Skeleton::write`] gives `None`.
+    pub(crate) fn reserve_values(
+        &mut self,
+        dataset: &mut DatasetBuilder,
+        datatype: Datatype,
+        size: usize,
+        shape: &[u64],
+    ) {
+        let values = shape.iter().product::<u64>();
+        let mut bytes = vec![0u8; values as usize * size];
+        let mark = mark(self.lengths.len());
+        let count = mark.len().min(bytes.len());
+        bytes[..count].copy_from_slice(&mark[..count]);
+        self.lengths.push(bytes.len());
+        dataset.with_raw_data(datatype, bytes, values).with_shape(shape);
+    }
+
+    /// Writes everything but the values; where those of each dataset begin. `None` if the
+    /// encoder did not hand all of them over in one piece.
+    pub(crate) fn write(
+        &self,
+        builder: FileBuilder,
+        file: &fs::File,
+    ) -> io::Result<Option<Vec<u64>>> {
+        let mut sink =
+            Sink { lengths: &self.lengths, file, at: 0, offsets: vec![None; self.lengths.len()] };
+        builder.finish_to(&mut sink).map_err(io::Error::other)?;
+        let offsets: Option<Vec<u64>> = sink.offsets.into_iter().collect();
+        if offsets.is_some() {
+            allocate(file, sink.at)?;
+        }
+        Ok(offsets)
+    }
+}
+
+/// Reserves the file's blocks at once, which makes writing them cheaper.
+fn allocate(file: &fs::File, length: u64) -> io::Result<()> {
+    #[cfg(target_os = "linux")]
+    if rustix::fs::fallocate(file, rustix::fs::FallocateFlags::empty(), 0, length).is_ok() {
+        return Ok(());
+    }
+    file.set_len(length)
+}
+
+fn mark(number: usize) -> [u8; MARK_BYTES] {
+    let mut mark = [0; MARK_BYTES];
+    mark[..16].copy_from_slice(MARK);
+    mark[16..].copy_from_slice(&(number as u64).to_le_bytes());
+    mark
+}
+
+/// Takes the encoder's bytes and leaves out those that are marked.
+struct Sink<'a> {
+    lengths: &'a [usize],
+    file: &'a fs::File,
+    at: u64,
+    offsets: Vec<Option<u64>>,
+}
+
+impl Write for Sink<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let marked = bytes.get(16..MARK_BYTES).filter(|_| bytes.starts_with(MARK));
+        let number = marked.and_then(|n| n.try_into().ok()).map(u64::from_le_bytes);
+        let number = number.and_then(|n| usize::try_from(n).ok());
+        match number.filter(|&n| self.lengths.get(n) == Some(&bytes.len())) {
+            Some(number) => self.offsets[number] = Some(self.at),
+            None => write_all_at(self.file, bytes, self.at)?,
+        }
+        self.at += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Writes all bytes at a position.
+#[cfg(unix)]
+pub(crate) fn write_all_at(file: &fs::File, bytes: &[u8], at: u64) -> io::Result<()> {
+    std::os::unix::fs::FileExt::write_all_at(file, bytes, at)
+}
+
+/// Writes all bytes at a position.
+#[cfg(windows)]
+pub(crate) fn write_all_at(file: &fs::File, mut bytes: &[u8], mut at: u64) -> io::Result<()> {
+    while !bytes.is_empty() {
+        let written = std::os::windows::fs::FileExt::seek_write(file, bytes, at)?;
+        bytes = &bytes[written..];
+        at += written as u64;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hdf5;
+
+    /// What the module rests on: if this fails after an update of hdf5-pure, the encoder does not
+    /// hand over the values of a dataset in one piece any more. Then histories go through memory
+    /// and large sweeps cannot be converted: find another way to learn where the values begin.
+    #[test]
+    fn the_encoder_hands_over_the_values_of_each_dataset_in_one_piece() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.h5");
+        let file = fs::File::create(&path).unwrap();
+        let mut out = FileBuilder::new();
+        let mut skeleton = Skeleton::default();
+        // From 8 KiB on.
+        let shapes = [(1024, 1), (1, 1024), (70_000, 11)];
+        for (k, (rows, columns)) in shapes.into_iter().enumerate() {
+            skeleton.reserve(out.create_dataset(&format!("d{k}")), rows, columns);
+        }
+        out.create_dataset("small").with_f64_data(&[1.0, 2.0]);
+        let offsets = skeleton.write(out, &file).unwrap();
+        let offsets = offsets.expect("hdf5-pure hands values over in pieces: see this test");
+        let value = |k: usize, i: usize| (k * 1_000_000 + i) as f64;
+        for (k, (rows, columns)) in shapes.into_iter().enumerate() {
+            let bytes: Vec<u8> =
+                (0..rows * columns).flat_map(|i| value(k, i).to_le_bytes()).collect();
+            write_all_at(&file, &bytes, offsets[k]).unwrap();
+        }
+        let (read, _) = hdf5::open(&path).unwrap();
+        for (k, (rows, columns)) in shapes.into_iter().enumerate() {
+            let dataset = read.dataset(&format!("d{k}")).unwrap();
+            assert_eq!(dataset.shape().unwrap(), [rows as u64, columns as u64]);
+            let expected: Vec<f64> = (0..rows * columns).map(|i| value(k, i)).collect();
+            assert!(dataset.read_f64().unwrap() == expected, "d{k}");
+        }
+        assert_eq!(read.dataset("small").unwrap().read_f64().unwrap(), [1.0, 2.0]);
+    }
+
+    #[test]
+    fn values_that_are_not_handed_over_by_themselves_are_noticed() {
+        for rows in [1, 3, 1000] {
+            let file = tempfile::tempfile().unwrap();
+            let mut out = FileBuilder::new();
+            let mut skeleton = Skeleton::default();
+            skeleton.reserve(out.create_dataset("d"), rows, 1);
+            assert_eq!(skeleton.write(out, &file).unwrap(), None, "{rows} values");
+        }
+    }
 }

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use hdf5_pure::{CharacterSet, Datatype, StringPadding, make_f64_type, make_i64_type};
 
-use super::skeleton::{Skeleton, write_all_at};
 use super::{AttrValue, Dataset, Fault, File, FileBuilder, OpenError, declared_bytes};
+use super::{Skeleton, write_all_at};
 use crate::error::{Error, error};
 use crate::file::write_at;
 
@@ -227,7 +227,6 @@ impl Table {
         Ok(Column { name: name.into(), values, rows })
     }
 
-    /// An attribute of the file, if it has it.
     pub(crate) fn attribute(&self, name: &str) -> Result<Option<Attribute>, Error> {
         let all = self.file.root().attrs();
         self.fault.check().map_err(|source| Error::io(&self.path, source))?;
@@ -241,7 +240,6 @@ impl Table {
         })
     }
 
-    /// Bytes of `rows` values of a column from `row` on.
     pub(crate) fn read(&self, column: usize, row: u64, rows: u64) -> Result<Vec<u8>, Error> {
         let name = &self.columns[column].name;
         let bytes = rows.saturating_mul(self.columns[column].values.size() as u64);

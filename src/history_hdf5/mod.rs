@@ -13,22 +13,13 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use crate::file::{write_at, write_whole};
-use crate::hdf5::skeleton::{Skeleton, write_all_at};
 use crate::hdf5::{self, AttrValue, DatasetBuilder, FileBuilder, OpenError};
+use crate::hdf5::{Skeleton, write_all_at};
 use crate::history::{EntityId, History, Side};
 use crate::solver::lsdyna::deck::Deck;
 use crate::solver::{self, Blocks, Selection, SolverFile, decks};
 use crate::unit::UnitSystem;
 use units::unit_of;
-
-/// What is known about a file's histories next to the file.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Beside<'a> {
-    /// Units of the values; the deck's if absent, and if that has none they stay unknown.
-    pub units: Option<UnitSystem>,
-    /// The deck of the run, which has units and the titles that the file lacks.
-    pub deck: Option<&'a Deck>,
-}
 
 /// Converts the selected histories of the file at `input` to HDF5, in the solver's units.
 ///
@@ -39,7 +30,8 @@ pub(crate) fn convert(
     input: &Path,
     format: Option<&str>,
     selection: &Selection,
-    beside: &Beside<'_>,
+    units: Option<UnitSystem>,
+    deck: Option<&Deck>,
     output: &Path,
 ) -> Result<SolverFile, Error> {
     // Neither can be opened twice, nor be written at any place.
@@ -48,12 +40,12 @@ pub(crate) fn convert(
     if !is_device
         && is_file(input)
         && let Some(blocks) = solver::blocks(input, format, selection)?
-        && let Some(file) = stream(input, blocks, beside, output)?
+        && let Some(file) = stream(input, blocks, units, deck, output)?
     {
         return Ok(file);
     }
     let file = solver::read(input, format, selection)?;
-    write_whole(output, &encode(&file, beside, Some(input))?)?;
+    write_whole(output, &encode(&file, units, deck, Some(input))?)?;
     Ok(file)
 }
 
@@ -88,10 +80,11 @@ pub(crate) fn is_other_hdf5(path: &Path) -> bool {
 /// If HDF5 cannot hold them.
 pub fn encode(
     file: &SolverFile,
-    beside: &Beside<'_>,
+    units: Option<UnitSystem>,
+    deck: Option<&Deck>,
     source: Option<&Path>,
 ) -> Result<Vec<u8>, Error> {
-    let mut layout = Layout::of(file, beside, source);
+    let mut layout = Layout::of(file, units, deck, source);
     let mut components: Vec<(&Arc<str>, Vec<&History>)> = Vec::new();
     let mut index: HashMap<&Arc<str>, usize> = HashMap::new();
     for history in &file.histories {
@@ -137,7 +130,12 @@ struct Layout {
 
 impl Layout {
     /// A file with what describes the source, and the times.
-    fn of(file: &SolverFile, beside: &Beside<'_>, source: Option<&Path>) -> Self {
+    fn of(
+        file: &SolverFile,
+        units: Option<UnitSystem>,
+        deck: Option<&Deck>,
+        source: Option<&Path>,
+    ) -> Self {
         let mut out = FileBuilder::new();
         let mut attr = |name: &str, value: &str| {
             out.set_attr(name, AttrValue::VarLenString(value.into()));
@@ -150,8 +148,8 @@ impl Layout {
         if let Some(path) = source.and_then(|path| std::path::absolute(path).ok()) {
             attr("source", &path.display().to_string());
         }
-        let stated = || beside.deck?.units.as_ref()?.system;
-        let units = beside.units.or_else(stated);
+        let stated = || deck?.units.as_ref()?.system;
+        let units = units.or_else(stated);
         units.iter().for_each(|units| attr("units", &units.to_string()));
         let dataset = out.create_dataset(TIME);
         dataset.with_f64_data(&file.time);
@@ -159,7 +157,7 @@ impl Layout {
             dataset.set_attr(UNITS, AttrValue::VarLenString(units.names().2.into()));
         }
         let mut entities = file.entities.clone();
-        if let Some(deck) = beside.deck {
+        if let Some(deck) = deck {
             decks::fill_entity_titles(&file.section, &mut entities, deck);
         }
         let titles = entities.into_iter().filter_map(|e| Some((e.id, e.title?)));
@@ -315,11 +313,12 @@ const MANY_VALUES: usize = 1 << 18;
 fn stream(
     input: &Path,
     blocks: Blocks,
-    beside: &Beside<'_>,
+    units: Option<UnitSystem>,
+    deck: Option<&Deck>,
     output: &Path,
 ) -> Result<Option<SolverFile>, Error> {
     let states = blocks.file.time.len();
-    let mut layout = Layout::of(&blocks.file, beside, Some(input));
+    let mut layout = Layout::of(&blocks.file, units, deck, Some(input));
     let mut skeleton = Skeleton::default();
     for column in &blocks.columns {
         let dataset = layout.component(&column.component, &column.entities);

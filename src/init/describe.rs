@@ -4,15 +4,14 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::UserHints;
-use super::explain::FOLLOWS;
 use super::folders::{seen_from, speed_in};
 use super::measure::{self, Impact, MassEstimates, SAME_MASS, SAME_SPEED, is_near};
-use super::proposal::Evidence::{Computed, Given, Guessed, Read};
-use super::proposal::{Proposal, Proposed, ProposedRun};
-use super::recipe::{CommonRecipe, names_centre_of_gravity, percent};
+use super::recipe::{CommonRecipe, FOLLOWS, names_centre_of_gravity, percent};
 use super::record::Record;
 use super::sources::MOTION;
 use super::units::digits;
+use super::write::Evidence::{Computed, Given, Guessed, Read};
+use super::write::{Proposal, Proposed, ProposedRun};
 use crate::curve::recipe::{DeflectionSource, Filter, ForceSource, RecordedMotion};
 use crate::signal::cfc;
 use crate::study::StudyKind;
@@ -425,14 +424,13 @@ fn doubts_of_speed(record: &Record, impact: &Impact) -> Vec<String> {
     }
     if let Some((path, deck)) = &run.sources.deck
         && path.parent() == Some(&run.path)
-        && let Some(stated) = deck.impact_speed()
-        && !is_near(stated.speed, first, SAME_SPEED)
+        && let Some((speed, at)) = deck.impact_speed()
+        && !is_near(speed, first, SAME_SPEED)
     {
         notes.push(format!(
-            "the deck {}, line {}, states {} in its units, the record {first}",
+            "the deck {}, line {}, states {speed} in its units, the record {first}",
             shown_name(path),
-            stated.at.line,
-            stated.speed
+            at.line
         ));
     }
     notes

@@ -193,7 +193,7 @@ pub(super) fn speed_in(name: &str) -> Option<f64> {
 
 /// A folder that a proposed study leaves out.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct LeftOut {
+pub(crate) struct LeftOut {
     /// The folder, as it was found.
     pub path: PathBuf,
     #[serde(flatten)]

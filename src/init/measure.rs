@@ -1,10 +1,10 @@
 //! Results of the chosen histories of a run in SI: speed, crush, times, masses; and what follows from
 //! them for filter and sampling.
 
-use super::proposal::Evidence::{Computed, Guessed, Read};
-use super::proposal::Proposed;
 use super::record::Record;
 use super::units::{digits, shown_mass, trimmed};
+use super::write::Evidence::{Computed, Guessed, Read};
+use super::write::Proposed;
 use crate::curve::contact;
 use crate::curve::recipe::{Filter, Sampling};
 use crate::signal::integral;

@@ -4,10 +4,8 @@
 //! and says so; unknown values are left to fill in.
 
 mod describe;
-mod explain;
 mod folders;
 mod measure;
-mod proposal;
 mod propose;
 mod recipe;
 mod record;
@@ -25,11 +23,10 @@ use crate::error::{Error, error};
 use crate::history::Side;
 use crate::study::StudyKind;
 use crate::unit::UnitSystem;
-pub use folders::LeftOut;
-pub use proposal::Proposal;
-pub(crate) use proposal::Proposed;
 pub use propose::propose;
 pub(crate) use scenario::propose_scenario;
+pub use write::Proposal;
+pub(crate) use write::Proposed;
 
 pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
     if std::fs::symlink_metadata(path)

@@ -8,9 +8,8 @@ use serde::Serialize;
 
 use super::folders::seen_from;
 use super::measure;
-use super::proposal::Evidence::{Guessed, Read};
-use super::proposal::Proposed;
-use super::write::{Text, inline, quoted, speed_text};
+use super::write::Evidence::{Guessed, Read};
+use super::write::{Proposed, Text, inline, quoted, speed_text};
 use crate::curve::Parameter;
 use crate::error::{Error, error};
 use crate::file::folder_of;

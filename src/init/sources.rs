@@ -53,7 +53,6 @@ pub(super) struct Sources {
 }
 
 impl Sources {
-    /// The files of the run in `folder`.
     pub(super) fn of(folder: &Path) -> Result<Self, Reason> {
         let unreadable = |error: &dyn ToString| Reason::Unreadable { why: error.to_string() };
         let files = solver::runs::output_files(folder).map_err(|error| unreadable(&error))?;

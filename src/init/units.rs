@@ -4,8 +4,8 @@
 //! has a speed, a crush, a time to the maximum crush, a mean deceleration and a mass that vehicles
 //! have.
 
-use super::proposal::Evidence::{Computed, Given, Guessed, Read};
-use super::proposal::{Evidence, Proposed};
+use super::write::Evidence::{self, Computed, Given, Guessed, Read};
+use super::write::Proposed;
 use crate::unit::{UnitSystem, km_per_h};
 
 /// What of an impact depends on the units, in the file's.

@@ -24,23 +24,20 @@ mod chain;
 mod contacts;
 mod engine;
 mod law;
-mod ledger;
-mod rates;
 mod recorder;
 mod reference;
 mod rows;
 mod run;
 
 use crate::error::{Error, error};
-pub use chain::{Body, Chain, Interface, Resistance, STANDARD_GRAVITY_M_PER_S2, Tension};
-use engine::Scheme;
-pub use law::{
-    EnvelopeEnd, ForceLaw, LawTables, MemoryTables, Unloading, UnloadingChoice, UnloadingShape,
+pub(crate) use chain::Tension;
+pub use chain::{
+    Body, Chain, Damping, Interface, RateFactor, Resistance, STANDARD_GRAVITY_M_PER_S2, Stopping,
 };
-pub use ledger::Ledger;
-pub use rates::{Damping, RateFactor, Stopping};
+use engine::Scheme;
+pub use law::{EnvelopeEnd, ForceLaw, LawTables, Unloading, UnloadingChoice, UnloadingShape};
 use run::Grid;
-pub use run::{BodyHistory, InterfaceHistory, Method, Record, Run, RunSettings};
+pub use run::{BodyHistory, InterfaceHistory, Ledger, Method, Record, Run, RunSettings};
 
 /// A curve's own run ends where the curve does, but for rounding.
 const AT_END_M: f64 = 1e-4;

@@ -28,8 +28,6 @@ mod genetic;
 mod law;
 mod motion;
 mod simplex;
-mod spread;
-mod start;
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -38,10 +36,9 @@ use crate::error::{Error, error};
 use crate::signal::l1_ratio;
 use crate::stream::Stream;
 use genetic::{Genes, Scales};
-pub use law::{Nsdm, PiecewiseLinear};
+pub use law::{Identifiability, LawSpread, Nsdm, PiecewiseLinear, Range};
 pub use motion::Motion;
 use motion::Steps;
-pub use spread::{Identifiability, LawSpread, Range};
 
 /// Bounds of the stiffness at its nodes, in N/m; searched evenly in the logarithm.
 pub const STIFFNESS_N_PER_M: [f64; 2] = [1e5, 1e8];
@@ -91,8 +88,7 @@ impl Target {
             let (velocity, acceleration) = (velocity.len(), acceleration.len());
             return Err(error!(
                 Comparison,
-                "columns differ in length: {time} times, {velocity} velocities, {acceleration} accelerations",
-                time = samples
+                "columns differ in length: {samples} times, {velocity} velocities, {acceleration} accelerations"
             ));
         }
         if samples < FEWEST_SAMPLES {
@@ -231,11 +227,7 @@ pub fn fit(target: &Target, settings: &FitSettings, seed: u64) -> Result<Fit, Er
         ));
     }
     if u32::try_from(generations).is_err() {
-        return Err(error!(
-            Comparison,
-            "{count} generations: expected fewer than 2^32",
-            count = generations
-        ));
+        return Err(error!(Comparison, "{generations} generations: expected fewer than 2^32"));
     }
     if !(weight_per_s2 >= 0.0 && weight_per_s2.is_finite()) {
         return Err(error!(
@@ -291,7 +283,7 @@ fn first_individuals(target: &Target, settings: &FitSettings, seed: u64) -> Vec<
         // A number that no individual of the search has.
         let mut stream = Stream::new(seed, u64::MAX - i as u64);
         let mut genes: Genes = std::array::from_fn(|_| if i == 0 { 0.5 } else { stream.unit() });
-        start::least_squares(&mut genes, target);
+        simplex::least_squares(&mut genes, target);
         genes
     };
     (0..count).into_par_iter().map(individual).collect()

@@ -20,7 +20,7 @@ pub(crate) const MAX_ITEMS: u64 = 1_000_000_000_000;
 /// A `--plan` file: the `[sweep]` table by itself.
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct PlanFile {
+pub(crate) struct PlanFile {
     /// What is varied.
     pub(crate) sweep: Plan,
 }
@@ -140,7 +140,7 @@ pub(crate) struct Vary {
 /// What is varied.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
-pub enum What {
+pub(crate) enum What {
     /// Speed of a train.
     #[default]
     Speed,
@@ -172,7 +172,7 @@ impl What {
 /// Vehicles by name, or all of them.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected a list of vehicles, or \"all\"")]
-pub enum Vehicles {
+pub(crate) enum Vehicles {
     /// By name.
     List(Vec<String>),
     /// `all`.
@@ -567,31 +567,20 @@ mod tests {
             let text = format!("samples = 2\nvary = [ {{ {vary} }} ]");
             assert_eq!(design(&text).unwrap_err(), expected);
         }
-        t(
-            "what = \"mass\", values = [24]",
-            "values: mass \"24\" has no unit: write for example \"24t\" or \"24kg\"",
-        );
-        t(
-            "what = \"mass\", factor = true, values = [\"24t\"]",
-            "values: \"24t\" is not a number: write for example 0.9",
-        );
-        t("what = \"band\", values = [1.5]", "values: 1.5 is out of range: expected from -1 to 1");
-        t("what = \"force\", values = [-1]", "values: -1 is out of range: expected 0 or more");
-        t("what = \"force\", values = []", "values is empty: give one or more");
-        t("what = \"force\", from = 1, to = 2, steps = 1", "steps is 1: expected 2 or more");
-        t(
-            "what = \"force\", from = 1, to = 2",
-            "give values = […], or from, to and steps, or a distribution",
-        );
-        t("what = \"force\", distribution = \"normal\", mean = 1", "the distribution needs sd = …");
-        t(
-            "what = \"force\", distribution = \"uniform\", from = 1, to = 2, sd = 1",
-            "sd does not go with uniform: remove one of them",
-        );
-        t(
-            "what = \"force\", values = [1]",
-            "sweep.samples is given, but no variable has a distribution: remove samples",
-        );
+        #[rustfmt::skip]
+        let cases = [
+            ("what = \"mass\", values = [24]", "values: mass \"24\" has no unit: write for example \"24t\" or \"24kg\""),
+            ("what = \"mass\", factor = true, values = [\"24t\"]", "values: \"24t\" is not a number: write for example 0.9"),
+            ("what = \"band\", values = [1.5]", "values: 1.5 is out of range: expected from -1 to 1"),
+            ("what = \"force\", values = [-1]", "values: -1 is out of range: expected 0 or more"),
+            ("what = \"force\", values = []", "values is empty: give one or more"),
+            ("what = \"force\", from = 1, to = 2, steps = 1", "steps is 1: expected 2 or more"),
+            ("what = \"force\", from = 1, to = 2", "give values = […], or from, to and steps, or a distribution"),
+            ("what = \"force\", distribution = \"normal\", mean = 1", "the distribution needs sd = …"),
+            ("what = \"force\", distribution = \"uniform\", from = 1, to = 2, sd = 1", "sd does not go with uniform: remove one of them"),
+            ("what = \"force\", values = [1]", "sweep.samples is given, but no variable has a distribution: remove samples"),
+        ];
+        cases.into_iter().for_each(|(vary, expected)| t(vary, expected));
     }
 
     #[test]

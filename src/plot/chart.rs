@@ -1,4 +1,7 @@
 //! What a chart shows: panels with axes, series, bands and marks. Values are SI; an axis says in which unit they are shown.
+//! Round numbers along an axis, and how they are written. Laid out it is a drawing: lines, areas and texts in pixels, y downwards; the input of the writers.
+
+use super::{font, thin};
 
 /// Panels side by side with one title and one legend.
 #[derive(Clone, Debug, PartialEq)]
@@ -84,7 +87,7 @@ impl Axis {
 
     /// The axis of a quantity in N, J, … with the prefix that suits its largest magnitude: kilo below 10⁶, mega
     /// above, none below 10³.
-    pub fn prefixed(quantity: &str, unit: &str, largest: f64) -> Self {
+    pub(crate) fn prefixed(quantity: &str, unit: &str, largest: f64) -> Self {
         let (prefix, scale) = match largest.abs() {
             l if l >= 1e6 => ("M", 1e-6),
             l if l >= 1e3 => ("k", 1e-3),
@@ -164,4 +167,319 @@ pub struct Mark {
     pub name: String,
     /// Where, in SI.
     pub x: f64,
+}
+
+/// A chart in pixels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Drawing {
+    /// Width in pixels.
+    pub width: f64,
+    /// Height in pixels.
+    pub height: f64,
+    /// The chart's title, for who cannot see it.
+    pub title: String,
+    /// From the lowest to the topmost.
+    pub shapes: Vec<Shape>,
+    /// Where the panels are.
+    pub(crate) panels: Vec<PanelPlace>,
+    /// Where the legend begins, in pixels from the top.
+    pub legend_top: f64,
+}
+
+/// Where a panel's axes are and what they span.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct PanelPlace {
+    /// Left, top, right and bottom of the area between the axes, in pixels.
+    pub area: [f64; 4],
+    /// What it spans to the right, in SI.
+    pub x_span: (f64, f64),
+    /// What it spans upwards, in SI.
+    pub y_span: (f64, f64),
+}
+
+impl PanelPlace {
+    /// Which of the points of a line show it, for a page that gives values under the pointer: those that its picture
+    /// goes through, and no gap between them beyond a few pixels.
+    pub(crate) fn telling(&self, x: &[f64], y: &[f64]) -> Vec<usize> {
+        let points: Vec<(f64, f64)> = x.iter().zip(y).map(|(x, y)| self.place(*x, *y)).collect();
+        let mut telling = Vec::new();
+        let mut last: Option<usize> = None;
+        for i in thin::kept(&points) {
+            if let Some(before) = last {
+                let far = |a: usize, b: usize| (points[a].0 - points[b].0).abs() > MOST_GAP;
+                let mut from = before;
+                for k in before + 1..i {
+                    if far(k + 1, from) {
+                        telling.push(k);
+                        from = k;
+                    }
+                }
+            }
+            telling.push(i);
+            last = Some(i);
+        }
+        telling
+    }
+
+    /// Where a pair of values is.
+    pub(super) fn place(&self, x: f64, y: f64) -> (f64, f64) {
+        let [left, top, right, bottom] = self.area;
+        // Halves, so that a span of all numbers does not overflow.
+        let share =
+            |v: f64, (low, high): (f64, f64)| (0.5 * v - 0.5 * low) / (0.5 * high - 0.5 * low);
+        (
+            left + (right - left) * share(x, self.x_span),
+            bottom - (bottom - top) * share(y, self.y_span),
+        )
+    }
+}
+
+/// Widest gap between the values that a page gives, in pixels.
+const MOST_GAP: f64 = 4.0;
+
+/// A colour by its meaning, so that a dark page can give it another value.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Paint {
+    /// The ground.
+    Paper,
+    /// Texts and axes.
+    Ink,
+    /// Texts of less weight.
+    Faint,
+    /// Lines at ticks.
+    Grid,
+    /// The colour of a look: eight, then again from the first.
+    Series(usize),
+}
+
+/// A line's look.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stroke {
+    /// Its colour.
+    pub paint: Paint,
+    /// Its width in pixels.
+    pub width: f64,
+    /// Lengths of strokes and gaps in pixels; empty for a solid line.
+    pub dash: Vec<f64>,
+}
+
+/// Something that is drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape {
+    /// Lines, each through its points; an area if it is filled.
+    Path {
+        /// Points of each line.
+        lines: Vec<Vec<(f64, f64)>>,
+        /// Whether each line returns to its beginning.
+        is_closed: bool,
+        /// The line, if it is drawn.
+        stroke: Option<Stroke>,
+        /// Colour and opacity of the area, if it is filled.
+        fill: Option<(Paint, f64)>,
+        /// Panel and ordinal among its series, or its bands, which it shows.
+        shows: Option<Shows>,
+    },
+    /// A text of one line.
+    Text(Text),
+}
+
+/// What of a panel a shape shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shows {
+    /// Panel, and ordinal of the series.
+    Series(usize, usize),
+    /// Panel, and ordinal of the band.
+    Band(usize, usize),
+    /// Ticks, their lines and numbers: what changes with the span.
+    Ticks(usize),
+    /// The legend below the axes.
+    Legend,
+}
+
+/// A text of one line.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Text {
+    /// What it says.
+    pub text: String,
+    /// Where its baseline begins, in pixels.
+    pub x: f64,
+    /// See `x`.
+    pub y: f64,
+    /// Height of a line in pixels.
+    pub size: f64,
+    /// Whether it runs upwards.
+    pub is_upright: bool,
+    /// Its colour.
+    pub paint: Paint,
+    /// What of a panel it belongs to.
+    pub shows: Option<Shows>,
+}
+
+impl Text {
+    fn area(&self) -> [f64; 4] {
+        let width = font::width(&self.text, self.size);
+        let (up, down) = (font::ASCENT * self.size, font::DESCENT * self.size);
+        if self.is_upright {
+            [self.x - up, self.y - width, self.x + down, self.y]
+        } else {
+            [self.x, self.y - up, self.x + width, self.y + down]
+        }
+    }
+}
+
+impl Drawing {
+    /// Each text and what it covers by the measures of the font: left, top, right and bottom in pixels.
+    pub fn text_boxes(&self) -> Vec<(&str, [f64; 4])> {
+        let texts = self.shapes.iter().filter_map(|shape| match shape {
+            Shape::Text(text) => Some((&*text.text, text.area())),
+            Shape::Path { .. } => None,
+        });
+        texts.collect()
+    }
+}
+
+/// Positions of ticks with the digits that they need after the point.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Ticks {
+    pub(super) values: Vec<f64>,
+    pub(super) step: f64,
+    decimals: usize,
+}
+
+/// A power of ten, by multiplication: the same bits everywhere.
+fn ten_to(power: i32) -> f64 {
+    let mut value = 1.0;
+    for _ in 0..power.abs() {
+        value *= 10.0;
+    }
+    if power < 0 { 1.0 / value } else { value }
+}
+
+/// The smallest of 1, 2, 5 times a power of ten that is not below `least`, and the power.
+fn round_up(least: f64) -> (f64, i32) {
+    let mut power = 0;
+    while power > -300 && ten_to(power) > least {
+        power -= 1;
+    }
+    while power < 307 && ten_to(power + 1) <= least {
+        power += 1;
+    }
+    for digit in [1.0, 2.0, 5.0] {
+        if digit * ten_to(power) >= least {
+            return (digit * ten_to(power), power);
+        }
+    }
+    (10.0 * ten_to(power), power + 1)
+}
+
+/// The largest power of ten that is not above a value.
+fn magnitude(value: f64) -> i32 {
+    let mut power = 0;
+    while power > -300 && ten_to(power) > value * (1.0 + 1e-9) {
+        power -= 1;
+    }
+    while power < 308 && ten_to(power + 1) <= value * (1.0 + 1e-9) {
+        power += 1;
+    }
+    power
+}
+
+/// Number of ticks above which a span is refused by all callers' sizes.
+const MOST: f64 = 1e3;
+
+impl Ticks {
+    /// Ticks between `low` and `high`, about `most` of them at the most.
+    pub(super) fn new(low: f64, high: f64, most: usize) -> Self {
+        let width = (high - low).clamp(f64::MIN_POSITIVE, f64::MAX);
+        // Numbers this close together relative to their size cannot be written apart.
+        let least = (width / most.max(1) as f64).max(1e-9 * low.abs().max(high.abs()));
+        let (step, power) = round_up(least);
+        // In steps, so that nothing overflows.
+        let slack = 1e-9;
+        let first = (low / step - slack).ceil();
+        let count = ((high / step + slack).floor() - first).clamp(-1.0, MOST) + 1.0;
+        let values = (0..count as usize)
+            .map(|k| (first + k as f64) * step)
+            .filter(|v| v.is_finite())
+            .collect();
+        Self { values, step, decimals: usize::try_from(-power).unwrap_or(0) }
+    }
+
+    /// A tick's number: `-1.5`, `0`, `2e12`.
+    pub(super) fn text(&self, value: f64) -> String {
+        let value = if value.abs() < 1e-6 * self.step { 0.0 } else { value };
+        if value == 0.0 && (self.decimals > 6 || self.step >= 1e6) {
+            return "0".into();
+        }
+        if self.decimals > 6 || value.abs() >= 1e7 {
+            // As many digits as distinguish neighbours.
+            let digits = magnitude(value.abs()) - magnitude(self.step);
+            let digits = usize::try_from(digits).unwrap_or_default();
+            return format!("{value:.digits$e}").replace('-', "−");
+        }
+        format!("{value:.*}", self.decimals).replace('-', "−")
+    }
+
+    pub(super) fn texts(&self) -> impl Iterator<Item = (f64, String)> + '_ {
+        self.values.iter().map(|&v| (v, self.text(v)))
+    }
+}
+
+/// What an axis spans for these values: up to the next round numbers, with 0 where it is near.
+pub(super) fn span(low: f64, high: f64, most: usize) -> (f64, f64) {
+    if !(low.is_finite() && high.is_finite()) || low > high {
+        return (0.0, 1.0);
+    }
+    let (mut low, mut high) = (low, high);
+    if low > 0.0 && low < 0.5 * high {
+        low = 0.0;
+    }
+    if high < 0.0 && high > 0.5 * low {
+        high = 0.0;
+    }
+    let near = low.abs().max(high.abs());
+    if high - low <= 1e-9 * near || near == 0.0 {
+        let half = if near == 0.0 { 0.5 } else { 0.05 * near };
+        (low, high) = (low - half, high + half);
+    }
+    let (step, _) = round_up((high - low) / most.max(1) as f64);
+    let slack = 1e-6;
+    let (low, high) = ((low / step + slack).floor() * step, (high / step - slack).ceil() * step);
+    // The next round number may be none any more.
+    (low.max(f64::MIN), high.min(f64::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texts(low: f64, high: f64, most: usize) -> Vec<String> {
+        Ticks::new(low, high, most).texts().map(|(_, t)| t).collect()
+    }
+
+    #[test]
+    fn ticks_are_round() {
+        assert_eq!(texts(0.0, 5.0, 6), ["0", "1", "2", "3", "4", "5"]);
+        assert_eq!(texts(-1.0, 5.5, 4), ["0", "2", "4"]);
+        assert_eq!(texts(-0.3, 0.3, 6), ["−0.3", "−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3"]);
+        assert_eq!(texts(0.0, 2e12, 2), ["0", "1e12", "2e12"]);
+        assert_eq!(texts(1e9, 1.2e9, 2), ["1.0e9", "1.1e9", "1.2e9"]);
+        assert_eq!(texts(1e-9, 3e-9, 4), ["1.0e−9", "1.5e−9", "2.0e−9", "2.5e−9", "3.0e−9"]);
+    }
+
+    #[test]
+    fn spans_end_at_round_numbers() {
+        assert_eq!(span(0.2, 4.3, 5), (0.0, 5.0));
+        assert_eq!(span(-0.4, 4.3, 5), (-1.0, 5.0));
+        let near = |(low, high): (f64, f64), (a, b): (f64, f64)| {
+            assert!((low - a).abs() < 1e-12 && (high - b).abs() < 1e-12, "{low} {high}");
+        };
+        near(span(3.0, 3.0, 5), (2.8, 3.2));
+        near(span(0.0, 0.0, 5), (-0.6, 0.6));
+        assert_eq!(span(f64::NAN, 1.0, 5), (0.0, 1.0));
+        assert_eq!(span(f64::INFINITY, f64::NEG_INFINITY, 5), (0.0, 1.0));
+        let (low, high) = span(0.0, f64::MAX, 8);
+        assert_eq!((low, high), (0.0, f64::MAX));
+        assert_eq!(texts(low, high, 8), ["0", "5e307", "1.0e308", "1.5e308"]);
+    }
 }

@@ -1,8 +1,9 @@
 //! Places a chart: margins from the measured texts, axes, series, marks, legend, notes.
 
-use super::chart::{Axis, Chart, Mark, Panel, Shown};
-use super::drawing::{Drawing, Paint, PanelPlace, Shape, Shows, Stroke, Text};
-use super::ticks::{self, Ticks};
+use super::chart::{
+    self, Axis, Chart, Drawing, Mark, Paint, Panel, PanelPlace, Shape, Shown, Shows, Stroke, Text,
+    Ticks,
+};
 use super::{font, style, thin};
 
 /// Around the picture, in pixels.
@@ -82,7 +83,7 @@ fn span(axis: &Axis, values: impl Iterator<Item = f64>, most: usize) -> (f64, f6
     let finite = values.filter(|v| v.is_finite()).map(|v| v * axis.scale);
     let (low, high) =
         finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
-    let (low, high) = ticks::span(low, high, most);
+    let (low, high) = chart::span(low, high, most);
     (low / axis.scale, high / axis.scale)
 }
 

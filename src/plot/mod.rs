@@ -15,17 +15,15 @@
 //! ```
 
 mod chart;
-mod drawing;
 mod font;
 mod layout;
-mod png;
 mod style;
 mod svg;
 mod thin;
-mod ticks;
 
-pub use chart::{Axis, Band, Chart, Mark, Panel, Series, Shown};
-pub(crate) use drawing::PanelPlace;
-pub use drawing::{Drawing, Paint, Shape, Shows, Stroke, Text, TextBox};
+pub(crate) use chart::PanelPlace;
+pub use chart::{
+    Axis, Band, Chart, Drawing, Mark, Paint, Panel, Series, Shape, Shown, Shows, Stroke, Text,
+};
 pub(crate) use style::looks_for_pages;
 pub(crate) use svg::SvgFor;

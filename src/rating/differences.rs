@@ -1,9 +1,18 @@
-//! Differences of two signals, sample by sample and over all of them; in magnitude and in phase.
+//! Differences of two signals, sample by sample and over all of them; in magnitude and in phase;
+//! and the mean decelerations by which a collision is judged.
+//!
+//! And CORA: correlation and analysis, a corridor and a cross-correlation.
+//!
+//! Gehre, Gades, Wernicke: Objective rating of signals using test and simulation responses,
+//! ESV 2009, paper 09-0407, with that paper's parameters.
 
 use std::f64::consts::{FRAC_PI_4, PI};
 
 use schemars::JsonSchema;
 use serde::Serialize;
+
+use super::iso18571::{MOST_SAMPLES, corridor};
+use super::signal::{best, plain};
 
 /// Values below this share of the largest magnitude have no relative error worth its name.
 const SMALL: f64 = 0.05;
@@ -12,7 +21,7 @@ const CANCELS: f64 = 0.05;
 
 /// Mean of `|p − r|/|r|` over the samples where `|r|` is at least 5 % of its maximum.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Pointwise {
+pub(crate) struct Pointwise {
     /// The mean; 0 where the signals agree.
     pub mean: f64,
     /// Share of the samples that are left out.
@@ -21,7 +30,7 @@ pub struct Pointwise {
 
 /// The largest difference.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct MaxAbs {
+pub(crate) struct MaxAbs {
     /// `|p − r|`, in the unit of the signals.
     pub value: f64,
     /// Where it is, in s.
@@ -95,7 +104,7 @@ pub(crate) fn integral_error(along: &[f64], reference: &[f64], prediction: &[f64
 
 /// Errors of magnitude and of phase, and their combination; 0 where the signals agree.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct MagnitudePhase {
+pub(crate) struct MagnitudePhase {
     /// Above 0 if the prediction is larger.
     pub magnitude: f64,
     /// 0 to 1.
@@ -146,6 +155,196 @@ pub(crate) fn russell(reference: &[f64], prediction: &[f64]) -> Option<Magnitude
 }
 
 #[cfg(test)]
+mod magnitude_phase_tests {
+    use super::*;
+
+    #[test]
+    fn a_doubled_signal_has_no_phase_error() {
+        let (r, p) = ([3.0, -4.0], [6.0, -8.0]);
+        let sg = sprague_geers(&r, &p).unwrap();
+        assert_eq!((sg.magnitude, sg.phase, sg.combined), (1.0, 0.0, 1.0));
+        // m = (100 − 25)/50 = 1.5.
+        let russell = russell(&r, &p).unwrap();
+        assert!((russell.magnitude - 2.5_f64.log10()).abs() < 1e-15);
+        assert!((russell.combined - FRAC_PI_4.sqrt() * 2.5_f64.log10()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_quarter_wave_is_half_and_the_opposite_all() {
+        for rate in [sprague_geers, russell] {
+            let quarter = rate(&[1.0, 0.0], &[0.0, 1.0]).unwrap();
+            assert!(quarter.magnitude == 0.0 && (quarter.phase - 0.5).abs() < 1e-15);
+            assert_eq!(rate(&[1.0, 2.0], &[-1.0, -2.0]).unwrap().phase, 1.0);
+            let angle = rate(&[1.0, 0.0], &[1.0, 1e-12]).unwrap().phase * PI;
+            assert!((angle - 1e-12).abs() < 1e-24, "{angle}");
+            assert_eq!(rate(&[0.0, 0.0], &[1.0, 2.0]), None);
+        }
+        assert!(russell(&[2.0, 0.0], &[1.0, 0.0]).unwrap().magnitude < 0.0);
+    }
+}
+
+/// Exponent K_V of the progression.
+const PROGRESSION_EXPONENT: i32 = 10;
+/// Shifts up to D_MIN of the interval count as none, from D_MAX on as the worst.
+const D_MIN: f64 = 0.01;
+const D_MAX: f64 = 0.12;
+/// Weights of progression, size and phase.
+const WEIGHTS: [f64; 3] = [0.5, 0.25, 0.25];
+
+/// Ratings of CORA, each from 0 to 1.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct Cora {
+    /// Corridor of 5 % and 50 % of the reference's largest magnitude, exponent 2.
+    pub corridor: f64,
+    /// `(½ (K + 1))¹⁰` of the largest correlation K.
+    pub progression: f64,
+    /// The smaller over the larger sum of squares after the shift.
+    pub size: f64,
+    /// 1 for a shift up to 1 % of the interval, falling to 0 at 12 %.
+    pub phase: f64,
+    /// Half the progression, a quarter of size and of phase each.
+    pub cross_correlation: f64,
+    /// Mean of corridor and cross-correlation.
+    pub rating: f64,
+    /// By how much the prediction is late, in s; negative if it is early. At most a fifth of
+    /// the interval.
+    pub late_s: f64,
+}
+
+/// Rates a prediction by CORA over the whole interval that is given: the program's automatic
+/// choice of an interval is left to the caller.
+///
+/// Equal lengths of 2 to [`MOST_SAMPLES`], samples at `interval_s`; `None` otherwise. Signals are
+/// shifted within the interval, and 80 % of it (INT_MIN) must overlap. A signal of zeros
+/// correlates with nothing: progression, size and phase are 0, unless both are zero.
+pub(crate) fn cora(reference: &[f64], prediction: &[f64], interval_s: f64) -> Option<Cora> {
+    let n = reference.len();
+    if !(2..=MOST_SAMPLES).contains(&n) || prediction.len() != n {
+        return None;
+    }
+    let corridor = corridor(reference, prediction);
+    let shift = best(reference, prediction, plain);
+    let [progression, size, phase] = match shift {
+        Some(shift) => {
+            let [r, p] = shift.overlap(reference, prediction);
+            let share = shift.late.unsigned_abs() as f64 / (n - 1) as f64;
+            [
+                (0.5 * (shift.correlation + 1.0)).powi(PROGRESSION_EXPONENT),
+                size(r, p),
+                ((D_MAX - share) / (D_MAX - D_MIN)).clamp(0.0, 1.0),
+            ]
+        }
+        None if reference == prediction => [1.0; 3],
+        None => [0.0; 3],
+    };
+    let parts = [progression, size, phase];
+    let cross_correlation = parts.iter().zip(WEIGHTS).map(|(part, weight)| part * weight).sum();
+    Some(Cora {
+        corridor,
+        progression,
+        size,
+        phase,
+        cross_correlation,
+        rating: 0.5 * (corridor + cross_correlation),
+        late_s: shift.map_or(0.0, |s| s.late as f64 * interval_s),
+    })
+}
+
+/// The smaller over the larger sum of squares.
+fn size(a: &[f64], b: &[f64]) -> f64 {
+    let squares = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+    let (a, b) = (squares(a), squares(b));
+    if a == b { 1.0 } else { a.min(b) / a.max(b) }
+}
+
+/// The deceleration begins above this share of its largest value.
+const THRESHOLD: f64 = 0.05;
+const MOVING_MEAN_S: f64 = 0.120;
+
+/// Means of a deceleration, in the unit of the signal.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct Deceleration {
+    /// Mean of −a from the first instant at which it exceeds 5 % of its largest value until it
+    /// next returns to zero or the interval ends; null if it is never above zero. Where only the
+    /// contact decelerates, that is the time in which the net contact force is above zero.
+    pub mean: Option<f64>,
+    /// Time at which that mean begins, in s.
+    pub from_s: Option<f64>,
+    /// Time at which it ends, in s.
+    pub to_s: Option<f64>,
+    /// Whether the interval ends while −a still exceeds 5 % of its largest value: the mean is then
+    /// of a part of the deceleration.
+    pub is_cut: bool,
+    /// Largest mean of −a over 120 ms; null if the interval is shorter.
+    pub largest_120ms_mean: Option<f64>,
+}
+
+impl Deceleration {
+    /// Of an acceleration `a` over `time_s` (s, increasing, equal intervals, at least two).
+    ///
+    /// Between samples −a is linear. EN 15227 limits the mean while the net contact force is
+    /// above zero; of a signal without its force the deceleration itself gives start and end.
+    pub(crate) fn of(time_s: &[f64], acceleration: &[f64]) -> Self {
+        let deceleration: Vec<f64> = acceleration.iter().map(|a| -a).collect();
+        let phase = phase(time_s, &deceleration);
+        Self {
+            mean: phase.map(|p| p.mean),
+            from_s: phase.map(|p| p.from_s),
+            to_s: phase.map(|p| p.to_s),
+            is_cut: phase.is_some_and(|p| p.is_cut),
+            largest_120ms_mean: largest_moving_mean(time_s, &deceleration, MOVING_MEAN_S),
+        }
+    }
+}
+
+#[derive(Clone, Copy)]
+struct Phase {
+    mean: f64,
+    from_s: f64,
+    to_s: f64,
+    is_cut: bool,
+}
+
+fn phase(time_s: &[f64], deceleration: &[f64]) -> Option<Phase> {
+    let largest = deceleration.iter().copied().fold(0.0, f64::max);
+    let above = |&d: &f64| d > THRESHOLD * largest && d > 0.0;
+    let first = deceleration.iter().position(above)?;
+    let length = deceleration[first..].iter().take_while(|&&d| d > 0.0).count();
+    let after = first + length;
+    let last = after - 1;
+    let mut area = integral(&time_s[first..after], &deceleration[first..after]);
+    let mut to_s = time_s[last];
+    // The zero lies between two samples.
+    if let Some(&below) = deceleration.get(after) {
+        let share = deceleration[last] / (deceleration[last] - below);
+        let part_s = share * (time_s[after] - time_s[last]);
+        area += 0.5 * deceleration[last] * part_s;
+        to_s += part_s;
+    }
+    let from_s = time_s[first];
+    let mean = if to_s > from_s { area / (to_s - from_s) } else { deceleration[first] };
+    let is_cut = after == deceleration.len() && above(&deceleration[last]);
+    Some(Phase { mean, from_s, to_s, is_cut })
+}
+
+/// Largest mean of `values` over any `length_s` that begins at a sample; equal intervals.
+fn largest_moving_mean(time_s: &[f64], values: &[f64], length_s: f64) -> Option<f64> {
+    let interval_s = (time_s[time_s.len() - 1] - time_s[0]) / (time_s.len() - 1) as f64;
+    let steps = (length_s / interval_s).round() as usize;
+    if steps == 0 || steps >= values.len() {
+        return None;
+    }
+    let mut sums = vec![0.0];
+    let mut sum = 0.0;
+    for pair in values.windows(2) {
+        sum += 0.5 * (pair[0] + pair[1]);
+        sums.push(sum);
+    }
+    let means = sums.iter().zip(&sums[steps..]).map(|(a, b)| (b - a) / steps as f64);
+    means.max_by(f64::total_cmp)
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
 
@@ -182,33 +381,101 @@ mod tests {
         assert_eq!(integral_error(&[0.0, 1.0, 2.0], &zero, &one), None);
         assert_eq!(max_abs(&zero, &zero, &one).value, 1.0);
     }
-}
-
-#[cfg(test)]
-mod magnitude_phase_tests {
-    use super::*;
 
     #[test]
-    fn a_doubled_signal_has_no_phase_error() {
-        let (r, p) = ([3.0, -4.0], [6.0, -8.0]);
-        let sg = sprague_geers(&r, &p).unwrap();
-        assert_eq!((sg.magnitude, sg.phase, sg.combined), (1.0, 0.0, 1.0));
-        // m = (100 − 25)/50 = 1.5.
-        let russell = russell(&r, &p).unwrap();
-        assert!((russell.magnitude - 2.5_f64.log10()).abs() < 1e-15);
-        assert!((russell.combined - FRAC_PI_4.sqrt() * 2.5_f64.log10()).abs() < 1e-15);
+    fn a_scaled_signal_by_hand() {
+        // 1.3 times a plateau: distance 0.3 of the maximum, squares 1.69.
+        let p = [1.3; 100];
+        let rated = cora(&[1.0; 100], &p, 1e-4).unwrap();
+        let corridor = (0.2_f64 / 0.45).powi(2);
+        assert!((rated.corridor - corridor).abs() < 1e-14);
+        assert!((rated.progression - 1.0).abs() < 1e-14 && rated.phase == 1.0);
+        assert!((rated.size - 1.0 / 1.69).abs() < 1e-14);
+        let cross = 0.5 + 0.25 / 1.69 + 0.25;
+        assert!((rated.cross_correlation - cross).abs() < 1e-14);
+        assert!((rated.rating - 0.5 * (corridor + cross)).abs() < 1e-14);
     }
 
     #[test]
-    fn a_quarter_wave_is_half_and_the_opposite_all() {
-        for rate in [sprague_geers, russell] {
-            let quarter = rate(&[1.0, 0.0], &[0.0, 1.0]).unwrap();
-            assert!(quarter.magnitude == 0.0 && (quarter.phase - 0.5).abs() < 1e-15);
-            assert_eq!(rate(&[1.0, 2.0], &[-1.0, -2.0]).unwrap().phase, 1.0);
-            let angle = rate(&[1.0, 0.0], &[1.0, 1e-12]).unwrap().phase * PI;
-            assert!((angle - 1e-12).abs() < 1e-24, "{angle}");
-            assert_eq!(rate(&[0.0, 0.0], &[1.0, 2.0]), None);
-        }
-        assert!(russell(&[2.0, 0.0], &[1.0, 0.0]).unwrap().magnitude < 0.0);
+    fn the_phase_falls_between_one_and_twelve_percent() {
+        let pulse = |at: usize| -> Vec<f64> { (0..1001).map(|i| f64::from(i == at)).collect() };
+        let phase = |late: usize| cora(&pulse(400), &pulse(400 + late), 1e-4).unwrap().phase;
+        assert_eq!([phase(0), phase(10), phase(120), phase(150)], [1.0, 1.0, 0.0, 0.0]);
+        assert!((phase(65) - 0.5).abs() < 1e-12);
+        assert!((cora(&pulse(400), &pulse(465), 1e-4).unwrap().late_s - 0.0065).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_progression_of_an_opposite_constant_is_nothing() {
+        let rated = cora(&[1.0; 100], &[-1.0; 100], 1e-4).unwrap();
+        assert_eq!((rated.progression, rated.size, rated.corridor), (0.0, 1.0, 0.0));
+    }
+
+    #[test]
+    fn zeros_correlate_with_nothing_but_zeros() {
+        assert_eq!(cora(&[0.0; 20], &[0.0; 20], 1e-4).unwrap().rating, 1.0);
+        assert_eq!(cora(&[0.0; 20], &[1.0; 20], 1e-4).unwrap().rating, 0.0);
+        assert_eq!(cora(&vec![0.0; MOST_SAMPLES + 1], &vec![0.0; MOST_SAMPLES + 1], 1e-4), None);
+    }
+
+    fn times(samples: usize) -> Vec<f64> {
+        (0..samples).map(|i| i as f64 * 1e-3).collect()
+    }
+
+    #[test]
+    fn half_a_sine_has_the_mean_of_two_over_pi() {
+        // 100 ms of deceleration from 10 ms on, then a rebound.
+        let time = times(200);
+        let a: Vec<f64> = time
+            .iter()
+            .map(|t| {
+                if *t < 0.01 {
+                    0.0
+                } else {
+                    -50.0 * ((t - 0.01) / 0.1 * std::f64::consts::PI).sin()
+                }
+            })
+            .collect();
+        let of = Deceleration::of(&time, &a);
+        // 5 % are passed 1.6 ms after the begin: the next sample is the first.
+        assert!((of.from_s.unwrap() - 0.012).abs() < 1e-12);
+        assert!((of.to_s.unwrap() - 0.110).abs() < 1e-6);
+        let x = 0.002 / 0.1 * std::f64::consts::PI;
+        let mean = 50.0 * (1.0 + x.cos()) / (std::f64::consts::PI - x);
+        assert!((of.mean.unwrap() - mean).abs() < 1e-2, "{of:?}");
+    }
+
+    #[test]
+    fn a_triangle_by_hand() {
+        // 0, 2, 4, 2, −2: above 0 from the first 2 to half way after the last: 2.5 steps.
+        let of = Deceleration::of(&times(5), &[0.0, -2.0, -4.0, -2.0, 2.0]);
+        assert!((of.mean.unwrap() - (3.0 + 3.0 + 0.5) / 2.5).abs() < 1e-12);
+        assert!((of.to_s.unwrap() - 3.5e-3).abs() < 1e-12);
+        assert_eq!(of.largest_120ms_mean, None);
+    }
+
+    #[test]
+    fn an_interval_that_ends_in_the_pulse_is_said() {
+        let cut = |a: &[f64]| Deceleration::of(&times(a.len()), a).is_cut;
+        assert!(cut(&[0.0, -2.0, -40.0, -20.0]));
+        assert!(!cut(&[0.0, -2.0, -40.0, -20.0, 1.0]));
+        assert!(!cut(&[0.0, -2.0, -40.0, -1.9]), "what remains is below 5 %");
+        assert!(!cut(&[0.0, -40.0, 1.0, -40.0]), "a second pulse is not in the mean");
+    }
+
+    #[test]
+    fn the_moving_mean_finds_the_plateau() {
+        let time = times(400);
+        let a: Vec<f64> =
+            time.iter().map(|t| if (0.1..0.2).contains(t) { -60.0 } else { 0.0 }).collect();
+        // 99 whole steps and two halves of one.
+        let mean = Deceleration::of(&time, &a).largest_120ms_mean.unwrap();
+        assert!((mean - 60.0 * 100.0 / 120.0).abs() < 1e-9, "{mean}");
+    }
+
+    #[test]
+    fn what_only_speeds_up_has_no_mean() {
+        assert_eq!(Deceleration::of(&times(5), &[1.0; 5]).mean, None);
+        assert_eq!(Deceleration::of(&times(5), &[0.0; 5]).mean, None);
     }
 }

@@ -4,12 +4,11 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::shift::{best, centred};
+use super::signal::{best, centred};
 use crate::signal::derivative;
 
 /// Largest phase error that has a score, as a share of the samples; nothing is shifted further.
 const PHASE_ERROR: f64 = 0.2;
-/// Magnitude error at which the score is zero.
 const MAGNITUDE_ERROR: f64 = 0.5;
 /// Slope error at which the score is zero.
 const SLOPE_ERROR: f64 = 2.0;
@@ -26,7 +25,7 @@ pub(crate) const MOST_SAMPLES: usize = 20_000;
 
 /// Scores of ISO/TS 18571, each from 0 to 1, and the rating they give.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Iso18571 {
+pub(crate) struct Iso18571 {
     /// Corridor score Z.
     pub corridor: f64,
     /// Phase score E_P.
@@ -47,7 +46,7 @@ pub struct Iso18571 {
 /// Grades of ISO/TS 18571, table 3.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Grade {
+pub(crate) enum Grade {
     /// R above 0.94.
     Excellent,
     /// Above 0.80.

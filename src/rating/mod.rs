@@ -11,25 +11,9 @@
 //! every shift, so rounding chooses its shift (0.1 i against 0.2 i + 0.3: one sample, and E_P = 0.95), while correlations
 //! within 1e-12 are equal here. Of a reference of zeros it gives NaN. No public program computes CORA (pyisomme 1.1 has ISO/TS
 //! 18571 only, through the same package); the tests compute it a second way.
-//!
-//! ```
-//! use crumple::rating::{RatingSettings, Signal, rate};
-//!
-//! let time_s: Vec<f64> = (0..=1500).map(|i| 1e-4 * f64::from(i)).collect();
-//! let wave = |factor: f64| time_s.iter().map(|t| factor * (20.0 * t).sin()).collect::<Vec<f64>>();
-//! let reference = Signal::new("FE", time_s.clone(), wave(1.0))?;
-//! let prediction = Signal::new("run", time_s.clone(), wave(1.3))?;
-//! let rating = rate(&reference, &prediction, &RatingSettings::default())?;
-//! assert!((rating.l1_ratio.unwrap() - 0.3).abs() < 1e-9);
-//! assert!((rating.iso18571.unwrap().rating - 0.713).abs() < 1e-3);
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
 
-pub(crate) mod cora;
-pub(crate) mod deceleration;
 pub(crate) mod differences;
 pub(crate) mod iso18571;
-pub(crate) mod shift;
 mod signal;
 
 use schemars::JsonSchema;
@@ -38,22 +22,18 @@ use serde::Serialize;
 use crate::error::Error;
 use crate::signal::l1_ratio;
 use crate::signal::peaks::{MatchedPeak, matched_peaks};
-pub use cora::Cora;
-use cora::cora;
-pub use deceleration::Deceleration;
-pub use differences::{MagnitudePhase, MaxAbs, Pointwise};
+pub(crate) use differences::{Cora, Deceleration, MagnitudePhase, MaxAbs, Pointwise};
 use differences::{
-    integral_error, max_abs, peak_norm, pointwise, rms_ratio, russell, sprague_geers,
+    cora, integral_error, max_abs, peak_norm, pointwise, rms_ratio, russell, sprague_geers,
 };
+pub(crate) use iso18571::Iso18571;
 use iso18571::iso18571;
-pub use iso18571::{Grade, Iso18571};
-pub use signal::Signal;
-pub(crate) use signal::{INTERVAL_S, Pair};
+pub(crate) use signal::{INTERVAL_S, Pair, Signal};
 
 /// What two signals are.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Quantity {
+pub(crate) enum Quantity {
     /// Means of the deceleration are rated as well.
     Acceleration,
     /// Anything else.
@@ -72,7 +52,7 @@ impl Quantity {
 
 /// How two signals are rated.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct RatingSettings {
+pub(crate) struct RatingSettings {
     /// What the signals are.
     pub quantity: Quantity,
     /// Class of a CFC filter for both, such as 60.
@@ -88,11 +68,11 @@ pub struct RatingSettings {
 /// `r` is the reference, `p` the prediction, at the same times. Errors are 0 and scores 1 where
 /// they agree. What has no meaning, such as a ratio to zeros, is null.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Rating {
+pub(crate) struct Rating {
     /// The signal that is taken as right.
-    pub reference: Rated,
+    pub(crate) reference: Rated,
     /// The signal that is rated.
-    pub prediction: Rated,
+    pub(crate) prediction: Rated,
     /// What the signals are.
     pub quantity: Quantity,
     /// Class of the filter on both signals, run over all their samples; null without one.
@@ -112,32 +92,32 @@ pub struct Rating {
     /// Mean of `|p − r|` over the largest `|r|`.
     pub peak_norm: Option<f64>,
     /// Relative differences sample by sample.
-    pub pointwise: Option<Pointwise>,
+    pub(crate) pointwise: Option<Pointwise>,
     /// The largest difference and its time.
-    pub max_abs: MaxAbs,
+    pub(crate) max_abs: MaxAbs,
     /// The first two peaks of the reference, upwards or, where its largest magnitude is negative,
     /// downwards; they stand out by at least a tenth of the largest.
-    pub peaks: Vec<Peak>,
+    pub(crate) peaks: Vec<Peak>,
     /// `∫p/∫r − 1` over time: of a force the error of its impulse, of an acceleration that of the
     /// change of speed; null where the reference's positive and negative parts nearly cancel.
     pub integral_error: Option<f64>,
     /// Measure of Sprague and Geers.
-    pub sprague_geers: Option<MagnitudePhase>,
+    pub(crate) sprague_geers: Option<MagnitudePhase>,
     /// Measure of Russell.
-    pub russell: Option<MagnitudePhase>,
+    pub(crate) russell: Option<MagnitudePhase>,
     /// Null over more than 2 s.
-    pub iso18571: Option<Iso18571>,
+    pub(crate) iso18571: Option<Iso18571>,
     /// Null over more than 2 s.
-    pub cora: Option<Cora>,
+    pub(crate) cora: Option<Cora>,
     /// Of accelerations: positive where the body is slowed down, so −a.
-    pub deceleration: Option<Decelerations>,
+    pub(crate) deceleration: Option<Decelerations>,
     /// What a reader of these numbers should know.
     pub warnings: Vec<String>,
 }
 
 /// A signal that was rated.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Rated {
+pub(crate) struct Rated {
     /// Name of its column.
     pub name: String,
     /// Its own samples, before anything is done to it.
@@ -157,7 +137,7 @@ impl Rated {
 
 /// A peak of the reference and the peak of the prediction that is nearest to it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Peak {
+pub(crate) struct Peak {
     /// Time of the reference's peak, in s.
     pub time_s: f64,
     /// Value of the reference, in the unit of the signals.
@@ -171,7 +151,7 @@ pub struct Peak {
 
 /// Decelerations of both signals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct Decelerations {
+pub(crate) struct Decelerations {
     /// Of the reference.
     pub reference: Deceleration,
     /// Of the prediction.
@@ -187,7 +167,7 @@ pub struct Decelerations {
 ///
 /// # Errors
 /// If they have no or too few common times, or cannot be filtered.
-pub fn rate(
+pub(crate) fn rate(
     reference: &Signal,
     prediction: &Signal,
     settings: &RatingSettings,
@@ -356,6 +336,17 @@ mod tests {
                 prop_assert!((0.0..=1.0).contains(&score), "{:?} {:?}", iso, cora);
             }
         }
+    }
+
+    #[test]
+    fn a_wave_that_is_three_tenths_too_high() {
+        let time_s: Vec<f64> = (0..=1500).map(|i| 1e-4 * f64::from(i)).collect();
+        let wave = |factor: f64| time_s.iter().map(|t| factor * (20.0 * t).sin()).collect();
+        let reference = Signal::new("FE", time_s.clone(), wave(1.0)).unwrap();
+        let prediction = Signal::new("run", time_s.clone(), wave(1.3)).unwrap();
+        let rating = rate(&reference, &prediction, &RatingSettings::default()).unwrap();
+        assert!((rating.l1_ratio.unwrap() - 0.3).abs() < 1e-9);
+        assert!((rating.iso18571.unwrap().rating - 0.713).abs() < 1e-3);
     }
 
     #[test]

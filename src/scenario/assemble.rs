@@ -3,10 +3,9 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::end::{Crush, crush_between, crush_end, plates};
 use super::layout::{Connection, ConnectionKind, End, Layout, Role, layout};
 use super::place::{self, Origin};
-use super::spring::{Spring, scale_error, spring};
+use super::spring::{Crush, Spring, crush_between, crush_end, plates, scale_error, spring};
 use super::{CheckedScenario, CurveInUse, CurveSource, LawName, LimitsTable, Prepared, Sources};
 use crate::curve::Masses;
 use crate::error::{Error, ErrorCode, KeyPath, error};

@@ -30,13 +30,11 @@
 
 mod assemble;
 mod check;
-mod end;
 mod layout;
 mod local;
 mod place;
 mod sources;
 mod spring;
-pub(crate) mod summary;
 mod tables;
 
 use std::path::Path;
@@ -45,7 +43,9 @@ use serde::Serialize;
 
 use crate::error::{Document, Error, Place};
 use crate::manifest;
-use crate::multibody::{Chain, Run, RunSettings, simulate};
+use crate::multibody::{
+    Chain, InterfaceHistory, Run, RunSettings, STANDARD_GRAVITY_M_PER_S2, simulate,
+};
 pub(crate) use assemble::{PLATES, adjust};
 pub use check::CheckedScenario;
 pub(crate) use local::assemble;
@@ -134,4 +134,110 @@ pub fn load(path: &Path) -> Result<Prepared, Error> {
     let scenario = read(path)?;
     let sources = Sources::read(path, &scenario)?;
     assemble(path, &scenario, &sources)
+}
+
+/// A run in numbers.
+#[derive(Serialize)]
+pub(crate) struct Summary<'a> {
+    /// In the order of the scenario.
+    pub(crate) bodies: Vec<BodySummary<'a>>,
+    pub(crate) interfaces: Vec<InterfaceSummary<'a>>,
+    pub(crate) step_s: f64,
+    /// Time of the last output, which the final speeds are for.
+    pub(crate) end_s: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) limits: Option<Limits<'a>>,
+}
+
+#[derive(Serialize)]
+pub(crate) struct BodySummary<'a> {
+    pub(crate) name: &'a str,
+    #[serde(skip)]
+    pub(crate) mass_kg: f64,
+    #[serde(skip)]
+    pub(crate) initial_v_m_per_s: f64,
+    pub(crate) final_v_m_per_s: f64,
+    mean_deceleration_m_per_s2: f64,
+    pub(crate) mean_deceleration_g: f64,
+    /// Whether it is the crush zone of a vehicle's end, which stops at once: its decelerations are
+    /// no vehicle's.
+    pub(crate) is_crush_zone: bool,
+    /// The run ended before the contact of that mean did: it is the mean of a part.
+    pub(crate) still_loaded_at_end: bool,
+    /// Over the 120 ms in which it is largest in magnitude; null in a shorter run.
+    pub(crate) moving_mean_deceleration_g: Option<f64>,
+}
+
+#[derive(Serialize)]
+pub(crate) struct InterfaceSummary<'a> {
+    pub(crate) name: &'a str,
+    #[serde(flatten)]
+    pub(crate) history: &'a InterfaceHistory,
+    #[serde(flatten)]
+    pub(crate) used: &'a CurveInUse,
+}
+
+/// Mean decelerations against a limit.
+#[derive(Serialize)]
+pub(crate) struct Limits<'a> {
+    pub(crate) standard: &'a str,
+    pub(crate) edition: &'a str,
+    pub(crate) mean_deceleration_limit_g: f64,
+    /// Trains that it is for; null for all.
+    pub(crate) trains: &'a Option<Vec<String>>,
+    /// Bodies whose mean deceleration is over it.
+    pub(crate) over: Vec<&'a str>,
+    /// Interfaces that were crushed beyond the data of their curves: then `over` is not a verdict.
+    pub(crate) beyond_data: Vec<&'a str>,
+    pub(crate) statement: String,
+}
+
+impl Prepared {
+    /// What `run`, a run of this scenario, comes to.
+    pub(crate) fn summary<'a>(&'a self, run: &'a Run) -> Summary<'a> {
+        let (bodies, interfaces) = (self.chain.bodies(), self.chain.interfaces());
+        let is_crush_zone =
+            |i| interfaces.iter().filter_map(|i| i.stopping.as_ref()).any(|s| s.zone == i);
+        let of_body = |&i: &usize| {
+            let (body, history) = (&bodies[i], &run.bodies[i]);
+            let in_g = |a_m_per_s2: f64| a_m_per_s2 / STANDARD_GRAVITY_M_PER_S2;
+            BodySummary {
+                name: &body.name,
+                mass_kg: body.mass_kg,
+                initial_v_m_per_s: body.speed_m_per_s,
+                final_v_m_per_s: history.final_v_m_per_s,
+                mean_deceleration_m_per_s2: history.mean_deceleration_m_per_s2,
+                mean_deceleration_g: in_g(history.mean_deceleration_m_per_s2),
+                is_crush_zone: is_crush_zone(i),
+                still_loaded_at_end: history.is_loaded_at_end,
+                moving_mean_deceleration_g: history.moving_mean_deceleration_m_per_s2.map(in_g),
+            }
+        };
+        let bodies: Vec<BodySummary<'a>> = self.order.iter().map(of_body).collect();
+        let limits = self.limits.as_ref().map(|limits| Limits {
+            standard: &limits.standard,
+            edition: &limits.edition,
+            mean_deceleration_limit_g: limits.mean_deceleration_g,
+            trains: &limits.trains,
+            over: (self.order.iter().zip(&bodies))
+                .filter(|(i, _)| self.limited.contains(i))
+                .filter(|(_, body)| body.mean_deceleration_g.abs() > limits.mean_deceleration_g)
+                .map(|(_, body)| body.name)
+                .collect(),
+            beyond_data: run.beyond_data().map(|k| &*interfaces[k].name).collect(),
+            statement: format!(
+                "mean decelerations come from a one-dimensional model and say nothing about survival space; they are not evidence of conformity with {}:{}",
+                limits.standard, limits.edition
+            ),
+        });
+        Summary {
+            bodies,
+            interfaces: (interfaces.iter().zip(&run.interfaces).zip(&self.used))
+                .map(|((of, history), used)| InterfaceSummary { name: &of.name, history, used })
+                .collect(),
+            step_s: run.step_s,
+            end_s: run.time_s.last().copied().unwrap_or_default(),
+            limits,
+        }
+    }
 }

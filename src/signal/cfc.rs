@@ -6,27 +6,17 @@ use super::interpolate;
 
 /// Why a history cannot be filtered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum CfcError {
+pub(crate) enum CfcError {
     /// The samples are too far apart for the class.
     #[error(
         "the interval of {:.3} ms is too long for CFC{class}: at most {:.3} ms; use a lower class, filter = \"none\", or a shorter output interval", interval_s * 1e3, longest_s * 1e3
     )]
-    TooCoarse {
-        /// The class, such as 60.
-        class: u32,
-        /// Time between samples, in s.
-        interval_s: f64,
-        /// Longest time between samples that the class allows, in s.
-        longest_s: f64,
-    },
+    TooCoarse { class: u32, interval_s: f64, longest_s: f64 },
     /// The samples are not evenly spaced.
     #[error(
         "the filter needs about equal intervals, but they differ by up to {spread_percent:.0} % of their mean: use filter = \"none\""
     )]
-    Uneven {
-        /// By how much the intervals differ, in % of their mean.
-        spread_percent: f64,
-    },
+    Uneven { spread_percent: f64 },
 }
 
 /// Largest deviation of an interval from the mean that still counts as equal.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use super::lsdyna::deck::{self, Deck, DeckInterface, TitledEntity};
+use super::lsdyna::deck::{self, Deck};
 use super::lsdyna::line::Lines;
 use super::{Entity, SolverFile, source};
 use crate::error::Error;
@@ -140,25 +140,19 @@ pub(crate) fn fill_titles(file: &mut SolverFile, deck: &Deck) -> usize {
 
 /// The same for the entities of a section.
 pub(crate) fn fill_entity_titles(section: &str, entities: &mut [Entity], deck: &Deck) -> usize {
-    let named = |list: &[TitledEntity]| -> Vec<(i64, Option<String>)> {
-        list.iter().map(|n| (n.id, n.title.clone())).collect()
-    };
-    let interfaces = |list: &[DeckInterface]| -> Vec<(i64, Option<String>)> {
-        list.iter().filter_map(|n| Some((n.id?, n.title.clone()))).collect()
-    };
-    let titles = match section.split('/').next().unwrap_or_default() {
-        "nodout" => named(&deck.history_nodes),
-        "matsum" => named(&deck.parts),
-        "rcforc" | "sleout" => interfaces(&deck.contacts),
-        "rwforc" => interfaces(&deck.rigid_walls),
+    let list = match section.split('/').next().unwrap_or_default() {
+        "nodout" => &deck.history_nodes,
+        "matsum" => &deck.parts,
+        "rcforc" | "sleout" => &deck.contacts,
+        "rwforc" => &deck.rigid_walls,
         _ => return 0,
     };
-    let titles: HashMap<i64, String> =
-        titles.into_iter().rev().filter_map(|(id, title)| Some((id, title?))).collect();
+    let titles: HashMap<i64, &String> =
+        list.iter().rev().filter_map(|of| Some((of.id?, of.title.as_ref()?))).collect();
     let mut filled = 0;
     for Entity { id, title } in entities.iter_mut().filter(|e| e.title.is_none()) {
         if let Some(found) = titles.get(&id.id) {
-            *title = Some(found.clone());
+            *title = Some((*found).clone());
             filled += 1;
         }
     }

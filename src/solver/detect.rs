@@ -3,14 +3,14 @@
 use std::io::{self, Read};
 use std::path::Path;
 
-use super::family::restart_number;
+use super::runs::restart_number;
 use super::source::{self, Source, Stream};
 use super::{Selection, SolverFile, lsdyna, openradioss, problem, unknown_format};
 use crate::error::{Error, error};
 use crate::guess;
 
 /// One kind of file: its name, how to recognise it, how to read it.
-pub struct Format {
+pub(crate) struct Format {
     /// Named as the solver names the file.
     pub name: &'static str,
     /// Kind of its entities, for messages.
@@ -81,7 +81,7 @@ impl Format {
 
 /// All files we read, in the order in which their signatures are tried. To add one: write its
 /// module with its `FORMAT`, and add that here.
-pub const FORMATS: &[Format] = &[
+pub(crate) const FORMATS: &[Format] = &[
     lsdyna::nodout::FORMAT,
     lsdyna::rcforc::FORMAT,
     lsdyna::rwforc::FORMAT,
@@ -111,9 +111,14 @@ pub(crate) fn entity_word(section: &str) -> &'static str {
     FORMATS.iter().find(|format| format.name == name).map_or("entity", |format| format.entity)
 }
 
-/// The formats' names, for messages: `nodout, rcforc, …`.
+/// The names of the formats that are read, such as `nodout`.
+pub fn formats() -> impl Iterator<Item = &'static str> {
+    FORMATS.iter().map(|f| f.name)
+}
+
+/// The same for messages: `nodout, rcforc, …`.
 pub(crate) fn format_names() -> String {
-    FORMATS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ")
+    formats().collect::<Vec<_>>().join(", ")
 }
 
 pub(super) fn named(name: &str) -> Result<&'static Format, Error> {
@@ -128,7 +133,6 @@ pub(super) fn named(name: &str) -> Result<&'static Format, Error> {
 /// few enough that a large foreign file is refused at once.
 const DETECT_LINES: u64 = 100_000;
 
-/// The format of a file.
 pub(super) fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format, Error> {
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned());
     let name = name.as_deref().map(without_job_id);
@@ -193,7 +197,7 @@ fn look_at(
                 error!(SolverFile at "deck", "{path}: this is a keyword deck, which holds no histories; crumple inspect shows what it says of its run"),
             );
         }
-        is_lsdyna |= line.number == 2 && lsdyna::header::version(line.text).is_some();
+        is_lsdyna |= line.number == 2 && lsdyna::line::version(line.text).is_some();
         if line.number <= 2 {
             continue;
         }

@@ -24,14 +24,11 @@
 
 pub(crate) mod decks;
 mod detect;
-mod family;
 pub(crate) mod lsdyna;
 mod openradioss;
 mod problem;
-mod restart;
 pub(crate) mod runs;
 mod selection;
-mod solver_file;
 pub(crate) mod source;
 mod states;
 mod zeros;
@@ -41,21 +38,19 @@ use std::path::Path;
 use crate::error::{Error, error};
 use crate::guess;
 pub use decks::read_deck;
-pub use detect::{FORMATS, Format};
+pub use detect::formats;
+pub(crate) use detect::{Format, entity_word, format_names, is_named_like_binary, without_job_id};
 use detect::{check_format, detect, files_in, named};
-pub(crate) use detect::{entity_word, format_names, is_named_like_binary, without_job_id};
-pub(crate) use family::family;
-use family::missing_continuation;
-pub use lsdyna::deck::contents::{DeckPlace, ImpactSpeed, Include, Output, StatedUnits};
-pub use lsdyna::deck::parameters::Value;
-pub use lsdyna::deck::{Deck, DeckInterface, TitledEntity, parse_deck};
+pub use lsdyna::deck::context::Value;
+pub use lsdyna::deck::{Deck, DeckEntity, DeckPlace, Include, Output, StatedUnits, parse_deck};
 pub use lsdyna::nodout::Blocks;
-pub use lsdyna::nodout::blocks::Column;
+pub use lsdyna::nodout::stride::Column;
 pub use problem::{Problem, ProblemCode};
+pub(crate) use runs::family;
+use runs::missing_continuation;
 use selection::check_selection;
 pub(crate) use selection::no_component;
-pub use selection::{Selection, WantedId};
-pub use solver_file::{Entity, NoDataReason, SolverFile, WithoutData};
+pub use selection::{Entity, NoDataReason, Selection, SolverFile, WantedId, WithoutData};
 pub use source::{Access, Source, Window};
 
 /// Reads the selected histories of the file at `path`, of one section.
@@ -148,7 +143,6 @@ fn unknown_format(path: &Path, looks_like: impl std::fmt::Display) -> Error {
     error!(SolverFile at "format", "{path}: {looks_like}: the readers take {known}")
 }
 
-/// A file and what continues it.
 type Parts = Vec<Box<dyn Source>>;
 
 /// Opens a file and what continues it.

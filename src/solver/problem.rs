@@ -97,7 +97,6 @@ impl Problem {
         Self { columns, ..Self::at(self.code, place, self.message) }
     }
 
-    /// A problem at a place.
     pub(in crate::solver) fn at(code: ProblemCode, place: Option<Place>, message: String) -> Self {
         let line = place.map(|p| p.line).filter(|&line| line > 0);
         Self { code, line, byte: place.map(|p| p.byte), columns: None, message }
@@ -121,7 +120,6 @@ pub(in crate::solver) fn of_time(time: &[f64]) -> Vec<Problem> {
     problems
 }
 
-/// Where a problem is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Place {
     /// Counted from 1; 0 in a binary file.

@@ -1,14 +1,11 @@
 //! Studies: which runs there are, and how each becomes a case.
 //!
-//! A manifest as written ([`Manifest`]) is checked once ([`Study`]); the files of a run are found
+//! A manifest as written (`Manifest`) is checked once ([`Study`]); the files of a run are found
 //! and hashed (`LocatedRun`); only if they changed are they read and the case extracted.
 
 mod check;
 pub(crate) mod extract;
 pub(crate) mod files;
-mod locate;
-mod manifest;
-mod read;
 
 use std::path::{Path, PathBuf};
 
@@ -18,9 +15,8 @@ use crate::error::{Document, Error, KeyPath};
 use crate::file::absolute;
 use crate::manifest as toml_file;
 use crate::unit::SpeedKind;
-pub(crate) use locate::LocatedRun;
-pub use manifest::Manifest;
-pub(crate) use manifest::{RunEntry, StudyKind};
+pub(crate) use check::{Manifest, RunEntry, StudyKind};
+pub(crate) use files::LocatedRun;
 
 /// A manifest that makes sense, and where it stands.
 #[derive(Clone, Debug)]

@@ -20,7 +20,6 @@
 //! laws and only changes the numbers in them (`scenario::adjust`). `cargo bench --bench sweep` prints the saving.
 
 mod journal;
-mod merge;
 mod row;
 mod run;
 mod statistics;
@@ -37,10 +36,9 @@ use crate::manifest;
 use crate::multibody::Chain;
 use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName, Spread};
 use crate::scenario::{self, CheckedScenario, Prepared, Scenario, Sources};
-pub use journal::{WriteOptions, write, write_rows};
-pub use merge::merge;
+pub use journal::{WriteOptions, merge, write, write_rows};
 pub use run::Chunk;
-pub use statistics::ColumnStatistics;
+pub(crate) use statistics::ColumnStatistics;
 use variables::Variable;
 pub use variables::VariableSummary;
 
@@ -55,7 +53,7 @@ pub struct Shard {
 
 impl Shard {
     /// The whole sweep.
-    pub const WHOLE: Self = Self { index: 1, count: 1 };
+    pub(crate) const WHOLE: Self = Self { index: 1, count: 1 };
 
     /// Shard `index` of `count`, counted from 1.
     pub fn new(index: u64, count: u64) -> Option<Self> {
@@ -114,7 +112,7 @@ pub struct Report {
     /// The first few messages of rows that failed, by item.
     pub messages: Vec<(u64, String)>,
     /// Statistics of the columns of numbers.
-    pub columns: Vec<ColumnStatistics>,
+    pub(crate) columns: Vec<ColumnStatistics>,
 }
 
 impl Report {

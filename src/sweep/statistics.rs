@@ -13,22 +13,15 @@ const SHARES: [f64; 3] = [0.05, 0.5, 0.95];
 
 /// Statistics of one column, over the rows that have a number there.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ColumnStatistics {
-    /// Name of the column.
+pub(crate) struct ColumnStatistics {
     pub column: String,
-    /// Rows with a number.
     pub count: u64,
-    /// Smallest number.
     pub min: Option<f64>,
-    /// Mean.
     pub mean: Option<f64>,
-    /// Largest number.
     pub max: Option<f64>,
     /// 5 %, by linear interpolation between order statistics.
     pub p5: Option<f64>,
-    /// 50 %, as `p5`.
     pub median: Option<f64>,
-    /// 95 %, as `p5`.
     pub p95: Option<f64>,
     /// Rows that the quantiles rest on.
     pub quantiles_from: u64,

@@ -9,6 +9,7 @@ use crate::unit::{LengthText, MassText, SignedSpeedText};
 
 /// One column of varied values.
 pub(crate) struct Variable {
+    /// Name of its column.
     pub column: String,
     target: Target,
     /// Values multiply what is there.

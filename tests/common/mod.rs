@@ -103,10 +103,45 @@ pub fn is_thorough() -> bool {
 /// The date of everything that is built here, so that what is built twice is the same.
 const DATE: &str = "1767225600";
 
+/// Arguments of the program: a line of words, or a list of them.
+pub trait Arguments: std::fmt::Debug {
+    fn words(&self) -> Vec<&str>;
+}
+
+impl Arguments for str {
+    fn words(&self) -> Vec<&str> {
+        self.split(' ').collect()
+    }
+}
+
+impl Arguments for String {
+    fn words(&self) -> Vec<&str> {
+        self.split(' ').collect()
+    }
+}
+
+impl Arguments for [&str] {
+    fn words(&self) -> Vec<&str> {
+        self.to_vec()
+    }
+}
+
+impl<const N: usize> Arguments for [&str; N] {
+    fn words(&self) -> Vec<&str> {
+        self.to_vec()
+    }
+}
+
+impl Arguments for Vec<&str> {
+    fn words(&self) -> Vec<&str> {
+        self.clone()
+    }
+}
+
 /// Runs the program in `folder`.
-pub fn crumple_in(folder: &Path, arguments: &[&str]) -> Output {
+pub fn crumple_in(folder: &Path, arguments: &(impl Arguments + ?Sized)) -> Output {
     Command::new(env!("CARGO_BIN_EXE_crumple"))
-        .args(arguments)
+        .args(arguments.words())
         .env("SOURCE_DATE_EPOCH", DATE)
         .current_dir(folder)
         .output()
@@ -114,7 +149,7 @@ pub fn crumple_in(folder: &Path, arguments: &[&str]) -> Output {
 }
 
 /// Runs the program in `folder`, which must exit with 0; returns its standard output.
-pub fn crumple_ok(folder: &Path, arguments: &[&str]) -> String {
+pub fn crumple_ok(folder: &Path, arguments: &(impl Arguments + ?Sized)) -> String {
     let output = crumple_in(folder, arguments);
     let error = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "crumple {arguments:?} failed:\n{error}");
@@ -122,12 +157,22 @@ pub fn crumple_ok(folder: &Path, arguments: &[&str]) -> String {
 }
 
 /// Runs the program in `folder`, which must exit with `code`; returns what it said of it.
-pub fn crumple_fails(folder: &Path, code: i32, arguments: &[&str]) -> String {
+pub fn crumple_fails(folder: &Path, code: i32, arguments: &(impl Arguments + ?Sized)) -> String {
     let output = crumple_in(folder, arguments);
     let error = said(&output);
     assert_eq!(output.status.code(), Some(code), "crumple {arguments:?} said:\n{error}");
     assert!(!error.contains("panicked"), "{error}");
     error
+}
+
+/// Asserts that a text holds what is expected.
+#[track_caller]
+pub fn says(text: &str, expected: &str) {
+    assert!(text.contains(expected), "\"{expected}\" is not in:\n{text}");
+}
+
+pub fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap()
 }
 
 /// What a failing command said: on standard error, and with --json as a document on standard output.

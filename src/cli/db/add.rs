@@ -8,10 +8,9 @@ use crate::formats::read::{READERS, ReadOptions};
 use crate::import::{self, Item, Settings};
 use crate::unit::UnitSystem;
 
-use super::super::curve_file::CurveFile;
+use super::super::arguments::CurveFile;
 use super::arguments::{FORCES, mass, one_of, parameter, speed, units};
-use super::list::print_group;
-use super::row::case_row;
+use super::list::{case_row, print_group};
 use super::{CommandResult, Failure, GlobalOptions, output, usage};
 
 /// Files, the group they join, and data missing from them.

@@ -9,8 +9,7 @@ use crate::database::CasePath;
 use crate::plural::counted;
 use serde::Serialize;
 
-use super::chosen::Chosen;
-use super::{CommandResult, GlobalOptions, usage};
+use super::{Chosen, CommandResult, GlobalOptions, usage};
 
 /// What happens to a case whose name another curve has, and whether anything is written.
 #[derive(clap::Args)]

@@ -2,20 +2,20 @@
 //! together.
 
 mod add;
-mod check;
-mod chosen;
-mod export;
 mod join;
-mod label;
 mod list;
 mod rename;
-mod row;
 mod show;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::{CommandResult, Failure, GlobalOptions, Outcome, arguments, output, usage};
-pub(super) use row::{case_columns, case_row};
+use crate::curate::{self, Selection, SpeedRange};
+use crate::curve::Case;
+use crate::database::Database;
+use crate::database::check::{self, Checked};
+use crate::plural::counted;
+pub(super) use list::{case_columns, case_row};
 
 /// List, show, check, add, rename, join, tag and export cases of a curve database
 #[derive(clap::Args)]
@@ -116,13 +116,13 @@ A build adds the runs of its study again: to drop a case for good, remove its ru
   crumple db tag curves.h5 --case lead-car-wall/72kmh --remove reviewed --add doubtful
   crumple db ls curves.h5 --tag reviewed
 Tags and notes stay with a case when it is built again.")]
-    Tag(label::TagArgs),
+    Tag(rename::TagArgs),
     /// Add and remove notes on cases
     #[command(after_help = "Examples:
   crumple db note curves.h5 --case lead-car-wall/72kmh --add \"the nose rides up from 80 ms on\"
   crumple db note curves.h5 --case lead-car-wall/72kmh --clear
 Tags and notes stay with a case when it is built again.")]
-    Note(label::NoteArgs),
+    Note(rename::NoteArgs),
     /// Write cases and their samples as CSV tables
     ///
     /// cases.csv has a line for each case, curves.csv one for each sample at the common interval,
@@ -131,21 +131,101 @@ Tags and notes stay with a case when it is built again.")]
   crumple db export curves.h5 -o tables
   crumple db export curves.h5 --group lead-car-wall --originals -o tables
 docs/databases.md has recipes for pandas, polars, DuckDB, Parquet and xarray.")]
-    Export(export::Args),
+    Export(ExportArgs),
 }
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     match &args.command {
         Command::Ls(args) => list::run(args, options),
         Command::Show(args) => show::run(args, options),
-        Command::Check { database } => check::run(database, options),
+        Command::Check { database } => check_values(database, options),
         Command::Add(args) => add::run(args, options),
         Command::Rm(args) => rename::remove(args, options),
         Command::Rename(args) => rename::rename(args, options),
         Command::Merge(args) => join::merge(args, options),
         Command::Copy(args) => join::copy(args, options),
-        Command::Tag(args) => label::tag(args, options),
-        Command::Note(args) => label::note(args, options),
-        Command::Export(args) => export::run(args, options),
+        Command::Tag(args) => rename::tag(args, options),
+        Command::Note(args) => rename::note(args, options),
+        Command::Export(args) => export(args, options),
     }
+}
+
+/// Which cases; every option narrows the choice.
+#[derive(clap::Args)]
+struct Chosen {
+    /// Group; may be repeated [default: all]
+    #[arg(long, help_heading = "Which cases")]
+    group: Vec<String>,
+    /// Case of the group, or GROUP/CASE; may be repeated [default: all]
+    #[arg(long, help_heading = "Which cases")]
+    case: Vec<String>,
+    /// Impact speeds: 20km/h..40km/h, ..40km/h, 20km/h.. or 36km/h
+    #[arg(long, value_name = "RANGE", allow_hyphen_values = true, help_heading = "Which cases")]
+    speed: Option<SpeedRange>,
+    /// Tag that the cases have, or one of several; may be repeated
+    #[arg(long, help_heading = "Which cases")]
+    tag: Vec<String>,
+}
+
+impl Chosen {
+    fn selection(&self) -> Selection {
+        Selection {
+            groups: self.group.clone(),
+            cases: self.case.clone(),
+            speed: self.speed,
+            tags: self.tag.clone(),
+        }
+    }
+
+    /// The same, which may not be everything by mistake; `what` is what happens to the cases.
+    fn some(&self, what: &str) -> Result<Selection, Failure> {
+        let selection = self.selection();
+        if selection.is_all() {
+            usage(format!("choose the cases to be {what} with --group, --case, --speed or --tag"))
+        } else {
+            Ok(selection)
+        }
+    }
+}
+
+/// `crumple db check`: every stored value checked against the others.
+fn check_values(path: &Path, options: GlobalOptions) -> CommandResult {
+    let checked = check::check(path)?;
+    let Checked { cases, findings } = &checked;
+    options.show(&checked, |out| {
+        for f in findings {
+            writeln!(out, "{}/{}: {}", f.group, f.case, f.message)?;
+        }
+        let (cases, found) = (counted(*cases, "case"), counted(findings.len(), "finding"));
+        writeln!(out, "{cases} checked, {found}")
+    })?;
+    Ok(Outcome::warned_if(!findings.is_empty()))
+}
+
+/// Cases, and the folder for their tables.
+#[derive(clap::Args)]
+struct ExportArgs {
+    /// Curve database
+    database: PathBuf,
+    #[command(flatten)]
+    chosen: Chosen,
+    /// Folder to write to; created if it does not exist
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Also write originals.csv, the curves at the solver's rate
+    #[arg(long)]
+    originals: bool,
+}
+
+fn export(args: &ExportArgs, options: GlobalOptions) -> CommandResult {
+    let database = Database::read(&args.database)?;
+    let selection = args.chosen.selection();
+    let cases: Vec<&Case> = selection.find(&args.database, &database)?;
+    let files = curate::write_tables(&cases, &args.output, args.originals)?;
+    let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    let database = args.database.display().to_string();
+    let document = document! { database: database, cases: cases.len(), files: &files };
+    options
+        .show(&document, |out| files.iter().try_for_each(|file| writeln!(out, "wrote {file}")))?;
+    Ok(Outcome::Clean)
 }

@@ -12,10 +12,8 @@ use crate::table::Table;
 use crate::unit::{Shown, km_per_h};
 
 use super::super::predict::draw_curve;
-use super::chosen::Chosen;
-use super::list::print_group;
-use super::row::full_case;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, output, usage};
+use super::list::{full_case, print_group};
+use super::{Chosen, CommandResult, Failure, GlobalOptions, Outcome, output, usage};
 
 /// A database, and which of its cases are shown how.
 #[derive(clap::Args)]

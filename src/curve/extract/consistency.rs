@@ -1,10 +1,10 @@
 //! Consistency of the histories of one record along time: impulse against momentum, displacement against velocity,
 //! force against motion, the output interval against the curve.
 
+use super::Notes;
 use super::error::ExtractError;
-use super::from_contact::FromContact;
 use super::record::Record;
-use super::remarks::Notes;
+use super::start::FromContact;
 use crate::curve::contact::milliseconds;
 use crate::curve::energy::{IMPOSSIBLE_ALONG_TIME, ImpossibleRun, POSSIBLE};
 use crate::curve::{Curve, Masses, loading};

@@ -7,31 +7,15 @@ use crate::signal::cfc;
 
 /// Reasons why a run has no curve.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ExtractError {
+pub(crate) enum ExtractError {
     /// A history has fewer than two states.
     #[error("{what} holds {}: at least 2 are needed", crate::plural::counted(*states, "state"))]
-    TooShort {
-        /// Which file it comes from.
-        origin: Origin,
-        /// What it is of.
-        what: &'static str,
-        /// Number of its states.
-        states: usize,
-    },
+    TooShort { origin: Origin, what: &'static str, states: usize },
     /// A value is not a finite number.
     #[error(
         "{what} of state {state} is {value}: expected a finite number; look for the problem with crumple inspect"
     )]
-    NotFinite {
-        /// Which file it comes from.
-        origin: Origin,
-        /// What it is of.
-        what: String,
-        /// The state, counted from 1.
-        state: usize,
-        /// The value.
-        value: f64,
-    },
+    NotFinite { origin: Origin, what: String, state: usize, value: f64 },
     /// The force never exceeds what counts as contact.
     #[error(
         "the force is never positive: there is no contact in this record; look at id, component, sign and units"
@@ -45,38 +29,19 @@ pub enum ExtractError {
         "{key} = {at} lies outside the record, which runs from {first} to {last}",
         at = milliseconds(*time_s), first = milliseconds(*first_s), last = milliseconds(*last_s)
     )]
-    OutsideRecord {
-        /// Its key in the manifest.
-        key: &'static str,
-        /// The time, in s.
-        time_s: f64,
-        /// First time of the record, in s.
-        first_s: f64,
-        /// Last time of the record, in s.
-        last_s: f64,
-    },
+    OutsideRecord { key: &'static str, time_s: f64, first_s: f64, last_s: f64 },
     /// The bodies never close the gap that the manifest states.
     #[error(
         "gap = {gap_mm} mm is never closed: the bodies approach each other by at most {most_mm:.3} mm",
         gap_mm = gap_m * 1e3, most_mm = most_m * 1e3
     )]
-    GapStaysOpen {
-        /// The gap, in m.
-        gap_m: f64,
-        /// How far the bodies approach, in m.
-        most_m: f64,
-    },
+    GapStaysOpen { gap_m: f64, most_m: f64 },
     /// The deflection never reaches the offset that the manifest states.
     #[error(
         "offset = {offset_mm} mm is never made up for: the deflection grows by {most_mm:.3} mm at most",
         offset_mm = offset_m * 1e3, most_mm = most_m * 1e3
     )]
-    OffsetTooLarge {
-        /// The offset, in m.
-        offset_m: f64,
-        /// How far the deflection grows, in m.
-        most_m: f64,
-    },
+    OffsetTooLarge { offset_m: f64, most_m: f64 },
     /// No crash can have such a curve.
     #[error("{0}")]
     ImpossibleRun(#[from] energy::ImpossibleRun),
@@ -92,10 +57,7 @@ pub enum ExtractError {
     #[error(
         "the manifest gives no speed and the file has no {component} to take it from: add speed = \"…km/h\""
     )]
-    NoSpeed {
-        /// Component that would have given it.
-        component: String,
-    },
+    NoSpeed { component: String },
     /// The body does not move in the first state.
     #[error("the body is at rest in the first state: add speed = \"…km/h\" to the run")]
     Standing,
@@ -120,11 +82,9 @@ impl ExtractError {
     }
 }
 
-/// Which history an error speaks of.
+/// The history that an error speaks of, by its file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Origin {
-    /// The file of the deflection.
+pub(crate) enum Origin {
     Motion,
-    /// The file of the force.
     Force,
 }

@@ -9,28 +9,21 @@
 
 mod consistency;
 pub(crate) mod error;
-mod from_contact;
-pub(crate) mod input;
 mod record;
-mod remarks;
-mod speed;
 mod start;
 
-use super::recipe::Filter;
-use super::{Curve, EnergyAudit, ForceKind, Quality, RecordedCurves, energy, loading};
+use super::recipe::{Filter, RecordedMotion, Sampling};
+use super::{Curve, EnergyAudit, ForceKind, Masses, Quality, RecordedCurves, energy, loading};
+use crate::error::{Error, ErrorCode};
+use crate::history::History;
 use crate::plural::counted;
 use crate::signal::cfc;
-use crate::unit::Speed;
+use crate::unit::{Speed, SpeedKind, UnitSystem};
 use consistency::Motion;
-pub use error::ExtractError;
-use from_contact::FromContact;
-pub(crate) use input::{DeckSpeed, StatedContact};
-pub use input::{Measured, MeasuredForce, Setup, Stated};
+pub(crate) use error::ExtractError;
 pub(crate) use record::Record;
 use record::sample;
-pub(crate) use remarks::Notes;
-use speed::{ImpactSpeed, SpeedBy};
-use start::Start;
+use start::{FromContact, ImpactSpeed, SpeedBy, Start};
 
 /// The curve of a run and what was found on the way.
 #[derive(Clone, Debug, PartialEq)]
@@ -51,8 +44,16 @@ pub struct Extracted {
 /// original rate), deflection from contact on, speed, resampling, audit and its bounds.
 ///
 /// # Errors
-/// [`ExtractError`] says which history cannot be used and what to change.
-pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, ExtractError> {
+/// It says which history cannot be used and what to change.
+pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, Error> {
+    of_run(measured, setup).map_err(|reason| Error::below(ErrorCode::Run, reason))
+}
+
+/// The same, for callers that decide by the reason.
+pub(crate) fn of_run(
+    measured: &Measured<'_>,
+    setup: &Setup<'_>,
+) -> Result<Extracted, ExtractError> {
     let (record, remarks) = Record::of(measured, setup)?;
     curve_of(record, remarks, setup)
 }
@@ -130,7 +131,6 @@ pub(crate) fn curve_of(
     })
 }
 
-/// Filters the record's force.
 fn filter(class: u32, record: &mut Record) -> Result<Notes, ExtractError> {
     let mut remarks = Notes::default();
     let filtered = cfc::filter(class, &record.time_s, &record.force_n)?;
@@ -172,4 +172,125 @@ fn audited(curve: &Curve, balance: energy::EnergyBalance) -> Notes {
         ));
     }
     remarks
+}
+
+/// Choices that were made, and what the user should check.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Notes {
+    /// Choices made, for the record.
+    pub notes: Vec<String>,
+    /// What the user should check.
+    pub warnings: Vec<String>,
+}
+
+impl Notes {
+    /// A single warning.
+    pub(crate) fn warning(warning: String) -> Self {
+        Self { notes: Vec::new(), warnings: vec![warning] }
+    }
+
+    /// Adds a note.
+    pub(crate) fn note(&mut self, note: impl Into<String>) {
+        self.notes.push(note.into());
+    }
+
+    /// Adds a warning.
+    pub(crate) fn warn(&mut self, warning: impl Into<String>) {
+        self.warnings.push(warning.into());
+    }
+
+    /// Adds other remarks after these.
+    pub(crate) fn append(&mut self, other: Self) {
+        self.notes.extend(other.notes);
+        self.warnings.extend(other.warnings);
+    }
+
+    /// The result of a step, whose remarks are added after these.
+    pub(crate) fn take<T>(&mut self, (result, remarks): (T, Self)) -> T {
+        self.append(remarks);
+        result
+    }
+}
+
+/// The histories of one run, in the solver's units.
+pub struct Measured<'a> {
+    /// Those of the solver files.
+    pub units: UnitSystem,
+    /// Of the recipe's node.
+    pub displacement: &'a History,
+    /// Of the node that is subtracted, if the recipe names one.
+    pub minus_displacement: Option<&'a History>,
+    /// Velocities of the same nodes, where the file has them.
+    pub velocity: Option<&'a History>,
+    /// Of the node that is subtracted.
+    pub minus_velocity: Option<&'a History>,
+    /// The force of the curve.
+    pub force: MeasuredForce<'a>,
+    /// Contact force that marks the start of contact for a body force.
+    pub contact: Option<&'a History>,
+}
+
+/// The force, or what makes it.
+pub enum MeasuredForce<'a> {
+    /// The force on the obstacle.
+    Contact(&'a History),
+    /// Acceleration or velocity of the body's node, to be multiplied by its mass.
+    Body(&'a History, RecordedMotion),
+}
+
+/// Settings of a run in the manifest.
+#[derive(Clone, Debug)]
+pub struct Setup<'a> {
+    /// Of the force.
+    pub filter: Filter,
+    /// Common times.
+    pub sampling: Sampling,
+    /// What the speed is measured against.
+    pub kind: SpeedKind,
+    /// One of two identical bodies against the symmetry plane: closing speed and
+    /// deflection are twice the run's.
+    pub half_model: bool,
+    /// Of the body, or of both bodies.
+    pub masses: Masses,
+    /// Of the run, if the manifest gives it.
+    pub manifest_speed_m_per_s: Option<f64>,
+    /// Of the run in m/s, if its deck gives it, of half a model the closing speed; with the name of the
+    /// deck and the line of the velocity in it.
+    pub deck_speed: Option<(f64, String)>,
+    /// Share of the peak force above which a record is in contact.
+    pub contact_threshold: f64,
+    /// Settings of the record in the run's entry.
+    pub stated: Stated,
+    /// Names and speeds of the study's other runs, to name what was mistaken for what.
+    pub others: &'a [(String, f64)],
+}
+
+/// What a run's entry states of its record, in the place of what would be found in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stated {
+    /// When contact begins.
+    pub contact: Option<StatedContact>,
+    /// Deflection at contact.
+    pub offset_m: f64,
+    /// Solver's time after which the record is not used.
+    pub truncate_s: Option<f64>,
+    /// 1 or −1: factor that makes the file's force positive in compression.
+    pub force_sign: Option<f64>,
+    /// Accept the run whatever its energy and impulse.
+    pub accept_energy: bool,
+}
+
+/// Where contact begins by the manifest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StatedContact {
+    /// At this time of the solver.
+    Time {
+        /// In s.
+        s: f64,
+    },
+    /// When the bodies have moved by this from the first state.
+    Gap {
+        /// In m.
+        m: f64,
+    },
 }

@@ -1,8 +1,7 @@
 //! Motion and force of a run in SI, at common times.
 
 use super::error::{ExtractError, Origin};
-use super::input::{Measured, MeasuredForce, Setup};
-use super::remarks::Notes;
+use super::{Measured, MeasuredForce, Notes, Setup};
 use crate::curve::contact::milliseconds;
 use crate::curve::recipe::RecordedMotion;
 use crate::curve::{Curve, ForceKind, loading};

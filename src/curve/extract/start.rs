@@ -1,13 +1,11 @@
-//! Start of contact in a record.
+//! Start of contact in a record, the record from there on (time and deflection count from it), and the impact speed.
 
 use super::error::ExtractError;
-use super::from_contact::FromContact;
-use super::input::{Setup, StatedContact};
 use super::record::{Record, impulse};
-use super::remarks::Notes;
+use super::{Notes, Setup, StatedContact};
 use crate::curve::contact::{self, milliseconds};
 use crate::curve::{Curve, ForceKind, loading};
-use crate::unit::Shown;
+use crate::unit::{Shown, Speed, km_per_h};
 
 /// A beginning of the crush, as a share of it, that brings less than this share of the impulse
 /// is doubtful: light noses of real runs bring twice as much and more.
@@ -219,4 +217,161 @@ fn impulse_share_to(curve: &Curve, deflection_m: f64) -> f64 {
     let there = (0..=end).take_while(|&i| d[i] <= deflection_m).count().saturating_sub(1);
     let whole: f64 = steps(end).sum();
     if whole > 0.0 { steps(there + 1).sum::<f64>() / whole } else { 1.0 }
+}
+
+/// The record from contact on.
+pub(super) struct FromContact {
+    pub curve: Curve,
+    pub closing_m_per_s: Vec<f64>,
+    pub time_s: f64,
+    /// The last state that contact has not changed.
+    pub before: usize,
+}
+
+impl FromContact {
+    /// Time and deflection counted from contact, between two states where it lies there.
+    pub(crate) fn of(
+        record: &Record,
+        contact_s: f64,
+        offset_m: f64,
+    ) -> Result<(Self, Notes), ExtractError> {
+        let mut remarks = Notes::default();
+        let contact_m = record.at(&record.deflection_m, contact_s)?;
+        // A rebound can travel further than the crush: what the impact does first counts.
+        let direction = if record.at(&record.rate_m_per_s, contact_s)? < 0.0 { -1.0 } else { 1.0 };
+        let travel = |i: usize| direction * (record.deflection_m[i] - contact_m);
+        let next = record.time_s.partition_point(|&t| t <= contact_s);
+        let most_m = (next..record.time_s.len()).map(travel).fold(0.0, f64::max);
+        if most_m <= 0.0 {
+            return Err(ExtractError::NoDeflection);
+        }
+        if direction < 0.0 {
+            remarks.note("deflection: sign flipped, positive in compression");
+        }
+        let start_s = if offset_m >= 0.0 {
+            contact_s
+        } else {
+            closed_s(record, contact_s, -offset_m, most_m, travel)?
+        };
+        if offset_m != 0.0 {
+            remarks.note(format!("offset: the deflection at contact is {} mm", offset_m * 1e3));
+        }
+        let next = record.time_s.partition_point(|&t| t <= start_s);
+        let (mut time_s, mut deflection_m) = (vec![0.0], vec![offset_m.max(0.0)]);
+        let mut force_n = vec![record.at(&record.force_n, start_s)?];
+        let mut closing_m_per_s = vec![direction * record.at(&record.rate_m_per_s, start_s)?];
+        for i in next..record.time_s.len() {
+            time_s.push(record.time_s[i] - start_s);
+            deflection_m.push(travel(i) + offset_m);
+            force_n.push(record.force_n[i]);
+            closing_m_per_s.push(direction * record.rate_m_per_s[i]);
+        }
+        let contact = Self {
+            curve: Curve::new(time_s, deflection_m, force_n)?,
+            closing_m_per_s,
+            time_s: start_s,
+            before: record.time_s.partition_point(|&t| t <= contact_s).saturating_sub(1),
+        };
+        Ok((contact, remarks))
+    }
+}
+
+/// When the bodies have moved by `slack_m` after contact: where the surfaces meet later than
+/// found, the curve begins where they do.
+fn closed_s(
+    record: &Record,
+    contact_s: f64,
+    slack_m: f64,
+    most_m: f64,
+    travel: impl Fn(usize) -> f64,
+) -> Result<f64, ExtractError> {
+    let next = record.time_s.partition_point(|&t| t <= contact_s);
+    let i = (next..record.time_s.len())
+        .find(|&i| travel(i) >= slack_m)
+        .ok_or(ExtractError::OffsetTooLarge { offset_m: -slack_m, most_m })?;
+    let (from_s, from_m) =
+        if i == next { (contact_s, 0.0) } else { (record.time_s[i - 1], travel(i - 1)) };
+    let share = (slack_m - from_m) / (travel(i) - from_m);
+    Ok(from_s + share * (record.time_s[i] - from_s))
+}
+
+/// Two speeds of one impact may differ by this share before it is reported.
+const SAME_SPEED: f64 = 0.01;
+
+/// Source of the impact speed.
+#[derive(Clone, Copy, PartialEq)]
+pub(super) enum SpeedBy {
+    Manifest,
+    Record,
+    Deck,
+}
+
+pub(super) struct ImpactSpeed {
+    pub speed: Speed,
+    pub by: SpeedBy,
+    /// What the record shows before contact, or in its first state; `None` where the file has
+    /// no velocities.
+    pub recorded_m_per_s: Option<f64>,
+}
+
+impl ImpactSpeed {
+    /// The manifest's speed, else the record's, else the deck's. Where two of them differ, both
+    /// are reported. `before`: the last state that contact has not changed.
+    pub(crate) fn of(
+        setup: &Setup<'_>,
+        record: &Record,
+        before: usize,
+    ) -> Result<(Self, Notes), ExtractError> {
+        let mut remarks = Notes::default();
+        let differ = |a: f64, b: f64| (a - b).abs() > SAME_SPEED * a.max(b);
+        let first = record.first_rate_m_per_s.abs();
+        let recorded = record.missing_velocity.is_none().then(|| record.rate_m_per_s[before].abs());
+        if let Some(recorded) = recorded
+            && differ(first, recorded)
+        {
+            remarks.warn(format!(
+                "speed: the first state moves at {}, the last before contact at {}; the latter is used",
+                km_per_h(first),
+                km_per_h(recorded)
+            ));
+        }
+        let (m_per_s, by, name) = match (setup.manifest_speed_m_per_s, recorded) {
+            (Some(speed), _) => (speed, SpeedBy::Manifest, "manifest's"),
+            (None, Some(speed)) => (speed, SpeedBy::Record, "record's"),
+            (None, None) => match &setup.deck_speed {
+                Some((deck, _)) => (*deck, SpeedBy::Deck, "deck's"),
+                None => {
+                    let component = record.missing_velocity.clone().unwrap_or_default();
+                    return Err(ExtractError::NoSpeed { component });
+                }
+            },
+        };
+        let deck = setup.deck_speed.as_ref();
+        let of_record = recorded.map(|v| ("the record".to_string(), v));
+        let of_deck = deck.map(|(speed, place)| (format!("the deck {place}"), *speed));
+        for (who, other) in of_record.into_iter().chain(of_deck) {
+            if differ(m_per_s, other) {
+                remarks.warn(format!(
+                    "speed: {who} states {}; the {name} {} is used",
+                    km_per_h(other),
+                    km_per_h(m_per_s)
+                ));
+            }
+        }
+        match (by, deck) {
+            (SpeedBy::Record, _) => {
+                remarks.note(format!("speed: {} taken from the record", km_per_h(m_per_s)));
+            }
+            (SpeedBy::Deck, Some((_, place))) => {
+                remarks.note(format!("speed: {} taken from the deck {place}", km_per_h(m_per_s)))
+            }
+            _ => {}
+        }
+        if m_per_s > 0.0 {
+            let speed = Speed { m_per_s, kind: setup.kind };
+            Ok((Self { speed, by, recorded_m_per_s: recorded }, remarks))
+        } else {
+            Err(ExtractError::Standing)
+        }
+    }
 }

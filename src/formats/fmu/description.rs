@@ -1,7 +1,7 @@
 //! modelDescription.xml of FMI 2.0 and 3.0, and FMI 3's buildDescription.xml.
 
-use super::text::escaped;
 use super::{FmiVersion, Spring};
+use crate::formats::text::escaped;
 
 /// What a variable is.
 enum Role {

@@ -5,13 +5,20 @@
 //! versions; an export writes the curve into a marked block of it, so that users need no compiler.
 //! The same sources go into the archive, with the curve as a C file.
 
-mod archive;
 mod description;
 mod table;
-mod text;
 
-use crate::error::Error;
+use std::io::{Cursor, Write};
+
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+use super::thin::thinned;
+use super::{ExportCurve, Exported, Options};
+use crate::error::{Error, error};
+use crate::formats::text::{escaped, identifier};
 use crate::multibody::ForceLaw;
+use description::{build_description, model_description};
 use table::Table;
 
 /// Version of the interface.
@@ -83,7 +90,7 @@ pub fn binaries() -> impl Iterator<Item = &'static str> {
 pub fn archive(spring: &Spring<'_>, version: FmiVersion) -> Result<Vec<u8>, Error> {
     let token = token(spring, version, &Table::new(spring.law, "")?);
     let table = Table::new(spring.law, &token)?;
-    archive::pack(spring, version, &table, &token)
+    pack(spring, version, &table, &token)
 }
 
 /// GUID of FMI 2 and instantiation token of FMI 3: a hash of the content of the FMU.
@@ -108,6 +115,150 @@ fn token(spring: &Spring<'_>, version: FmiVersion, table: &Table) -> String {
     let hex = hash.finalize().to_hex();
     let part = |from: usize, to: usize| hex.get(from..to).unwrap_or_default();
     format!("{{{}-{}-{}-{}-{}}}", part(0, 8), part(8, 12), part(12, 16), part(16, 20), part(20, 32))
+}
+
+/// Points that an FMU's binary has room for.
+const MOST_POINTS: usize = 4096;
+
+pub(crate) fn write_fmi2(curve: &ExportCurve, options: &Options) -> Result<Exported, Error> {
+    write(curve, options, FmiVersion::Fmi2, "fmi2")
+}
+
+pub(crate) fn write_fmi3(curve: &ExportCurve, options: &Options) -> Result<Exported, Error> {
+    write(curve, options, FmiVersion::Fmi3, "fmi3")
+}
+
+fn write(
+    curve: &ExportCurve,
+    options: &Options,
+    version: FmiVersion,
+    format: &'static str,
+) -> Result<Exported, Error> {
+    if options.units.is_some() {
+        return Err(error!(
+            Export,
+            "{format} is always in SI: remove --units, or take a format that has units (csv, lsdyna, radioss, calculix, adams)"
+        ));
+    }
+    let mut notes = Vec::new();
+    let points = curve.deflection_m().len();
+    let thin;
+    let mut curve = curve;
+    if points > MOST_POINTS {
+        let loading = thinned(&curve.loading, MOST_POINTS, curve.end)?;
+        let end = loading.deflection_m().partition_point(|&d| d < curve.max_crush_m());
+        thin = curve.clone().through(loading, end);
+        curve = &thin;
+        notes.push(format!(
+            "{}: {MOST_POINTS} of {points} points are kept, with the same energy up to the maximum crush",
+            curve.headline()
+        ));
+    }
+    let law = curve.law();
+    let (name, description, facts) = (curve.identifier(), curve.headline(), curve.facts());
+    let spring = Spring { name: &name, description: &description, law: &law, facts: &facts };
+    let bytes = archive(&spring, version)?;
+    let there: Vec<&str> = binaries().collect();
+    notes.push(format!(
+        "{description}: the FMU holds the whole law, so it rebounds as crumple's own runs do (restitution {:.3}); ready binaries for {}",
+        curve.own_restitution(),
+        if there.is_empty() { "no platform".into() } else { there.join(" and ") }
+    ));
+    if !there.contains(&"win64") {
+        notes.push("there is no win64 binary, because x86_64-w64-mingw32-gcc was not found when crumple was built: on Windows the FMU must be compiled from its sources".into());
+    }
+    if !there.contains(&"linux64") {
+        notes.push("there is no linux64 binary, because no C compiler for it was found when crumple was built: on Linux the FMU must be compiled from its sources".into());
+    }
+    Ok(Exported {
+        files: vec![(format!("{}-{format}.fmu", curve.file_stem()), bytes)],
+        notes,
+        ..Exported::default()
+    })
+}
+
+/// Name of the generated C file.
+const TABLE_SOURCE: &str = "table.c";
+
+fn pack(
+    spring: &Spring<'_>,
+    version: FmiVersion,
+    table: &Table,
+    token: &str,
+) -> Result<Vec<u8>, Error> {
+    let name = identifier(spring.name);
+    let mut sources = SOURCES.to_vec();
+    let table_source = table.source();
+    sources.push((TABLE_SOURCE, &table_source));
+    sources.push(("table.h", TABLE_HEADER));
+    sources.sort_unstable();
+    let compiled: Vec<&str> =
+        sources.iter().map(|(file, _)| *file).filter(|file| file.ends_with(".c")).collect();
+
+    // A fixed date, so that the same input always gives the same bytes.
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .last_modified_time(DateTime::default())
+        .unix_permissions(0o644);
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    let mut add = |path: &str, bytes: &[u8]| -> Result<(), Error> {
+        archive.start_file(path, options).map_err(not_packed)?;
+        archive.write_all(bytes).map_err(not_packed)
+    };
+    let model = model_description(spring, version, &name, token, &compiled);
+    add("modelDescription.xml", model.as_bytes())?;
+    for binary in BINARIES {
+        let folder = binary.folders[version as usize];
+        let bytes = table.written_into(binary.bytes, folder)?;
+        add(&format!("binaries/{folder}/{name}.{}", binary.extension), &bytes)?;
+    }
+    if version == FmiVersion::Fmi3 {
+        add("sources/buildDescription.xml", build_description(&name, &compiled).as_bytes())?;
+    }
+    for (file, text) in &sources {
+        add(&format!("sources/{file}"), text.as_bytes())?;
+    }
+    add("documentation/index.html", documentation(spring).as_bytes())?;
+    add("extra/crumple/facts.json", facts(spring)?.as_bytes())?;
+    Ok(archive.finish().map_err(not_packed)?.into_inner())
+}
+
+fn not_packed(error: impl std::error::Error + Send + Sync + 'static) -> Error {
+    error!(Export, "the archive cannot be packed: {error}").caused_by(error)
+}
+
+/// What a user of the FMU must know.
+fn documentation(spring: &Spring<'_>) -> String {
+    let mut rows = String::new();
+    for (key, value) in spring.facts {
+        rows += &format!("<tr><th>{}</th><td>{}</td></tr>\n", escaped(key), escaped(value));
+    }
+    format!(
+        include_str!("documentation.html"),
+        name = escaped(spring.name),
+        description = escaped(spring.description),
+        rows = rows,
+    )
+}
+
+/// The facts for programs.
+fn facts(spring: &Spring<'_>) -> Result<String, Error> {
+    let mut facts = serde_json::Map::new();
+    facts.insert("name".into(), spring.name.into());
+    facts.insert("description".into(), spring.description.into());
+    for (key, value) in spring.facts {
+        // A warning in several lines, and several of them, are one text.
+        let text = match facts.get(*key).and_then(|before| before.as_str()) {
+            Some(before) => format!("{before} {value}"),
+            None => value.clone(),
+        };
+        facts.insert((*key).into(), text.into());
+    }
+    let text = serde_json::to_string_pretty(&facts);
+    let text = text.map_err(|e| {
+        error!(Export, "the facts of the curve cannot be written: {e}").caused_by(e)
+    })?;
+    Ok(text + "\n")
 }
 
 #[cfg(test)]

@@ -41,16 +41,13 @@ impl Table {
         if points > POINTS {
             return Err(error!(
                 Export,
-                "an FMU holds at most {room} points of a curve, found {points}",
-                room = POINTS
+                "an FMU holds at most {POINTS} points of a curve, found {points}"
             ));
         }
         if shape_points > SHAPE {
             return Err(error!(
                 Export,
-                "an FMU holds at most {room} points of an unloading branch, found {points}",
-                points = shape_points,
-                room = SHAPE
+                "an FMU holds at most {SHAPE} points of an unloading branch, found {shape_points}"
             ));
         }
         let (flags, numbers, dissipated_j) = match memory {

@@ -6,8 +6,7 @@ use crate::guess;
 use std::cmp::Ordering;
 
 use super::MIN_POINTS;
-use super::curve::{Metadata, ReadCurve, ReadFile};
-use super::curve::{Place, shown};
+use super::curve::{Metadata, Place, ReadCurve, ReadFile, shown};
 use crate::curve::{Envelope, ForceCurve};
 use crate::unit::UnitSystem;
 

@@ -3,7 +3,7 @@
 use crate::error::{Error, error};
 use std::path::{Path, PathBuf};
 
-use super::text::number;
+use super::encoding::number;
 use crate::curve::contact::{THRESHOLD, onset, threshold_n};
 use crate::curve::loading::loading_branch;
 use crate::curve::{Curve, CurveUnloading, Envelope, ForceCurve, ForceKind, unloading_stiffness};
@@ -230,33 +230,18 @@ pub(super) fn units(
 
 /// An error of content, of the file at `path`.
 pub(super) fn content(path: &Path) -> impl Fn(Error) -> Error {
-    move |error| {
-        error!(CurveFile, "{path}: {source}", path = path.display(), source = error)
-            .caused_by(error)
-    }
+    move |error| error!(CurveFile, "{path}: {error}", path = path.display()).caused_by(error)
 }
 
 /// A place in a file, counted from 1; bytes from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Place {
+pub(crate) enum Place {
     /// A whole line.
     Line(u64),
     /// A field of a line whose fields are separated.
-    Field {
-        /// The line.
-        line: u64,
-        /// The field.
-        field: usize,
-    },
+    Field { line: u64, field: usize },
     /// Columns of a line.
-    Columns {
-        /// The line.
-        line: u64,
-        /// The first column.
-        from: usize,
-        /// The last column.
-        to: usize,
-    },
+    Columns { line: u64, from: usize, to: usize },
     /// A byte of a binary file.
     Byte(usize),
     /// A row of a table or matrix.
@@ -281,7 +266,6 @@ pub(super) fn expected(place: Place, what: impl fmt::Display, found: &str) -> Er
     error!(CurveFile, "{place}: expected {what}, found \"{found}\"")
 }
 
-/// The number that a text is.
 pub(super) fn value(place: Place, text: &str) -> Result<f64, Error> {
     number(text).ok_or_else(|| expected(place, "a number", text))
 }

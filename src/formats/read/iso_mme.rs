@@ -10,9 +10,8 @@ use std::path::{Path, PathBuf};
 
 use super::columns::{Columns, LISTED, Places, check_points, no_curve, several_curves};
 use super::curve::{CUT, Metadata, Place, ReadFile, expected, miscounted, shown, title, value};
-use super::encoding::decoded;
+use super::encoding::{decoded, lines, number};
 use super::label::Quantity;
-use super::text::{lines, number};
 use super::{Input, MAX_CURVE_BYTES};
 use crate::error::{Error, error};
 use crate::file;

@@ -4,8 +4,8 @@ use crate::error::{Error, error};
 use std::path::Path;
 
 use super::columns::too_few;
-use super::curve::{Metadata, ReadCurve, title};
-use super::{Input, MIN_POINTS, curve};
+use super::curve::{self, Metadata, ReadCurve, title};
+use super::{Input, MIN_POINTS};
 use crate::curve::{ForceKind, Parameter};
 use crate::dataset::OTHER_MASS;
 use crate::file;

@@ -9,7 +9,7 @@ use super::Input;
 use super::columns::{Columns, check_curves, choose};
 use super::curve::expected;
 use super::deck::{DeckCurve, Fields, Said, WIDTH};
-use super::text::lines;
+use super::encoding::lines;
 use crate::error::{Error, error};
 
 const REMEDY: &str = " (or in a comment of the file: \"$ units: mm-t-s\")";

@@ -95,7 +95,6 @@ impl Matrix<'_> {
 const MOST_TEXT: usize = 1_000;
 
 impl Matrix<'_> {
-    /// The rows of a text.
     fn texts(&self) -> impl Iterator<Item = String> {
         let (rows, columns) = (self.head.rows.min(MOST_TEXT), self.head.columns.min(MOST_TEXT));
         let character = |code: f64| char::from_u32(code as u32).unwrap_or(' ');

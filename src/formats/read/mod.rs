@@ -19,31 +19,28 @@ mod layout;
 mod lsdyna;
 mod mat;
 mod modelica;
-mod modelica_package;
 mod radioss;
 mod table;
 mod tables;
-mod text;
 
 use crate::error::{Error, error};
+use crate::file;
 use crate::guess;
 use std::path::Path;
 
 use super::{MAX_CURVE_BYTES, MIN_POINTS};
 use crate::curve::{ForceCurve, ForceKind};
-use crate::file;
 use crate::surrogate::PredictedCurve;
 use crate::unit::UnitSystem;
 use columns::Columns;
-pub(crate) use curve::Metadata;
 pub use curve::ReadCurve;
-pub(crate) use curve::ReadFile;
+pub(crate) use curve::{Metadata, ReadFile};
 use label::Quantity;
 pub(crate) use tables::history;
 
 /// One format of curves.
 #[derive(Debug)]
-pub struct Reader {
+pub(crate) struct Reader {
     /// Its name.
     pub name: &'static str,
     /// Without the dot; the first is the usual one.
@@ -67,7 +64,7 @@ enum Read {
 
 /// Every format we read, in the order in which content is tried. To add one: write its module, add
 /// its line here.
-pub const READERS: &[Reader] = &[
+pub(crate) const READERS: &[Reader] = &[
     Reader {
         name: "mat",
         extensions: &["mat"],
@@ -100,8 +97,8 @@ pub const READERS: &[Reader] = &[
         name: "mo",
         extensions: &["mo"],
         description: "Modelica package that crumple export wrote",
-        recognise: modelica_package::recognise,
-        read: Read::Columns(modelica_package::read),
+        recognise: modelica::recognise_package,
+        read: Read::Columns(modelica::read_package),
     },
     Reader {
         name: "modelica",
@@ -221,13 +218,18 @@ pub(crate) fn is_folder_of_tests(path: &Path) -> bool {
     path.is_dir() && !iso_mme::tests(path).is_empty()
 }
 
-/// Reads the curve at `path`, a file, or for ISO-MME a test's folder.
+/// The names of the formats that are read.
+pub fn readers() -> impl Iterator<Item = &'static str> {
+    READERS.iter().map(|reader| reader.name)
+}
+
+/// Reads the curve at `path`, a file, or for ISO-MME a test's folder; with the name of its format.
 ///
 /// # Errors
 /// It names the file, the place in it, what was expected there and what to do.
-pub fn read(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static Reader), Error> {
+pub fn read(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static str), Error> {
     let (found, reader) = parse(path, options)?;
-    Ok((found.curve(path)?, reader))
+    Ok((found.curve(path)?, reader.name))
 }
 
 /// What a file holds before it becomes one curve.
@@ -341,7 +343,7 @@ pub(crate) fn driving(path: &Path, options: &ReadOptions) -> Result<DrivingFile,
 
 /// The reader that was named, else the first that knows the content, else that of the extension.
 fn reader(input: &Input<'_>) -> Result<&'static Reader, Error> {
-    let known = || READERS.iter().map(|r| r.name).collect::<Vec<_>>().join(", ");
+    let known = || readers().collect::<Vec<_>>().join(", ");
     if let Some(name) = &input.options.format {
         let found = READERS.iter().find(|r| r.name == name);
         return found.ok_or_else(|| {

@@ -9,7 +9,7 @@ use super::Input;
 use super::columns::{Columns, check_curves, choose};
 use super::curve::Place;
 use super::deck::{DeckCurve, Fields, Said, WIDTH};
-use super::text::{lines, number};
+use super::encoding::{lines, number};
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
 

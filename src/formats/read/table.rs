@@ -11,8 +11,8 @@
 
 use super::columns::check_curves;
 use super::curve::{CUT, Place, expected, miscounted, shown, value};
+use super::encoding::{lines, number};
 use super::label::{Label, Quantity, is_unit};
-use super::text::{lines, number};
 use crate::error::{Error, error};
 
 /// Lines with content among which the header is looked for.
@@ -167,7 +167,6 @@ pub(super) struct Table<'a> {
     before: u64,
 }
 
-/// A line of a table.
 #[derive(Clone, Debug)]
 pub(super) struct Row<'a> {
     pub line: u64,
@@ -298,7 +297,6 @@ impl<'a> Table<'a> {
         self.separator == Separator::Any
     }
 
-    /// The first line of it.
     pub(super) fn line(&self) -> u64 {
         self.names.first().map_or(self.before + 1, |(line, _)| *line)
     }

@@ -3,11 +3,10 @@
 use super::Input;
 use super::columns::{Columns, Places, check_points, choose};
 use super::curve::{Metadata, Place, expected, shown, stated_units, title};
-use super::encoding::decoded;
+use super::encoding::{decoded, lines};
 use super::label::{Label, Quantity};
 use super::layout::layout;
 use super::table::{Fit, Purpose, Row, Table, check_last, is_pair};
-use super::text::lines;
 use crate::error::{Error, error};
 use crate::guess;
 
@@ -296,40 +295,20 @@ mod tests {
         fn t(text: &str, wanted: Option<&str>, message: &str) {
             assert_eq!(read_text(text, wanted).unwrap_err(), message, "{text}");
         }
-        t("t,a,b\n", Some("c"), "there is no column \"c\": name one of \"a\", \"b\"");
-        t("t,a,b\n", None, "there are several columns: name one of \"a\", \"b\"");
-        t("t,a,a\n", Some("a"), "2 columns are called \"a\": rename all but one");
-        t("t,a\n0,1\n1,x\n", None, "line 3, column 2 (\"a\"): expected a number, found \"x\"");
-        t("t,a\n0,1\n1\n", None, "line 3, column 2 (\"a\"): expected a number, found \"\"");
-        t(
-            "t,a\n0,NaN\n",
-            None,
-            "line 2, column 2 (\"a\"): expected a finite number, found \"NaN\": remove the lines without a value",
-        );
-        t(
-            "#\nt,a\n0,1\n2,1\n1,1\n",
-            None,
-            "line 5, column 1 (\"t\"): time 1 does not come after 2: times must increase strictly, so cut or sort the file first",
-        );
-        t(
-            "t,a\n0,1\n0,5,2\n",
-            None,
-            "line 3: expected 2 fields, one for each column of the table, found 3: write decimal points, or semicolons between columns, and name every column in the header",
-        );
-        t(
-            "",
-            None,
-            "the table is empty: expected a header line, then a time and values in every line",
-        );
-        t(
-            "0,1\n1,2\n",
-            None,
-            "line 1: expected a header with the names of the columns, found numbers: write for example \"time_s,a_m_per_s2\" above them",
-        );
-        t(
-            "time\n0\n",
-            None,
-            "line 1: expected at least two columns separated by commas, semicolons, tabs or blanks, the first of them the time, found \"time\"",
-        );
+        #[rustfmt::skip]
+        let cases = [
+            ("t,a,b\n", Some("c"), "there is no column \"c\": name one of \"a\", \"b\""),
+            ("t,a,b\n", None, "there are several columns: name one of \"a\", \"b\""),
+            ("t,a,a\n", Some("a"), "2 columns are called \"a\": rename all but one"),
+            ("t,a\n0,1\n1,x\n", None, "line 3, column 2 (\"a\"): expected a number, found \"x\""),
+            ("t,a\n0,1\n1\n", None, "line 3, column 2 (\"a\"): expected a number, found \"\""),
+            ("t,a\n0,NaN\n", None, "line 2, column 2 (\"a\"): expected a finite number, found \"NaN\": remove the lines without a value"),
+            ("#\nt,a\n0,1\n2,1\n1,1\n", None, "line 5, column 1 (\"t\"): time 1 does not come after 2: times must increase strictly, so cut or sort the file first"),
+            ("t,a\n0,1\n0,5,2\n", None, "line 3: expected 2 fields, one for each column of the table, found 3: write decimal points, or semicolons between columns, and name every column in the header"),
+            ("", None, "the table is empty: expected a header line, then a time and values in every line"),
+            ("0,1\n1,2\n", None, "line 1: expected a header with the names of the columns, found numbers: write for example \"time_s,a_m_per_s2\" above them"),
+            ("time\n0\n", None, "line 1: expected at least two columns separated by commas, semicolons, tabs or blanks, the first of them the time, found \"time\""),
+        ];
+        cases.into_iter().for_each(|(text, wanted, message)| t(text, wanted, message));
     }
 }

@@ -4,13 +4,11 @@
 //! its segment is treated separately.
 
 mod contact;
-mod work;
 
 use super::law::{ForceLaw, Piece};
 use super::rows::{LANES, LaneIndex, Layout, Row, Rows, ahead, each, larger};
 pub(super) use contact::Move;
-use contact::{Contact, Stage};
-use work::Totals;
+use contact::{Contact, Stage, Totals};
 
 /// Which state of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -2,9 +2,10 @@
 
 use super::super::chain::Chain;
 use super::super::contacts::StepPoint;
-use super::super::ledger::{Account, Balance};
 use super::super::rows::{LANES, Layout, Row, Rows, each, larger};
-use super::super::run::{BodyHistory, Grid, InterfaceHistory, Record, Run, diverged};
+use super::super::run::{
+    Account, Balance, BodyHistory, Grid, InterfaceHistory, Record, Run, diverged,
+};
 use super::state::Engine;
 use crate::error::Error;
 
@@ -68,7 +69,6 @@ struct Recent {
 }
 
 impl Recent {
-    /// Values of one kind at an output.
     #[inline(always)]
     fn keep(&mut self, kind: usize, n: usize, row: impl Fn(usize) -> Row) {
         let output = self.outputs % OUTPUTS;

@@ -245,12 +245,12 @@ pub struct LawTables<'a> {
     /// `∫` of the shares of the force from each point to the end.
     pub shape_rest: &'a [f64],
     /// `None` where the envelope is followed back.
-    pub memory: Option<MemoryTables<'a>>,
+    pub(crate) memory: Option<MemoryTables<'a>>,
 }
 
 /// What of the work done on the envelope comes back; see [`ForceLaw`] for the rule.
 #[derive(Clone, Copy, Debug)]
-pub struct MemoryTables<'a> {
+pub(crate) struct MemoryTables<'a> {
     /// Energy that is lost once the deflection has been at each point of the envelope.
     pub dissipated_j: &'a [f64],
     /// Unloading stiffness `k`.

@@ -84,7 +84,6 @@ impl ForceLaw {
         d.partition_point(|&d| d <= deflection_m).max(1) - 1
     }
 
-    /// Piece `i` of the envelope.
     #[inline(always)]
     pub(in super::super) fn envelope_piece(&self, i: usize) -> Piece {
         let (d, f) = (self.envelope.deflection_m(), self.envelope.force_n());

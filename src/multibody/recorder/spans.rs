@@ -196,7 +196,6 @@ impl Spans {
         span.change() >= LEAST_SHARE * self.largest_change && span.end.time_s > span.begin.time_s
     }
 
-    /// The first span that counts.
     pub(crate) fn first(&self) -> Option<&Span> {
         self.closed.iter().find(|span| self.counts(span))
     }

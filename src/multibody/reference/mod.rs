@@ -11,10 +11,9 @@ mod motion;
 
 use self::motion::Motion;
 use super::chain::Chain;
-use super::ledger::{Account, Balance};
 use super::recorder::{EventRecorder, Moment};
 use super::rows::{Layout, Rows};
-use super::run::{Grid, Record, Run, RunSettings, curve_ended, diverged};
+use super::run::{Account, Balance, Grid, Record, Run, RunSettings, curve_ended, diverged};
 use crate::error::{Error, error};
 use motion::Contact;
 

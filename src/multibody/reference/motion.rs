@@ -175,7 +175,6 @@ impl<'a> Motion<'a> {
         self.pulled_m[k] = self.pulled_m[k].max(contact.extension_m);
     }
 
-    /// Stored and dissipated energy of interface `k`, in J.
     pub(crate) fn energies_j(&self, k: usize, contact: &Contact) -> (f64, f64) {
         let interface = &self.chain.interfaces()[k];
         let (mut stored_j, mut dissipated_j) =

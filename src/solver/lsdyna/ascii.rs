@@ -18,13 +18,11 @@
 use std::collections::{HashMap, HashSet};
 use std::io;
 
-use super::header;
-use super::line::{Line, Lines};
-use crate::solver::Format;
+use super::line::{Line, Lines, legend_entry, version};
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::{Source, Stream};
 use crate::solver::states::StateReader;
-use crate::solver::{NoDataReason, Selection, SolverFile, WithoutData};
+use crate::solver::{Format, NoDataReason, Selection, SolverFile, WithoutData};
 
 /// Names of tables, for messages, each with its components.
 pub(crate) type Tables = &'static [(&'static str, &'static [&'static str])];
@@ -176,7 +174,7 @@ impl<'a> AsciiReader<'a> {
             let text = String::from_utf8_lossy(line.text).trim().to_string();
             self.title = (!text.is_empty()).then_some(text);
         } else if line.number == 2 {
-            self.version = header::version(line.text);
+            self.version = version(line.text);
             if self.version.is_none() {
                 let message = "expected LS-DYNA's version line (\"ls-dyna … date …\")";
                 states.note(ProblemCode::NoVersionLine, &line, message);
@@ -207,7 +205,7 @@ impl<'a> AsciiReader<'a> {
             if self.in_legend || opens || closes {
                 self.in_legend = !closes;
                 if self.legend.len() < MAX_LEGEND {
-                    self.legend.extend(header::legend_entry(line.text));
+                    self.legend.extend(legend_entry(line.text));
                 }
             } else if text.is_empty() {
                 body.blank(states);

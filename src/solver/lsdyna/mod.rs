@@ -9,7 +9,6 @@ pub(super) mod dotted;
 mod e12;
 pub(super) mod elout;
 pub(super) mod glstat;
-pub(super) mod header;
 pub(super) mod label_values;
 pub(super) mod line;
 mod lsda;

@@ -4,13 +4,12 @@ use std::collections::{HashMap, HashSet};
 use std::io;
 use std::sync::Arc;
 
-use super::header::{FRAME, Header, Records};
 use super::variables::{Component, Made, components, entities, is_normal_only, section, variable};
-use super::{DIFFERENTIATED, GLOBAL_COMPONENTS, empty, history};
+use super::{DIFFERENTIATED, FRAME, GLOBAL_COMPONENTS, Header, Records, empty, history};
 use crate::history::{EntityId, History, Side};
 use crate::signal::derivative;
 use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
-use crate::solver::restart;
+use crate::solver::states::finish::{resolve, take};
 use crate::solver::{Entity, Selection, SolverFile};
 
 /// One value per state.
@@ -289,7 +288,7 @@ impl StateReader {
     /// Leaves out what a restart wrote again; forces are unknown across it.
     fn resolve_restarts(&mut self) {
         let place = |i: usize| self.starts.get(i).copied().map(Place::at_byte);
-        let (mut kept, found) = restart::resolve(&self.time, |_, _| Some(true), place, "");
+        let (mut kept, found) = resolve(&self.time, |_, _| Some(true), place, "");
         self.problems.append(found);
         // Nor can a state whose time is out of order be differentiated.
         let mut last = f64::NEG_INFINITY;
@@ -301,9 +300,9 @@ impl StateReader {
         if kept.len() == self.time.len() {
             return;
         }
-        let take = |values: &mut Vec<f64>| restart::take(values, &kept);
-        take(&mut self.time);
-        self.channels.iter_mut().for_each(|channel| take(&mut channel.values));
+        let keep = |values: &mut Vec<f64>| take(values, &kept);
+        keep(&mut self.time);
+        self.channels.iter_mut().for_each(|channel| keep(&mut channel.values));
     }
 
     pub(crate) fn finish(mut self, header: &Header, selection: &Selection) -> Vec<SolverFile> {

@@ -5,8 +5,7 @@
 //! entities of each table, unless its rows may come and go (eroded elements). Invariant:
 //! every kept history has one value per kept state.
 
-mod finish;
-mod table;
+pub(in crate::solver) mod finish;
 
 use std::sync::Arc;
 
@@ -16,7 +15,7 @@ use super::lsdyna::line::{Field, Line, real, shown};
 use super::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::history::EntityId;
 use crate::plural::counted;
-use table::Table;
+use finish::Table;
 
 /// Values that states may lack, beyond a multiple of the values they have: more are no
 /// erosion but damage, and would fill the memory.

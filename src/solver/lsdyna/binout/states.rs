@@ -4,10 +4,9 @@ use std::collections::{HashMap, HashSet};
 use std::io;
 use std::sync::Arc;
 
-use super::bytes::Bytes;
-use super::records::{Component, DataRecord, LISTS, Section};
+use super::records::{Bytes, Component, DataRecord, LISTS, Section};
 use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
-use crate::solver::restart;
+use crate::solver::states::finish::{resolve, take};
 
 pub(super) struct StateReader {
     /// Indices of the states, in order of their numbers.
@@ -30,7 +29,7 @@ impl StateReader {
         problems.append(left_out);
         let name = format!("{}: ", section.name);
         let place = |i: usize| place_of(section, timed.states[i]);
-        let (kept, repeated) = restart::resolve(&timed.time, |_, _| Some(true), place, &name);
+        let (kept, repeated) = resolve(&timed.time, |_, _| Some(true), place, &name);
         problems.append(repeated);
         timed.keep(&kept);
         if let Some(change) = last_change_of_lists(section, bytes)? {
@@ -125,8 +124,8 @@ impl Timed {
     }
 
     fn keep(&mut self, kept: &[usize]) {
-        restart::take(&mut self.time, kept);
-        restart::take(&mut self.states, kept);
+        take(&mut self.time, kept);
+        take(&mut self.states, kept);
     }
 
     /// Leaves out states that were written before a list of ids changed: their rows cannot be

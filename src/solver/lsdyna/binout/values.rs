@@ -6,9 +6,8 @@ use std::io;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::bytes::{Bytes, Scratch};
 use super::owners::{Entities, MAX_ROWS, ordinals, row_name};
-use super::records::{Component, DataRecord, Section};
+use super::records::{Bytes, Component, DataRecord, Scratch, Section};
 use super::states::{Ids, StateReader};
 use crate::history::{EntityId, History};
 use crate::solver::Selection;

@@ -1,12 +1,11 @@
-//! The cards of each kind of keyword: what names a run's parts and outputs, initial velocities, parameters.
+//! The cards of each kind of keyword: what names a run's parts and outputs, initial velocities, parameters, units.
 
-use super::super::line::shown;
-use super::card::{Card, Field, start, text};
-use super::contents::{DeckInterface, DeckPlace, InitialVelocity, Output, Scope, TitledEntity};
-use super::context::{Block, Context, MAX_ENTRIES, Missing};
-use super::keyword::Kind;
-use super::parameters::{Defined, Value};
+use super::context::{Block, Context, Defined, MAX_ENTRIES, Missing, Value};
+use super::keyword::{Card, Field, Kind, start, text};
+use super::{DeckEntity, DeckPlace, InitialVelocity, Output, Scope, StatedUnits};
+use crate::solver::lsdyna::line::shown;
 use crate::solver::problem::{Place, ProblemCode};
+use crate::unit::UnitSystem;
 
 /// Bytes of a parameter's name; the manual allows 9.
 const MAX_NAME: usize = 80;
@@ -28,7 +27,7 @@ impl Context {
         if sets {
             self.keep(|deck| &mut deck.history_node_sets, id, "history node sets");
         } else {
-            let node = TitledEntity { id, title: None, at: self.at(card.place) };
+            let node = self.entity(id, None, card);
             self.keep(|deck| &mut deck.history_nodes, node, "history nodes");
         }
     }
@@ -39,9 +38,13 @@ impl Context {
         }
         let (field, title) = card.id_and_text();
         if let Some(id) = self.required_id(field) {
-            let node = TitledEntity { id, title, at: self.at(card.place) };
+            let node = self.entity(id, title, card);
             self.keep(|deck| &mut deck.history_nodes, node, "history nodes");
         }
+    }
+
+    fn entity(&self, id: i64, title: Option<String>, card: &Card<'_>) -> DeckEntity {
+        DeckEntity { id: Some(id), title, keyword: String::new(), at: self.at(card.place) }
     }
 
     pub(super) fn interface(
@@ -52,7 +55,7 @@ impl Context {
         id: Option<i64>,
         title: Option<String>,
     ) {
-        let interface = DeckInterface { id: id.filter(|&id| id != 0), title, keyword, at };
+        let interface = DeckEntity { id: id.filter(|&id| id != 0), title, keyword, at };
         if kind == Kind::Wall {
             self.keep(|deck| &mut deck.rigid_walls, interface, "rigid walls");
         } else {
@@ -74,8 +77,7 @@ impl Context {
                     block.ids[0] = self.required_id(card.field(0));
                 }
                 if let Some(id) = block.ids[0] {
-                    let part =
-                        TitledEntity { id, title: block.text.take(), at: self.at(card.place) };
+                    let part = self.entity(id, block.text.take(), card);
                     self.keep(|deck| &mut deck.parts, part, "parts");
                 }
             }
@@ -260,4 +262,95 @@ fn parameter_name(text: &[u8]) -> Option<(u8, String)> {
 
 fn number<T>(read: Result<Option<T>, Missing>, value: fn(T) -> Value) -> Value {
     read.ok().flatten().map_or(Value::Unknown, value)
+}
+
+/// What a comment such as `$# Units: kg / mm / ms / kN / GPa` states.
+pub(super) fn in_comment(line: &[u8]) -> Option<String> {
+    const WORD: &[u8] = b"units";
+    let at = line.windows(WORD.len()).position(|w| w.eq_ignore_ascii_case(WORD))?;
+    let behind = line.get(at + WORD.len()..)?.trim_ascii_start();
+    text(behind.strip_prefix(b":").or_else(|| behind.strip_prefix(b"="))?)
+}
+
+/// Length, time and mass of `*CONTROL_UNITS`; m, sec and kg where blank.
+pub(super) fn on_card(card: &Card<'_>) -> String {
+    let field = |k: usize, default: &str| text(card.field(k).text).unwrap_or(default.into());
+    [field(0, "m"), field(1, "sec"), field(2, "kg")].join(" ")
+}
+
+/// The system that a text names, whatever other units it names.
+pub(super) fn system(text: &str) -> Option<UnitSystem> {
+    let separators = [' ', '/', ',', ';', '(', ')', '\t'];
+    // `kN-mm` is an energy but `mm-t-s` is a system: hyphens part the second only.
+    from_words(text.split(separators)).or_else(|| {
+        from_words(text.split(separators).find(|w| w.matches('-').count() >= 2)?.split('-'))
+    })
+}
+
+fn from_words<'a>(words: impl Iterator<Item = &'a str>) -> Option<UnitSystem> {
+    let mut found: [Option<&str>; 3] = [None; 3];
+    for word in words {
+        // Case decides between Mg (tonne) and mg.
+        let (slot, unit) = match word {
+            // No `in`: sentences have it too ("forces in kN").
+            "mm" | "cm" | "m" => (0, word),
+            "kg" | "t" | "Mg" | "g" => (1, word),
+            "ton" | "tonne" | "tonnes" | "mtrc_ton" | "MTRC_TON" => (1, "t"),
+            "s" | "ms" | "us" => (2, word),
+            "sec" | "SEC" => (2, "s"),
+            "msec" => (2, "ms"),
+            "micro_s" => (2, "us"),
+            _ => continue,
+        };
+        let slot = found.get_mut(slot)?;
+        if slot.replace(unit).is_some_and(|known| known != unit) {
+            return None;
+        }
+    }
+    let [length, mass, time] = found;
+    UnitSystem::parse(&[length?, mass?, time?].join("-")).ok()
+}
+
+impl Context {
+    /// Keeps the first statement that is recognised; `*CONTROL_UNITS` is above comments.
+    pub(super) fn units(&mut self, stated: String, place: Place, on_card: bool) {
+        let mut new = StatedUnits { system: system(&stated), text: stated, at: self.at(place) };
+        if let Some(known) = &self.deck.units {
+            if new.system.zip(known.system).is_some_and(|(a, b)| a != b) {
+                let message = format!(
+                    "units \"{}\" contradict \"{}\" of line {}",
+                    new.text, known.text, known.at.line
+                );
+                self.units_differ = true;
+                self.problem(ProblemCode::BadLine, place, None, message);
+            } else if !on_card && (known.system.is_some() || self.units_differ) {
+                return;
+            }
+        }
+        new.system = new.system.filter(|_| !self.units_differ);
+        self.deck.units = Some(new);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reads_stated_units() {
+        fn t(comment: &str, expected: Option<&str>) {
+            let text = in_comment(comment.as_bytes());
+            let expected = expected.map(|e| UnitSystem::parse(e).unwrap());
+            assert_eq!(text.and_then(|t| system(&t)), expected, "{comment:?}");
+        }
+        t("$# Units: kg / mm / ms / kN / GPa / kN-mm", Some("kg-mm-ms"));
+        t("$ generated by deck.py  units: Mg mm s N MPa", Some("t-mm-s"));
+        t("$ UNITS = ton-mm-s", Some("t-mm-s"));
+        t("$ units : tonne, mm, sec", Some("t-mm-s"));
+        t("$ units: mg mm s", None); // milligram is not known
+        t("$ units: kg m mm s", None); // contradicts itself
+        t("$ units: mm/s", None); // a speed only
+        t("$ units: force in kN, mass in t, time in s", None);
+        t("$ all units are consistent", None);
+    }
 }

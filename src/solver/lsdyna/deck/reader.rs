@@ -5,11 +5,9 @@ use std::io::{self, BufRead, Read};
 use std::rc::Rc;
 
 use super::super::line::{Line, Lines, shown};
-use super::card::{Card, start, text};
-use super::contents::{Deck, DeckInterface, Include, Scope};
 use super::context::{Block, Context, MAX_INCLUDES};
-use super::keyword::{Keyword, Kind, STANDARD, kind};
-use super::units;
+use super::keyword::{Card, Keyword, Kind, STANDARD, kind, start, text};
+use super::{Deck, DeckEntity, Include, Scope, cards};
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::read_buffered;
 
@@ -135,7 +133,7 @@ impl Reader<'_, '_> {
     }
 
     fn comment(&mut self, line: &Line<'_>) {
-        if let Some(stated) = units::in_comment(line.text) {
+        if let Some(stated) = cards::in_comment(line.text) {
             self.context.units(stated, line.into(), false);
         }
     }
@@ -182,7 +180,7 @@ impl Reader<'_, '_> {
                 self.context.deck.title = text(card.text);
             }
             Kind::ControlUnits if first => {
-                self.context.units(units::on_card(&card), card.place, true);
+                self.context.units(cards::on_card(&card), card.place, true);
             }
             Kind::VelocityOfSet => self.context.velocity_of_set(block, &card),
             Kind::VelocityOfNodes => self.context.velocity_of_id(block, &card, Scope::Node),
@@ -251,7 +249,7 @@ fn number_interfaces(deck: &mut Deck) {
 
 /// Without ids the solver counts. How it counts through a mixture of kinds is not
 /// documented, so a mixture stays without.
-fn number_in_order(list: &mut [DeckInterface], kind: impl Fn(&str) -> Option<&'static str>) {
+fn number_in_order(list: &mut [DeckEntity], kind: impl Fn(&str) -> Option<&'static str>) {
     let Some(first) = list.first().and_then(|i| kind(&i.keyword)) else { return };
     if list.iter().all(|i| !has_id_card(&i.keyword) && kind(&i.keyword) == Some(first)) {
         for (id, interface) in (1..).zip(list) {
