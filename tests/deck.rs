@@ -211,7 +211,8 @@ fn a_deck_is_printed() {
     for expected in [
         "units       Mg mm s N MPa",
         "speed       6944.444 (initial velocity, in the deck's units)",
-        "nodout each 0.00075",
+        "nodout every 0.00075",
+        "solver      LS-DYNA\n",
         "201  nose, upper",
         "7  self contact",
         "1  rigid wall",

@@ -45,7 +45,7 @@ pub enum GroupReport {
         #[serde(skip_serializing_if = "Option::is_none")]
         next_run: Option<NextRun>,
         /// The choice and each model with fewer speeds; empty if that was not asked for.
-        #[serde(skip_serializing_if = "Vec::is_empty")]
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
         subsets: Vec<OverSubsets>,
     },
     /// There is no table.

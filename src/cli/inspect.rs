@@ -204,7 +204,8 @@ fn print(out: &mut dyn Write, section: &Section) -> io::Result<()> {
         None => writeln!(out, "  format      {}", file.format)?,
     }
     if let Some(solver) = &file.solver {
-        writeln!(out, "  solver      {solver} {}", file.version.as_deref().unwrap_or_default())?;
+        let version = file.version.as_deref().unwrap_or_default();
+        writeln!(out, "{}", format!("  solver      {solver} {version}").trim_end())?;
     }
     writeln!(out, "  title       {}", file.title.as_deref().unwrap_or("(none)"))?;
     if let Some((path, count)) = &section.titles_from {
@@ -304,7 +305,7 @@ pub(super) fn print_deck(out: &mut dyn Write, deck: &Deck) -> io::Result<()> {
     let outputs: Vec<String> = deck
         .outputs
         .iter()
-        .map(|o| o.interval.map_or(o.file.to_string(), |dt| format!("{} each {dt}", o.file)))
+        .map(|o| o.interval.map_or(o.file.to_string(), |dt| format!("{} every {dt}", o.file)))
         .collect();
     if !outputs.is_empty() {
         writeln!(out, "  outputs     {}", outputs.join(", "))?;

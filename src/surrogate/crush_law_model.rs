@@ -20,7 +20,6 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     about: "Contact and body force from one law of stopped mass and rate",
     // One law instead of two fits: before `rate`.
     complexity: 1,
-    baseline: false,
     sees_features: false,
     follows_closing: true,
     needs_crush_law: true,

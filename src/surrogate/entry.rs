@@ -18,10 +18,8 @@ pub struct ModelEntry {
     pub name: &'static str,
     /// What it is, in one line.
     pub about: &'static str,
-    /// Place from simple (0) to elaborate: of about equally good models the simplest is taken.
+    /// Place from simple (0) to elaborate: of the models that follow the closing speed the simplest is the default.
     pub complexity: u8,
-    /// Whether a chosen model must be at least as good as this one.
-    pub baseline: bool,
     /// Whether it sees parameters besides the speed.
     pub sees_features: bool,
     /// Whether its force follows the closing speed at each deflection.

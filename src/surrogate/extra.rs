@@ -11,7 +11,6 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "extra",
     about: "Extremely randomised trees",
     complexity: 4,
-    baseline: false,
     sees_features: true,
     follows_closing: false,
     needs_crush_law: false,

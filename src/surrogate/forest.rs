@@ -18,7 +18,6 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "forest",
     about: "Random forest on speed and deflection (DDTCM)",
     complexity: 5,
-    baseline: true,
     sees_features: true,
     follows_closing: false,
     needs_crush_law: false,

@@ -10,7 +10,6 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "linear",
     about: "Linear in speed at equal deflection",
     complexity: 0,
-    baseline: true,
     sees_features: false,
     follows_closing: false,
     needs_crush_law: false,

@@ -9,7 +9,6 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "nearest",
     about: "The FE curve of the nearest speed (FDRM)",
     complexity: 6,
-    baseline: true,
     sees_features: true,
     follows_closing: false,
     needs_crush_law: false,

@@ -26,7 +26,6 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "rate",
     about: "Linear in speed, with the force following the speed at each deflection",
     complexity: 2,
-    baseline: false,
     sees_features: false,
     follows_closing: true,
     needs_crush_law: false,
