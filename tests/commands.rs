@@ -900,8 +900,8 @@ fn scenarios_choose_the_force() {
         .unwrap();
     scenario("file = \"bad.csv\"");
     let error = crumple_fails(here, 1, "simulate s.toml");
-    let told = "bad.csv: line 2: \"# force_kind: bodie\": expected \"body\" or \"contact\"";
-    says(&error, told);
+    let said = "bad.csv: line 2: \"# force_kind: bodie\": expected \"body\" or \"contact\"";
+    says(&error, said);
     // Standard output is one file's.
     let predict = ["predict", "a.model", "--speed", "48km/h", "--to", "csv", "-o", "-"];
     assert_eq!(crumple_ok(here, &predict), text);

@@ -149,7 +149,7 @@ fn a_noisy_state_before_the_impact_does_not_move_the_contact() {
             noisy.force.values[80 - early] = 5e4;
             let found = noisy.extract();
             if early as f64 * INTERVAL_S < 0.010 {
-                // Too near to be told from a bouncing nose plate: taken, or said.
+                // Too near to be distinguished from a bouncing nose plate: taken, or said.
                 continue;
             }
             assert_eq!(
@@ -210,8 +210,8 @@ fn body_forces_find_the_contact_by_the_contact_force_or_say_that_they_cannot() {
     for speed in [25, 36, 48, 60, 72] {
         let run = Run::read(speed).after_flight(40);
         let contact = run.extract();
-        let told = run.extract_with(&with_contact, Stated::default()).unwrap();
-        assert_eq!(told.curves.contact_time_s, contact.curves.contact_time_s);
+        let measured = run.extract_with(&with_contact, Stated::default()).unwrap();
+        assert_eq!(measured.curves.contact_time_s, contact.curves.contact_time_s);
         let alone = run.extract_with(body, Stated::default()).unwrap();
         let said =
             alone.quality.warnings.iter().any(|w| w.contains("where the body starts to slow down"));

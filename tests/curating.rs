@@ -1,5 +1,5 @@
 //! Curating databases: cases are chosen, removed, renamed, joined, copied, tagged and written as
-//! tables; what was renamed is still its study's; whoever is killed loses nothing.
+//! tables; what was renamed is still its study's; a command that is killed loses nothing.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -1051,7 +1051,7 @@ fn every_acknowledged_case_is_there() {
     assert_eq!(entries(here), ["c.h5", "t.csv"]);
 }
 
-/// One writer at a time: the second is told, whatever it wants.
+/// One writer at a time: the second gets a message, whatever it wants.
 #[test]
 fn a_second_writer_is_known() {
     let (folder, study) = to_be_changed();
@@ -1070,7 +1070,7 @@ fn a_second_writer_is_known() {
     ok(here, "db copy curves.h5 --group lead-car-wall --to new.h5");
     drop(held);
     assert!(fs::read(here.join("curves.h5")).unwrap() == before);
-    // Two at once: each is done or told, and nothing is lost.
+    // Two at once: each is done or refused, and nothing is lost.
     let tag = |tag: &str| {
         Command::new(env!("CARGO_BIN_EXE_crumple"))
             .args(["db", "tag", "curves.h5", "--group", WALL, "--add", tag])

@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 
 /// The edges of both bands in a predicted curve.
 const BANDS: [&str; 4] = ["force_low_N", "force_high_N", "body_force_low_N", "body_force_high_N"];
-/// Units in which the exports of this test stand; readers of files without units are told them.
+/// Units in which the exports of this test stand; readers of files without units are given them.
 const UNITS: &str = "mm-t-s";
 /// Exports of one curve, by file.
 const FILES: [(&str, &[&str]); 12] = [

@@ -1123,7 +1123,7 @@ fn nested_validation_says_why_it_cannot_be() {
     }
 }
 
-/// Wall and closing speeds in one group: whoever uses the group says so, with cases.
+/// Wall and closing speeds in one group: every command that uses the group says so, with cases.
 #[test]
 fn kinds_of_speed_in_one_group_are_named_by_every_command() {
     let folder = tempfile::tempdir().unwrap();

@@ -81,7 +81,7 @@ pub(crate) struct NsdmFit {
 }
 
 /// The speeds of a group that lie between others, for a comparison at each, in m/s, and the names of the cases there that ended while
-/// loading and are no reference.
+/// loading and cannot serve as a reference.
 pub(crate) fn inner_speeds(group: &str, cases: &[Case]) -> Result<(Vec<f64>, Vec<String>), Error> {
     let set = TrainingSet::new(group, cases)?;
     let mut speeds = set.speeds_m_per_s();
@@ -217,7 +217,7 @@ fn fixed_case<'a>(
     settings: &ComparisonSettings,
 ) -> Result<&'a TrainingCase, Error> {
     let Some(asked) = settings.fixed_speed_m_per_s else {
-        // A run that ended while loading is the whole of no impact.
+        // A run that ended while loading does not show a whole impact.
         let whole: Vec<&TrainingCase> = rest.cases.iter().filter(|c| !c.truncated).collect();
         let all = if whole.is_empty() { rest.cases.iter().collect() } else { whole };
         return Ok(all[nearest(all.iter().map(|c| c.speed_m_per_s), left_out_m_per_s)]);

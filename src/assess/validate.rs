@@ -445,8 +445,8 @@ fn without_validation(fitting: &[ModelKind]) -> (String, String) {
     (if linear { "linear" } else { "nearest" }.into(), reason.into())
 }
 
-/// The rule for the maximum crush: the body's motion, or of the rules with more answers, at inner speeds before ends, the first; the reference method
-/// keeps its spline. `None` without any trial.
+/// The rule for the maximum crush: the body's motion, unless another has answers at more of the speeds; the reference method keeps its
+/// spline. `None` without any trial.
 fn best_rule(kind: &ModelKind, trials: &[&LeftOutRun<'_>]) -> Option<MaxCrushRule> {
     let missing = |rule: &MaxCrushRule| {
         let of = |inner| trials.iter().filter(move |t| t.held.inner == inner);

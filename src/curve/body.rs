@@ -39,9 +39,9 @@ pub(crate) fn rebound_stiffness_n_per_m(
 /// The body force `−m dv/dt` of the closing speed `v` at the sampled times, in N, with the case's
 /// effective mass; of a table without times its own force.
 ///
-/// It is filtered with the lowest class that keeps the energy of the impact within 0.5 %: CFC 60 is too low for an impact of a few
-/// hundredths of a second. If the sampling allows no such class, with the one that changes the energy least, and if it allows none, not
-/// at all. The rest is made up by a factor, so that a body that runs on this force loses FE's energy.
+/// It is filtered with the lowest class that keeps the energy of the impact within 0.5 %; if the sampling allows no such class, with the one
+/// that changes the energy least; and if it allows none, not at all. A factor makes up for the rest, so that a body that this force stops
+/// loses the energy that it loses in FE.
 pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
     let time_s = case.curves.sampled.time_s();
     // A motion computed from a force adds nothing to the force itself.

@@ -111,12 +111,12 @@ impl<F: Fn(usize, f64) -> f64> Sampled<'_, F> {
     }
 }
 
-/// Pairs of neighbouring curves between which the collapse changes its mode: what differs is no shift that the other pairs have
-/// as well.
+/// Pairs of neighbouring curves between which the collapse changes its mode: they differ by more than a shift, or by a much larger
+/// one than the other pairs.
 pub(super) fn mode_switches(cases: &[CaseCurve]) -> Vec<(usize, usize)> {
     let pair = |i: usize| {
         let end_m = cases[i].end_m().min(cases[i + 1].end_m());
-        // Levels that differ are no modes.
+        // A difference in level is not a change of mode.
         let level = |curve: usize| cases[curve].envelope().work_to(end_m) / end_m;
         let levels = [level(i), level(i + 1)];
         let relative = |curve: usize, d: f64| cases[curve].force_at(d) / levels[curve - i];
@@ -169,7 +169,8 @@ impl Pair {
         // Costs in steps.
         let misfit = |i: usize, j: usize| ((slow[i] - fast[j]) / level_n).powi(2);
         let nodes = (slow.len() - 1) / NODE;
-        // What the faster curve reaches only unshifted costs what it costs there; what it does not reach at all is compared with nothing.
+        // A shift must not push what differs off the end of the faster curve: what that reaches only unshifted is compared there. What it
+        // never reaches is not compared.
         let compared = (overlap - 1).min(nodes * NODE);
         let shifted_misfit = |i: usize, j: usize| match (j < fast.len(), i <= compared) {
             (true, _) => misfit(i, j),
@@ -229,8 +230,7 @@ impl Pair {
             if node > 0 {
                 let compared = (node - 1) * NODE + 1..=node * NODE;
                 let pairs = compared.filter_map(|i| Some((i, (i + k).checked_sub(most)?)));
-                left +=
-                    pairs.filter(|(_, j)| *j < fast.len()).map(|(i, j)| misfit(i, j)).sum::<f64>();
+                left += pairs.map(|(i, j)| shifted_misfit(i, j)).sum::<f64>();
                 k = k + SLOPE - usize::from(from[node - 1][k]);
             }
         }
@@ -370,7 +370,7 @@ mod tests {
         let steady: Vec<CaseCurve> =
             (10..16).map(|v| step(f64::from(v), 0.3 + 0.05 * f64::from(v - 10))).collect();
         assert_eq!(mode_switches(&steady), []);
-        // A hump that only one of two has is no shift.
+        // A hump that only one of two has is not a shift.
         let hump = |d: f64, f: f64| f + 4e6 * (-((d - 0.7) / 0.1_f64).powi(2)).exp();
         let pair = [step(10.0, 0.9), step(12.0, 0.9).map_forces(hump)];
         assert_eq!(mode_switches(&pair), [(0, 1)]);

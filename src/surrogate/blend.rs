@@ -78,6 +78,9 @@ pub(super) fn own_share(speeds_m_per_s: &[f64], values: &[Vec<f64>]) -> f64 {
     let likelihood = |own: f64| {
         let equations = Blend::of(speeds_m_per_s, own).equations;
         let of_runs = |runs: usize| {
+            if !values.iter().any(|y| y.len() == runs) {
+                return 0.0;
+            }
             let ones = vec![1.0; runs];
             let of_mean = equations.solve(&ones);
             let precision: f64 = of_mean.iter().sum();

@@ -11,7 +11,7 @@ pub(crate) const INTERFACE: i32 = 101;
 pub(crate) const RIGID_WALL: i32 = 102;
 const RIGID_BODY: i32 = 103;
 pub(crate) const SECTION: i32 = 104;
-/// Parts and subsets are no groups of the file; here they are groups of one object each.
+/// Parts and subsets are not groups of the file; here each is a group of one object.
 pub(crate) const PART: i32 = -1;
 pub(crate) const SUBSET: i32 = -2;
 

@@ -240,7 +240,7 @@ impl<'a> Card<'a> {
     }
 
     /// An id and the text after it. The text may hold commas, so the card counts as
-    /// free only when its first columns are no number by themselves.
+    /// free only when its first columns are not a number by themselves.
     pub(crate) fn id_and_text(&self) -> (Field<'a>, Option<String>) {
         let width = self.width.min(self.text.len());
         let (id, title) = self.text.split_at(width);
