@@ -2,13 +2,13 @@
 //!
 //!     cargo bench --bench forest
 
-mod table;
+mod samples;
 
 use crumple::forest::ForestParams;
 use divan::{Bencher, black_box};
 use linfa::traits::{Fit, Predict};
 use ndarray::Array1;
-use table::smooth;
+use samples::smooth;
 
 fn main() {
     divan::main();

@@ -6,7 +6,7 @@
 //! (`tests/run` installs that Python.) Names of rows behind `--` pick them; the rows of a
 //! million samples, of which scikit-learn needs minutes, run only if they are named.
 
-mod table;
+mod samples;
 
 use std::error::Error;
 use std::path::Path;
@@ -20,7 +20,7 @@ use crumple::forest::{ForestParams, Ties};
 use linfa::Dataset;
 use linfa::traits::{Fit, Predict};
 use ndarray::{Array1, Ix1};
-use table::smooth;
+use samples::smooth;
 
 /// Fits and predicts the tables in two files (raw doubles, target last) `repeats` times;
 /// prints CPU and wall seconds of a fit and of a prediction, and the rmse of the second table.

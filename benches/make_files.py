@@ -1,5 +1,6 @@
 """Writes the files of the reader benches: a nodout of 5 000 nodes and 400 states (310 MB), the
-same of 40 states, and a binout with the same values in single precision (96 MB).
+same of 40 states, a binout with the same values in single precision (96 MB), and an rcforc, elout, matsum and
+glstat of 190 to 270 MB.
 
     python make_files.py FOLDER
 """
@@ -84,11 +85,65 @@ def binout(path):
         record(7, struct.pack("<Q", table_at))
 
 
+def repeated(path, states, body):
+    """States of a text file; `body` writes one with other numbers, of which few are made and then repeated at other times."""
+    random = np.random.default_rng(2)
+    number = lambda form: form % (random.normal() * 10.0 ** random.integers(-8, 8))
+    bodies = [body(number) for _ in range(8)]
+    with path.open("w") as out:
+        out.write(HEAD)
+        for state in range(states):
+            out.write(bodies[state % len(bodies)].replace("TIME-------E", "%12.5E" % (state * 1e-5)).replace(
+                "TIME----E4", "%10.4E" % (state * 1e-5)).replace("CYCLE--", "%7d" % state))
+
+
+def rcforc(number):
+    """200 sides of interfaces."""
+    return "".join("  %-6s%11d timeTIME-------E" % (side, 1000 + k) + "".join(
+        label + number("%12.5E") for label in ("  x ", "  y ", "  z ", " mass ", "  mx ", "  my ", "  mz ")) + "\n"
+        for k in range(100) for side in ("slave", "master"))
+
+
+def elout(number):
+    """Stresses of 200 solids."""
+    return ("\n\n\n e l e m e n t   s t r e s s   c a l c u l a t i o n s   f o r   t i m e  s t e p  CYCLE--"
+            "   ( at timeTIME-------E )\n\n element  materl\n     ipt  stress       sig-xx      sig-yy      sig-zz"
+            "      sig-xy      sig-yz      sig-zx                       yield\n           state" + " " * 82
+            + "effsg      function\n" + "".join(
+                "%8d-%7d\n%8d elastic " % (1001 + k, 3, 1) + "".join(number("%12.4E") for _ in range(6))
+                + number("%14.4E") + number("%14.4E") + "\n" for k in range(200)))
+
+
+def matsum(number):
+    """100 parts."""
+    lines = (("inten", "     kinen", "     eroded_ie", "     eroded_ke"), (" x-mom", "     y-mom", "     z-mom"),
+             (" x-rbv", "     y-rbv", "     z-rbv"), (" " * 25 + "hgeng",))
+    return "\n\n\n time =   TIME----E4\n" + "".join(" mat.#=%5d             " % (10 + k) + "".join(
+        "".join(label + "=" + number("%13.4E") for label in line) + "\n" for line in lines) + "\n\n"
+        for k in range(100))
+
+
+def glstat(number):
+    """The labels of an explicit run."""
+    labels = ("time step", "kinetic energy", "internal energy", "stonewall energy", "spring and damper energy",
+              "hourglass energy ", "system damping energy", "sliding interface energy", "external work",
+              "eroded kinetic energy", "eroded internal energy", "eroded hourglass energy", "total energy",
+              "total energy / initial energy", "energy ratio w/o eroded energy", "global x velocity",
+              "global y velocity", "global z velocity")
+    return (" dt of cycle CYCLE-- is controlled by solid         100449 of part        10\n\n time"
+            + "." * 27 + "  TIME-------E\n" + "".join(
+                " " + label.ljust(31, ".") + number("%14.5E") + "\n" for label in labels)
+            + " time per zone cycle.(nanosec)..%14d\n\n\n" % 42)
+
+
 def main(folder):
     folder = pathlib.Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     nodout(folder / "nodout", folder / "nodout_small")
     binout(folder / "binout0000")
+    for name, states, body in (("rcforc", 8_000, rcforc), ("elout", 9_200, elout), ("matsum", 6_000, matsum),
+                               ("glstat", 262_000, glstat)):
+        repeated(folder / name, states, body)
 
 
 if __name__ == "__main__":

@@ -323,3 +323,100 @@ fn h5py_finds_the_nodes_of_what_was_written_state_by_state() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     assert_eq!(String::from_utf8(output.stdout).unwrap().trim(), "9000 4500");
 }
+
+/// A state of each of some kinds, with the time, the cycle and a number to be filled in.
+const KINDS: [(&str, &str); 4] = [
+    (
+        "rcforc",
+        "  slave           2 time {t5}  x {a}  y {b}  z {a} mass {b}  mx {a}  my {b}  mz {a}\n  master          2 time {t5}  x {b}  y {a}  z {b} mass {a}  mx {b}  my {a}  mz {b}\n",
+    ),
+    (
+        "elout",
+        " e l e m e n t   s t r e s s   c a l c u l a t i o n s   f o r   t i m e  s t e p {cycle}   ( at time {t5} )\n\n element  materl\n     ipt  stress       sig-xx      sig-yy      sig-zz      sig-xy      sig-yz      sig-zx                       yield\n           state                                                                                  effsg      function\n      45-      1\n       1 {word} {a}{b}{a}{b}{a}{b}  {a}  {b}\n      47-      1\n       1 elastic {b}{a}{b}{a}{b}{a}  {b}  {a}\n",
+    ),
+    (
+        "matsum",
+        " time =   {t4}\n mat.#=   10             inten= {a}     kinen= {b}     eroded_ie= {a}     eroded_ke= {b}\n x-mom= {a}     y-mom= {b}     z-mom= {a}\n x-rbv= {b}     y-rbv= {a}     z-rbv= {b}\n                         hgeng= {a}\n\n",
+    ),
+    (
+        "glstat",
+        " dt of cycle {cycle} is controlled by {kind} {cycle} of part        10\n\n time...........................  {t5}\n time step......................  {a}\n kinetic energy.................  {b}\n hourglass energy ..............  {a}\n time per zone cycle.(nanosec)..      {cycle}\n\n",
+    ),
+];
+
+/// A file of a kind; `uneven`: with blank lines that no layout repeats.
+fn of_kind(kind: &str, state: &str, states: usize, uneven: bool, damage: Option<usize>) -> String {
+    let mut text =
+        " title\n                    ls-dyna smp d R14 R14.0 date 12/12/2022\n".to_string();
+    if kind == "rwforc" {
+        text += "    time       wall#   normal-force    x-force        y-force        z-force\n";
+    }
+    let decimals = |value: f64, count: usize, width: usize| {
+        let (mantissa, exponent) = fortran(format!("{value:.count$E}"));
+        format!("{:>width$}", format!("{mantissa}{exponent}"))
+    };
+    for k in 0..states {
+        let time = k as f64 * 1e-4;
+        let number = |field| number(k, k % 7, field) / if field == 3 { 1e3 } else { 1.0 };
+        let form = |field| match kind {
+            "elout" | "matsum" => decimals(number(field), 4, 12),
+            "bndout" => decimals(number(field), 4, 12),
+            _ => decimals(number(field), 5, 12),
+        };
+        let body = state
+            .replace("{t5}", &decimals(time, 5, 11))
+            .replace("{t4}", &decimals(time, 4, 10))
+            .replace("{cycle}", &format!("{k:8}"))
+            .replace("{word}", if k % 5 == 0 { "plastic" } else { "elastic" })
+            .replace("{kind}", if k % 4 == 0 { "shell" } else { "solid" })
+            .replace("{a}", &form(3))
+            .replace("{b}", &form(8));
+        let body = match damage {
+            Some(at) if k == states / 2 => {
+                let at = at % (body.len() - 30);
+                format!("{}{}{}", &body[..at], "*".repeat(9), &body[at + 9..])
+            }
+            _ => body,
+        };
+        text += &body;
+        text += &"\n".repeat(if uneven { k % 2 + 1 + k % 3 } else { 2 });
+    }
+    text
+}
+
+/// Every kind of text, read by its layout and line by line; then with stars anywhere in one state, and cut anywhere.
+#[test]
+fn kinds_are_read_by_their_layout_as_line_by_line() {
+    let read_as = |kind: &str, text: &str, selection: &Selection| {
+        read_from(kind, &[Box::new(text.as_bytes().to_vec())], selection).unwrap().remove(0)
+    };
+    let told = |file: &SolverFile| {
+        file.problems.iter().map(|p| (p.code, p.columns, p.message.clone())).collect::<Vec<_>>()
+    };
+    for (kind, state) in KINDS {
+        for selection in [Selection::all(), Selection::nothing()] {
+            let even = of_kind(kind, state, 40, false, None);
+            let read = read_as(kind, &even, &selection);
+            assert_eq!(told(&read), [], "{kind}");
+            assert_eq!(read.time.len(), 40, "{kind}");
+            let lines = read_as(kind, &of_kind(kind, state, 40, true, None), &selection);
+            assert!(content(&read) == content(&lines), "{kind}");
+            for at in (0..600).step_by(7) {
+                let damaged = |uneven| of_kind(kind, state, 40, uneven, Some(at));
+                let read = read_as(kind, &damaged(false), &selection);
+                let lines = read_as(kind, &damaged(true), &selection);
+                assert_eq!(told(&read), told(&lines), "{kind} {at}");
+                assert!(content(&read) == content(&lines), "{kind} {at}");
+            }
+        }
+        // What is there of a cut file is what is there of the whole one.
+        let even = of_kind(kind, state, 12, false, None);
+        for cut in (even.len() / 2..even.len()).step_by(3) {
+            let read = read_as(kind, &even[..cut], &Selection::all());
+            let whole = read_as(kind, &even, &Selection::all());
+            for (a, b) in read.histories.iter().zip(&whole.histories) {
+                assert_eq!(a.values, b.values[..read.time.len()], "{kind} {cut}");
+            }
+        }
+    }
+}

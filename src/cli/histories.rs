@@ -3,9 +3,12 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crate::file::write_whole;
-use crate::history_hdf5::{convert, encode};
-use crate::solver::{self, Access, Selection, SolverFile, WantedId, decks};
+use rayon::prelude::*;
+
+use crate::error::Error;
+use crate::file::{write_at, write_whole};
+use crate::history_hdf5::{Precision, Trouble, can_stream, convert, encode_in};
+use crate::solver::{self, Access, Blocks, Selection, SolverFile, WantedId, decks};
 use crate::unit::UnitSystem;
 
 use super::arguments::{selection, units};
@@ -44,6 +47,9 @@ pub(super) struct Args {
     /// Units of the file, such as mm-t-s, to be named in HDF5 [default: those of the deck next to it]
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
+    /// Write the values in HDF5 in single precision: half the size, and all six digits that solvers print
+    #[arg(long)]
+    f32: bool,
     /// Replace an HDF5 file that is not a file of histories, such as a curve database
     #[arg(long)]
     force: bool,
@@ -58,13 +64,22 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let is_hdf5 = is_hdf5(args, output)?;
     let deck = is_hdf5.then(|| decks::deck_next_to(&args.file)).flatten().map(|(_, deck)| deck);
     let (units, deck) = (args.units, deck.as_ref());
+    let precision = if args.f32 { Precision::Single } else { Precision::Double };
     // JSON on standard output next to a file needs the values themselves.
     let straight = output.filter(|_| is_hdf5 && !options.json);
     let format = args.format.as_deref();
     let bar = Bar::new(options, "reading");
-    let file = match straight {
-        Some(path) => convert(&args.file, format, &selection, units, deck, path)?,
-        None => solver::read(&args.file, format, &selection)?,
+    let streamed = match is_hdf5 || options.json {
+        true => None,
+        false => stream_csv(&args.file, format, &selection, output)?,
+    };
+    let is_streamed = streamed.is_some();
+    let file = match (streamed, straight) {
+        (Some(file), _) => file,
+        (None, Some(path)) => {
+            convert(&args.file, format, &selection, units, deck, precision, path)?
+        }
+        (None, None) => solver::read(&args.file, format, &selection)?,
     };
     drop(bar);
     check_section(&args.file, &file, args.section.as_deref())?;
@@ -72,18 +87,18 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if !options.quiet {
         file.notes.iter().for_each(|note| output::eprint_line(&format!("note: {note}")));
     }
-    match output.filter(|_| straight.is_none()) {
+    match output.filter(|_| straight.is_none() && !is_streamed) {
         Some(path) => {
             let _bar = Bar::new(options, "writing");
             if is_hdf5 {
-                write_whole(path, &encode(&file, units, deck, Some(&args.file))?)?;
+                write_whole(path, &encode_in(precision, &file, units, deck, Some(&args.file))?)?;
             } else {
                 let mut csv = Vec::new();
                 write_csv(&mut csv, &file)?;
                 write_whole(path, &csv)?;
             }
         }
-        None if options.json || straight.is_some() => {}
+        None if options.json || straight.is_some() || is_streamed => {}
         None => output::print_data(|out| write_csv(out, &file))?,
     }
     if options.json {
@@ -151,7 +166,94 @@ fn is_hdf5(args: &Args, output: Option<&Path>) -> Result<bool, Failure> {
             "--units is for HDF5 (-o FILE.h5): CSV holds the values as they are in the file",
         );
     }
+    if args.f32 && !is_hdf5 {
+        return usage("--f32 is for HDF5 (-o FILE.h5)");
+    }
     Ok(is_hdf5)
+}
+
+/// Writes a file as CSV state by state while it is read, if that can be done; `None` if not.
+fn stream_csv(
+    input: &Path,
+    format: Option<&str>,
+    selection: &Selection,
+    output: Option<&Path>,
+) -> Result<Option<SolverFile>, Failure> {
+    if !can_stream(input, output) {
+        return Ok(None);
+    }
+    let Some(blocks) = solver::blocks(input, format, selection)? else { return Ok(None) };
+    let mut read_error = None;
+    let mut write = |out: &mut dyn Write| match write_rows(&blocks, out) {
+        Ok(whole) => Ok(whole.then_some(())),
+        Err(Trouble::Writing(error)) => Err(error),
+        Err(Trouble::Reading(error)) => {
+            read_error = Some(error);
+            Ok(None)
+        }
+    };
+    let written = match output {
+        Some(path) => write_at(path, |mut file| write(&mut file))?,
+        // What is printed cannot be taken back.
+        None if !blocks.are_whole().map_err(|error| Error::io(input, error))? => return Ok(None),
+        None => {
+            let written = output::print_data(write)?;
+            if written.is_none() {
+                read_error.get_or_insert(io::Error::other("it has changed while it was read"));
+            }
+            written
+        }
+    };
+    if let Some(error) = read_error {
+        return Err(Error::io(input, error).into());
+    }
+    Ok(written.map(|()| blocks.file))
+}
+
+/// Values of states that one thread writes at once.
+const TOGETHER: usize = 1 << 16;
+
+/// Writes all states, some at once; false if one is damaged.
+fn write_rows(blocks: &Blocks, out: &mut dyn Write) -> Result<bool, Trouble> {
+    let labels = blocks.labels();
+    let columns: Vec<(String, &[f64])> =
+        ["time".into()].into_iter().chain(labels).map(|label| (label, &[][..])).collect();
+    output::csv(out, &columns, |_, _| Ok(())).map_err(Trouble::Writing)?;
+    let (time, width) = (&blocks.file.time, blocks.values());
+    let together = (TOGETHER / width).max(1);
+    let round = 2 * rayon::current_num_threads();
+    let groups: Vec<&[f64]> = time.chunks(together).collect();
+    for (k, groups) in groups.chunks(round).enumerate() {
+        let texts: Vec<Option<Vec<u8>>> = (0..)
+            .map(|group| (k * round + group) * together)
+            .zip(groups)
+            .collect::<Vec<_>>()
+            .into_par_iter()
+            .map_init(
+                || (blocks.window(), vec![0.0; width], zmij::Buffer::new()),
+                |(window, values, digits), (first, times)| {
+                    let mut text = Vec::new();
+                    for (state, time) in (first..).zip(*times) {
+                        if !blocks.read(window, state, values).map_err(Trouble::Reading)? {
+                            return Ok(None);
+                        }
+                        text.extend_from_slice(digits.format(*time).as_bytes());
+                        for &place in &blocks.order {
+                            text.push(b',');
+                            text.extend_from_slice(digits.format(values[place]).as_bytes());
+                        }
+                        text.push(b'\n');
+                    }
+                    Ok(Some(text))
+                },
+            )
+            .collect::<Result<_, _>>()?;
+        for text in texts {
+            let Some(text) = text else { return Ok(false) };
+            out.write_all(&text).map_err(Trouble::Writing)?;
+        }
+    }
+    Ok(true)
 }
 
 /// A `time` column and one column per history, with enough digits to read back the same numbers.

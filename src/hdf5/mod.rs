@@ -11,8 +11,8 @@
 //! written.
 //!
 //! This relies on behaviour that hdf5-pure does not guarantee: it passes the raw values of
-//! a dataset to its writer in one piece, as they were given to it, if they have 8 KiB or more
-//! (fewer it gathers with others in the buffer of a `BufWriter`). The crate's version is pinned
+//! a dataset to its writer in one piece, as they were given to it, if they have 8 KiB or more. (Fewer
+//! it gathers with others in the buffer of a `BufWriter`: there the mark is looked for.) The crate's version is pinned
 //! exactly, and the test below fails when that changes. [`Skeleton::write`] notices it too, and
 //! its callers then report it or write in another way.
 
@@ -28,7 +28,7 @@ pub(crate) use hdf5_pure::{
     AttrValue, Dataset, DatasetBuilder, Error, File, FileAccessProperties, FileBuilder,
     FileLocking, FormatError, Group, ReadSeekSource, Source,
 };
-use hdf5_pure::{Datatype, make_f64_type};
+use hdf5_pure::{Datatype, make_f32_type, make_f64_type};
 
 /// Why a file is not opened as HDF5.
 #[derive(Debug, thiserror::Error)]
@@ -116,12 +116,16 @@ pub(crate) struct Skeleton {
 
 impl Skeleton {
     /// Gives a dataset of doubles its shape and its place.
-    pub(crate) fn reserve(&mut self, dataset: &mut DatasetBuilder, rows: usize, columns: usize) {
-        let shape = [rows as u64, columns as u64];
-        self.reserve_values(dataset, make_f64_type(), size_of::<f64>(), &shape);
+    pub(crate) fn reserve(&mut self, dataset: &mut DatasetBuilder, shape: &[u64]) {
+        self.reserve_values(dataset, make_f64_type(), size_of::<f64>(), shape);
     }
 
-    /// Gives a dataset of values of `size` bytes its shape and its place. Of fewer than 8 KiB the
+    /// The same of single precision.
+    pub(crate) fn reserve_single(&mut self, dataset: &mut DatasetBuilder, shape: &[u64]) {
+        self.reserve_values(dataset, make_f32_type(), size_of::<f32>(), shape);
+    }
+
+    /// Gives a dataset of values of `size` bytes its shape and its place. In fewer bytes than a mark has the
     /// place is not found, and [`Skeleton::write`] gives `None`.
     pub(crate) fn reserve_values(
         &mut self,
@@ -146,9 +150,15 @@ impl Skeleton {
         builder: FileBuilder,
         file: &fs::File,
     ) -> io::Result<Option<Vec<u64>>> {
-        let mut sink =
-            Sink { lengths: &self.lengths, file, at: 0, offsets: vec![None; self.lengths.len()] };
+        let offsets = vec![None; self.lengths.len()];
+        let mut sink = Sink { lengths: &self.lengths, file, at: 0, offsets, others: Vec::new() };
         builder.finish_to(&mut sink).map_err(io::Error::other)?;
+        for (number, offset) in sink.offsets.iter_mut().enumerate() {
+            let find = |(at, bytes): &(u64, Vec<u8>)| {
+                memchr::memmem::find(bytes, &mark(number)).map(|found| at + found as u64)
+            };
+            *offset = offset.or_else(|| sink.others.iter().find_map(find));
+        }
         let offsets: Option<Vec<u64>> = sink.offsets.into_iter().collect();
         if offsets.is_some() {
             allocate(file, sink.at)?;
@@ -179,6 +189,8 @@ struct Sink<'a> {
     file: &'a fs::File,
     at: u64,
     offsets: Vec<Option<u64>>,
+    /// The other bytes, in pieces that belong together.
+    others: Vec<(u64, Vec<u8>)>,
 }
 
 impl Write for Sink<'_> {
@@ -188,7 +200,13 @@ impl Write for Sink<'_> {
         let number = number.and_then(|n| usize::try_from(n).ok());
         match number.filter(|&n| self.lengths.get(n) == Some(&bytes.len())) {
             Some(number) => self.offsets[number] = Some(self.at),
-            None => write_all_at(self.file, bytes, self.at)?,
+            None => {
+                write_all_at(self.file, bytes, self.at)?;
+                match self.others.last_mut() {
+                    Some((at, above)) if *at + above.len() as u64 == self.at => above.extend(bytes),
+                    _ => self.others.push((self.at, bytes.to_vec())),
+                }
+            }
         }
         self.at += bytes.len() as u64;
         Ok(bytes.len())
@@ -234,7 +252,7 @@ mod tests {
         // From 8 KiB on.
         let shapes = [(1024, 1), (1, 1024), (70_000, 11)];
         for (k, (rows, columns)) in shapes.into_iter().enumerate() {
-            skeleton.reserve(out.create_dataset(&format!("d{k}")), rows, columns);
+            skeleton.reserve(out.create_dataset(&format!("d{k}")), &[rows as u64, columns as u64]);
         }
         out.create_dataset("small").with_f64_data(&[1.0, 2.0]);
         let offsets = skeleton.write(out, &file).unwrap();
@@ -257,12 +275,28 @@ mod tests {
 
     #[test]
     fn values_that_are_not_handed_over_by_themselves_are_noticed() {
-        for rows in [1, 3, 1000] {
-            let file = tempfile::tempfile().unwrap();
+        for rows in [1, 2, 3, 1000] {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("a.h5");
+            let file = fs::File::create(&path).unwrap();
             let mut out = FileBuilder::new();
             let mut skeleton = Skeleton::default();
-            skeleton.reserve(out.create_dataset("d"), rows, 1);
-            assert_eq!(skeleton.write(out, &file).unwrap(), None, "{rows} values");
+            for name in ["c", "d", "e"] {
+                skeleton.reserve(out.create_dataset(name), &[rows, 1]);
+            }
+            let Some(offsets) = skeleton.write(out, &file).unwrap() else {
+                assert!(rows < 3, "{rows} values");
+                continue;
+            };
+            for (value, offset) in [1.0f64, 2.0, 3.0].into_iter().zip(offsets) {
+                let bytes = value.to_le_bytes().repeat(rows as usize);
+                write_all_at(&file, &bytes, offset).unwrap();
+            }
+            let (read, _) = hdf5::open(&path).unwrap();
+            for (value, name) in [(1.0, "c"), (2.0, "d"), (3.0, "e")] {
+                let values = read.dataset(name).unwrap().read_f64().unwrap();
+                assert_eq!(values, vec![value; rows as usize], "{rows} values");
+            }
         }
     }
 }

@@ -23,7 +23,7 @@ use units::unit_of;
 
 /// Converts the selected histories of the file at `input` to HDF5, in the solver's units.
 ///
-/// An undamaged nodout is written state by state while it is read, on all threads, and
+/// An undamaged text file is written state by state while it is read, on all threads, and
 /// never held as a whole; any other file is read first. Gives back what the file says of
 /// itself, with its problems; the histories are left out where they went straight on.
 pub(crate) fn convert(
@@ -32,21 +32,24 @@ pub(crate) fn convert(
     selection: &Selection,
     units: Option<UnitSystem>,
     deck: Option<&Deck>,
+    precision: Precision,
     output: &Path,
 ) -> Result<SolverFile, Error> {
-    // Neither can be opened twice, nor be written at any place.
-    let is_file = |path: &Path| path.metadata().is_ok_and(|meta| meta.is_file());
-    let is_device = output.exists() && !is_file(output);
-    if !is_device
-        && is_file(input)
+    if can_stream(input, Some(output))
         && let Some(blocks) = solver::blocks(input, format, selection)?
-        && let Some(file) = stream(input, blocks, units, deck, output)?
+        && let Some(file) = stream(input, blocks, units, deck, precision, output)?
     {
         return Ok(file);
     }
     let file = solver::read(input, format, selection)?;
-    write_whole(output, &encode(&file, units, deck, Some(input))?)?;
+    write_whole(output, &encode_in(precision, &file, units, deck, Some(input))?)?;
     Ok(file)
+}
+
+/// Whether a file can be opened twice, and another be written at any place.
+pub(crate) fn can_stream(input: &Path, output: Option<&Path>) -> bool {
+    let is_file = |path: &Path| path.metadata().is_ok_and(|meta| meta.is_file());
+    output.is_none_or(|output| !output.exists() || is_file(output)) && is_file(input)
 }
 
 /// Whether a file is HDF5 but no file of histories: a curve database, or of someone else.
@@ -84,6 +87,50 @@ pub fn encode(
     deck: Option<&Deck>,
     source: Option<&Path>,
 ) -> Result<Vec<u8>, Error> {
+    encode_in(Precision::Double, file, units, deck, source)
+}
+
+/// In which precision values are written; times are always written in double precision.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Precision {
+    Double,
+    Single,
+}
+
+impl Precision {
+    fn size(self) -> usize {
+        match self {
+            Self::Double => size_of::<f64>(),
+            Self::Single => size_of::<f32>(),
+        }
+    }
+
+    /// Appends the bytes of values.
+    fn append(self, values: &[f64], bytes: &mut Vec<u8>) {
+        match self {
+            Self::Double => bytes.extend(values.iter().flat_map(|value| value.to_le_bytes())),
+            Self::Single => bytes.extend(values.iter().flat_map(|v| (*v as f32).to_le_bytes())),
+        }
+    }
+
+    fn fill<'a>(self, dataset: &'a mut DatasetBuilder, values: &[f64]) -> &'a mut DatasetBuilder {
+        match self {
+            Self::Double => dataset.with_f64_data(values),
+            Self::Single => {
+                dataset.with_f32_data(&values.iter().map(|v| *v as f32).collect::<Vec<_>>())
+            }
+        }
+    }
+}
+
+/// The same in a precision.
+pub(crate) fn encode_in(
+    precision: Precision,
+    file: &SolverFile,
+    units: Option<UnitSystem>,
+    deck: Option<&Deck>,
+    source: Option<&Path>,
+) -> Result<Vec<u8>, Error> {
     let mut layout = Layout::of(file, units, deck, source);
     let mut components: Vec<(&Arc<str>, Vec<&History>)> = Vec::new();
     let mut index: HashMap<&Arc<str>, usize> = HashMap::new();
@@ -98,14 +145,14 @@ pub fn encode(
         let entities: Vec<EntityId> = channels.iter().filter_map(|h| h.entity).collect();
         let dataset = layout.component(component, &entities);
         if entities.is_empty() {
-            dataset.with_f64_data(&channels[0].values);
+            precision.fill(dataset, &channels[0].values);
             continue;
         }
         let mut rows = Vec::with_capacity(file.time.len() * channels.len());
         for state in 0..file.time.len() {
             rows.extend(channels.iter().map(|h| h.values[state]));
         }
-        dataset.with_f64_data(&rows).with_shape(&[file.time.len() as u64, channels.len() as u64]);
+        precision.fill(dataset, &rows).with_shape(&[file.time.len() as u64, channels.len() as u64]);
     }
     layout.finish()?.finish().map_err(not_encoded)
 }
@@ -304,17 +351,18 @@ impl Names {
     }
 }
 
-/// States that are handed on together, so that writes are not too short; of states with
-/// more values than this each alone.
-const TOGETHER: usize = 2;
+/// Values that are handed on together, so that writes are not too short, but at least two states
+/// unless each has more values than this.
+const TOGETHER: usize = 1 << 17;
 const MANY_VALUES: usize = 1 << 18;
 
-/// Writes a nodout state by state. `None` if it turns out to be damaged.
+/// Writes a text file state by state. `None` if it turns out to be damaged.
 fn stream(
     input: &Path,
     blocks: Blocks,
     units: Option<UnitSystem>,
     deck: Option<&Deck>,
+    precision: Precision,
     output: &Path,
 ) -> Result<Option<SolverFile>, Error> {
     let states = blocks.file.time.len();
@@ -322,13 +370,18 @@ fn stream(
     let mut skeleton = Skeleton::default();
     for column in &blocks.columns {
         let dataset = layout.component(&column.component, &column.entities);
-        skeleton.reserve(dataset, states, column.entities.len());
+        let shape = [states as u64, column.entities.len() as u64];
+        let shape = if column.entities.is_empty() { &shape[..1] } else { &shape };
+        match precision {
+            Precision::Double => skeleton.reserve(dataset, shape),
+            Precision::Single => skeleton.reserve_single(dataset, shape),
+        }
     }
     let out = layout.finish()?;
     let mut read_error = None;
     let written = write_at(output, |file| {
         let Some(offsets) = skeleton.write(out, file)? else { return Ok(None) };
-        match fill(&blocks, &offsets, file) {
+        match fill(&blocks, precision, &offsets, file) {
             Ok(whole) => Ok(whole.then_some(())),
             Err(Trouble::Writing(error)) => Err(error),
             Err(Trouble::Reading(error)) => {
@@ -343,17 +396,24 @@ fn stream(
     Ok(written.map(|()| blocks.file))
 }
 
-enum Trouble {
+/// What has failed.
+pub(crate) enum Trouble {
     Reading(io::Error),
     Writing(io::Error),
 }
 
 /// Reads all states and writes their values to `offsets`, one per column; false if a state
 /// is damaged.
-fn fill(blocks: &Blocks, offsets: &[u64], file: &File) -> Result<bool, Trouble> {
+fn fill(
+    blocks: &Blocks,
+    precision: Precision,
+    offsets: &[u64],
+    file: &File,
+) -> Result<bool, Trouble> {
     let states = blocks.file.time.len();
     let values = blocks.values();
-    let together = if values > MANY_VALUES { 1 } else { TOGETHER };
+    let least = if values > MANY_VALUES { 1 } else { 2 };
+    let together = (TOGETHER / values).clamp(least, states.max(least));
     let damaged = AtomicBool::new(false);
     (0..states.div_ceil(together)).into_par_iter().try_for_each_init(
         || (blocks.window(), vec![0.0; values * together], Vec::new()),
@@ -370,13 +430,12 @@ fn fill(blocks: &Blocks, offsets: &[u64], file: &File) -> Result<bool, Trouble> 
             }
             let mut start = 0;
             for (column, offset) in blocks.columns.iter().zip(offsets) {
-                let width = column.entities.len();
+                let width = column.width();
                 bytes.clear();
                 for state in read.chunks_exact(values).take(count) {
-                    let row = &state[start..start + width];
-                    bytes.extend(row.iter().flat_map(|value| value.to_le_bytes()));
+                    precision.append(&state[start..start + width], bytes);
                 }
-                let at = offset + (first * width * size_of::<f64>()) as u64;
+                let at = offset + (first * width * precision.size()) as u64;
                 write_all_at(file, bytes, at).map_err(Trouble::Writing)?;
                 start += width;
             }

@@ -3,6 +3,8 @@
 use std::io::{self, Read};
 use std::path::Path;
 
+use super::lsdyna::ascii::{self, Body};
+use super::lsdyna::blocks::Blocks;
 use super::runs::restart_number;
 use super::source::{self, Source, Stream};
 use super::{Selection, SolverFile, lsdyna, openradioss, problem, unknown_format};
@@ -23,22 +25,22 @@ pub(crate) struct Format {
 /// Reads a family of files; one result per section.
 type ReadSections = fn(&[Box<dyn Source>], &Selection) -> io::Result<Vec<SolverFile>>;
 type ReadText = fn(&'static Format, &dyn Source, &Selection) -> io::Result<SolverFile>;
+type OpenBlocks = fn(&'static Format, Box<dyn Source>, &Selection) -> io::Result<Option<Blocks>>;
 
 enum Reader {
     /// Lines of text.
-    Text(ReadText),
+    Text(ReadText, OpenBlocks),
     /// Bytes, recognised by the first of them; over one or several files; sections inside.
     Binary(ReadSections),
 }
 
 impl Format {
-    pub(super) const fn text(
+    pub(super) const fn text<B: Body>(
         name: &'static str,
         entity: &'static str,
         signature: fn(&[u8]) -> bool,
-        read: ReadText,
     ) -> Self {
-        Self { name, entity, signature, reader: Reader::Text(read) }
+        Self { name, entity, signature, reader: Reader::Text(ascii::read::<B>, Blocks::open::<B>) }
     }
 
     pub(super) const fn binary(
@@ -61,6 +63,18 @@ impl Format {
         matches!(self.reader, Reader::Binary(_))
     }
 
+    /// The states of a file one by one, if they are laid out evenly.
+    pub(super) fn blocks(
+        &'static self,
+        source: Box<dyn Source>,
+        selection: &Selection,
+    ) -> io::Result<Option<Blocks>> {
+        match &self.reader {
+            Reader::Text(_, open) => open(self, source, selection),
+            Reader::Binary(_) => Ok(None),
+        }
+    }
+
     /// One result per section; a text file is one section.
     pub(super) fn read(
         &'static self,
@@ -68,8 +82,8 @@ impl Format {
         selection: &Selection,
     ) -> io::Result<Vec<SolverFile>> {
         let mut sections = match (&self.reader, parts) {
-            (Reader::Text(read), [first, ..]) => vec![read(self, &**first, selection)?],
-            (Reader::Text(_), []) => Vec::new(),
+            (Reader::Text(read, _), [first, ..]) => vec![read(self, &**first, selection)?],
+            (Reader::Text(..), []) => Vec::new(),
             (Reader::Binary(read), parts) => read(parts, selection)?,
         };
         for section in &mut sections {

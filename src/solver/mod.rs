@@ -41,10 +41,9 @@ pub use decks::read_deck;
 pub use detect::formats;
 pub(crate) use detect::{Format, entity_word, format_names, is_named_like_binary, without_job_id};
 use detect::{check_format, detect, files_in, named};
+pub use lsdyna::blocks::{Blocks, Column};
 pub use lsdyna::deck::context::Value;
 pub use lsdyna::deck::{Deck, DeckEntity, DeckPlace, Include, Output, StatedUnits, parse_deck};
-pub use lsdyna::nodout::Blocks;
-pub use lsdyna::nodout::stride::Column;
 pub use problem::{Problem, ProblemCode};
 pub(crate) use runs::family;
 use runs::missing_continuation;
@@ -183,7 +182,7 @@ pub(crate) fn is_output(path: &Path) -> bool {
     source.is_ok_and(|source| detect(path, &*source).is_ok())
 }
 
-/// Opens the file at `path` for reading state by state, if it is a nodout without damage
+/// Opens the file at `path` for reading state by state, if it is a text file without damage
 /// that is laid out evenly; [`read`] takes any other.
 ///
 /// # Errors
@@ -194,9 +193,9 @@ pub fn blocks(
     selection: &Selection,
 ) -> Result<Option<Blocks>, Error> {
     let (format, mut parts) = open(path, format, selection)?;
-    let Some(source) = parts.pop().filter(|_| format.name == "nodout") else { return Ok(None) };
+    let Some(source) = parts.pop() else { return Ok(None) };
     let io = |source| Error::io(path, source);
-    let blocks = Blocks::open(source, selection).map_err(io)?;
+    let blocks = format.blocks(source, selection).map_err(io)?;
     if let Some(blocks) = &blocks {
         check_selection(path, &blocks.file, selection)?;
     }

@@ -169,6 +169,10 @@ impl Diagnostics {
         self.add(code, Some(Place::at_byte(byte)), message);
     }
 
+    pub(crate) fn is_empty(&self) -> bool {
+        self.kept.is_empty()
+    }
+
     /// Adds the problems of another list after these.
     pub(crate) fn append(&mut self, other: Self) {
         let room = MAX_KEPT - self.kept.len();

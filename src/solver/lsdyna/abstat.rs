@@ -1,6 +1,6 @@
 //! `abstat`: state of airbags and control volumes, and of the materials they are made of.
 
-use super::ascii::{self, Body};
+use super::ascii::Body;
 use super::label_values::{Label, fields};
 use super::line::{Line, integer, real};
 use crate::history::EntityId;
@@ -37,17 +37,12 @@ const AREAS: [Label; 3] = [
 const AREA_WIDTH: usize = 12;
 const MAX_MATERIALS: usize = 1_000;
 
-pub(crate) const FORMAT: Format = Format::text(
-    "abstat",
-    "airbag",
-    |line| {
-        let text = line.trim_ascii_start();
-        text.starts_with(COLUMN_LINE) || (text.starts_with(MATERIAL) && text.len() > 60)
-    },
-    ascii::read::<Abstat>,
-);
+pub(crate) const FORMAT: Format = Format::text::<Abstat>("abstat", "airbag", |line| {
+    let text = line.trim_ascii_start();
+    text.starts_with(COLUMN_LINE) || (text.starts_with(MATERIAL) && text.len() > 60)
+});
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Abstat {
     table: Option<TableId>,
     /// Areas by material and row of it below its airbag; their components carry both.
@@ -89,12 +84,13 @@ impl Abstat {
             return None;
         }
         self.width = text.len();
-        let time = real(line.columns(1, TIME_END)).number()?;
+        let printed = line.columns(1, TIME_END);
+        let time = real(printed).number()?;
         let airbag = EntityId::new(integer(line.columns(TIME_END + 1, ID_END))?);
         let table = *self.table.get_or_insert_with(|| states.table("airbags", COMPONENTS));
         states.entity = Some(airbag);
         self.below.clear();
-        states.timed_row(table, airbag, time, line, |k| (k < count).then(|| field(k)));
+        states.timed_row(table, airbag, (time, printed), line, |k| (k < count).then(|| field(k)));
         Some(())
     }
 

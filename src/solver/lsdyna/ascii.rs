@@ -18,8 +18,9 @@
 use std::collections::{HashMap, HashSet};
 use std::io;
 
+use super::leap::Leaps;
 use super::line::{Line, Lines, legend_entry, version};
-use crate::solver::problem::{Place, ProblemCode};
+use crate::solver::problem::ProblemCode;
 use crate::solver::source::{Source, Stream};
 use crate::solver::states::StateReader;
 use crate::solver::{Format, NoDataReason, Selection, SolverFile, WithoutData};
@@ -28,11 +29,22 @@ use crate::solver::{Format, NoDataReason, Selection, SolverFile, WithoutData};
 pub(crate) type Tables = &'static [(&'static str, &'static [&'static str])];
 
 /// What one kind of file adds to the frame: the meaning of its lines.
-pub(crate) trait Body {
+pub(crate) trait Body: Clone + Default {
     /// Tables of every file of the kind, known by their order.
     const TABLES: Tables = &[];
 
     const EMPTY_STATES: bool = false;
+
+    /// Whether a state begins only where its time, or its cycle, is another one.
+    const BY_TIME: bool = false;
+
+    /// Whether lines between the first and the last row need not be read where none of them is wanted.
+    const MAY_SKIP: bool = false;
+
+    /// The reader of a format.
+    fn of(_: &'static Format) -> Self {
+        Self::default()
+    }
 
     /// What a line holds, for the message about one that holds something else.
     const EXPECTED: &'static str = "";
@@ -58,21 +70,15 @@ pub(crate) trait Body {
     /// The end of the file.
     fn end(&mut self, _states: &mut StateReader<'_>) {}
 
-    /// Offered after every line: reads the states from there on at once, if they are laid
-    /// out like the ones above, and says at which line to continue.
-    fn leap(
-        &mut self,
-        _source: &dyn Source,
-        _states: &mut StateReader<'_>,
-    ) -> io::Result<Option<Place>> {
-        Ok(None)
-    }
+    /// The state above, which was read by its layout, has this cycle.
+    fn continue_cycle(&mut self, _cycle: &[u8]) {}
 }
 
 /// Header, legend and states of a file, while it is read.
 pub(crate) struct AsciiReader<'a> {
-    format: &'static Format,
-    lines: Lines<Stream<'a>>,
+    pub format: &'static Format,
+    pub source: &'a dyn Source,
+    pub lines: Lines<Stream<'a>>,
     pub states: StateReader<'a>,
     in_legend: bool,
     legend: Vec<(i64, Option<String>)>,
@@ -87,36 +93,26 @@ const MAX_LEGEND: usize = 2_000_000;
 /// Leading states that may be too damaged to show the entities.
 const MAX_SKIPPED: usize = 3;
 
-/// Reads a whole file through a body made by `body`.
+/// Reads a whole file.
 ///
 /// The first complete state determines which entities a state has. If more states disagree with it
 /// than agree, it is the damaged one: the file is read again without it.
-pub(crate) fn read_with<B: Body>(
+pub(crate) fn read<B: Body>(
     format: &'static Format,
     source: &dyn Source,
     selection: &Selection,
-    body: impl Fn() -> B,
 ) -> io::Result<SolverFile> {
-    let (mut best, mut is_disputed) = read_from_state(0, format, source, selection, body())?;
+    let (mut best, mut is_disputed) = read_from_state::<B>(0, format, source, selection)?;
     for skipped in 1..=MAX_SKIPPED {
         if !is_disputed {
             break;
         }
-        let (next, disputed) = read_from_state(skipped, format, source, selection, body())?;
+        let (next, disputed) = read_from_state::<B>(skipped, format, source, selection)?;
         if next.time.len() > best.time.len() {
             (best, is_disputed) = (next, disputed);
         }
     }
     Ok(best)
-}
-
-/// The same through a body that needs nothing to begin with.
-pub(crate) fn read<B: Body + Default>(
-    format: &'static Format,
-    source: &dyn Source,
-    selection: &Selection,
-) -> io::Result<SolverFile> {
-    read_with(format, source, selection, B::default)
 }
 
 /// The file after the first `skipped` complete states, and whether more states disagree with the first
@@ -126,14 +122,12 @@ fn read_from_state<B: Body>(
     format: &'static Format,
     source: &dyn Source,
     selection: &Selection,
-    mut body: B,
 ) -> io::Result<(SolverFile, bool)> {
     let mut frame = AsciiReader::new::<B>(format, source, selection);
     frame.states.skip = skipped;
+    let (mut body, mut leaps) = (B::of(format), Leaps::default());
     while frame.step(&mut body)? {
-        if let Some(place) = body.leap(source, &mut frame.states)? {
-            frame.lines.go_to(place);
-        }
+        leaps.leap(&mut frame, &mut body)?;
     }
     let is_disputed = frame.states.is_disputed();
     Ok((frame.finish(&mut body), is_disputed))
@@ -152,6 +146,7 @@ impl<'a> AsciiReader<'a> {
         }
         Self {
             format,
+            source,
             lines: Lines::new(Stream::new(source)),
             states,
             in_legend: false,

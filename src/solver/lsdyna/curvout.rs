@@ -6,15 +6,16 @@ use super::ascii::{self, Body};
 use super::line::{Line, integer, is_whole_real};
 use crate::history::EntityId;
 use crate::solver::Format;
+use crate::solver::states::repeat::Part;
 use crate::solver::states::{StateReader, TableId};
 
 const STATE: &[u8] = b" curve data for time step";
 const COLUMN_LINE: &[u8] = b" curve id";
 
 pub(crate) const FORMAT: Format =
-    Format::text("curvout", "curve", |line| line.starts_with(STATE), ascii::read::<Curvout>);
+    Format::text::<Curvout>("curvout", "curve", |line| line.starts_with(STATE));
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Curvout;
 
 impl Body for Curvout {
@@ -28,6 +29,8 @@ impl Body for Curvout {
             return Some(());
         }
         if text.starts_with(STATE) {
+            let end = memchr::memchr(b'(', text).unwrap_or(STATE.len());
+            states.part(line, text.get(STATE.len()..end).unwrap_or_default(), Part::Unread);
             let time = super::heading_time(super::at_time(text), super::TIME, line, states);
             states.begin(time, line.into());
             if time.is_none() {

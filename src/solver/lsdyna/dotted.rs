@@ -3,11 +3,12 @@
 //!
 //! Never tested with real data; read as the source of LSTC's converter `l2a` writes them.
 
-use super::ascii::{self, Body};
+use super::ascii::Body;
 use super::label_values::is_number;
 use super::line::{Line, integer, real};
 use crate::history::EntityId;
 use crate::solver::Format;
+use crate::solver::states::repeat::Part;
 use crate::solver::states::{KeyedTables, StateReader};
 
 /// "label padded with dots to column 30, value in columns 31–44, id in columns 31–40".
@@ -20,23 +21,16 @@ const MAX_TABLES: usize = 100;
 const ELEMENTS: &[&str] = &["spring/damper number"];
 const JOINTS: &[&str] = &["joint number", "joint ID", "joint stiffness id number"];
 
-pub(crate) const DEFORC: Format = Format::text(
-    "deforc",
-    "element",
-    |line| label(line).is_some_and(|label| ELEMENTS.contains(&label)),
-    |format, source, selection| {
-        ascii::read_with(format, source, selection, || Dotted::new(ELEMENTS))
-    },
-);
+pub(crate) const DEFORC: Format = Format::text::<Dotted>("deforc", "element", |line| {
+    label(line).is_some_and(|label| ELEMENTS.contains(&label))
+});
 
-pub(crate) const JNTFORC: Format = Format::text(
-    "jntforc",
-    "joint",
-    |line| label(line).is_some_and(|label| JOINTS.contains(&label)),
-    |format, source, selection| ascii::read_with(format, source, selection, || Dotted::new(JOINTS)),
-);
+pub(crate) const JNTFORC: Format = Format::text::<Dotted>("jntforc", "joint", |line| {
+    label(line).is_some_and(|label| JOINTS.contains(&label))
+});
 
 /// Reader of either file; each label is a table of one column.
+#[derive(Clone, Default)]
 struct Dotted {
     /// Labels that begin an entity.
     entities: &'static [&'static str],
@@ -44,10 +38,6 @@ struct Dotted {
 }
 
 impl Dotted {
-    fn new(entities: &'static [&'static str]) -> Self {
-        Self { entities, tables: KeyedTables::default() }
-    }
-
     fn value(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         let (label, from) = split(text, LABEL)?;
@@ -64,6 +54,7 @@ impl Dotted {
         if label == "time" {
             states.entity = None;
             let time = real(value).number();
+            states.part(line, value, Part::Time);
             states.begin(time, line.into());
             return time.map(drop);
         }
@@ -77,6 +68,11 @@ impl Dotted {
 }
 
 impl Body for Dotted {
+    fn of(format: &'static Format) -> Self {
+        let entities = if format.name == DEFORC.name { ELEMENTS } else { JOINTS };
+        Self { entities, tables: KeyedTables::default() }
+    }
+
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         if self.value(line, states).is_none() {
             const END: usize = LABEL + VALUE_WIDTH;

@@ -10,11 +10,12 @@
 //! Rows may come and go, because elements erode; missing values are NaN. Their number is limited, so that damage
 //! that looks like erosion cannot fill the memory.
 
-use super::ascii::{self, Body};
+use super::ascii::Body;
 use super::line::{Line, integer};
 use crate::history::EntityId;
 use crate::solver::Format;
 use crate::solver::problem::{Place, ProblemCode};
+use crate::solver::states::repeat::Part;
 use crate::solver::states::{KeyedTables, StateReader, TableId};
 
 /// Headings of blocks; the last two are in an `eloutdet` only.
@@ -48,19 +49,12 @@ fn heading(line: &[u8]) -> Option<Quantity> {
     HEADINGS.iter().find(|(heading, _)| line.starts_with(heading)).map(|(_, quantity)| *quantity)
 }
 
-pub(crate) const FORMAT: Format = Format::text(
-    "elout",
-    "element",
-    |line| heading(line).is_some_and(|quantity| !quantity.is_nodal()),
-    ascii::read::<Elout>,
-);
+pub(crate) const FORMAT: Format = Format::text::<Elout>("elout", "element", |line| {
+    heading(line).is_some_and(|quantity| !quantity.is_nodal())
+});
 
-pub(crate) const DETAILS: Format = Format::text(
-    "eloutdet",
-    "node",
-    |line| heading(line).is_some_and(Quantity::is_nodal),
-    ascii::read::<Elout>,
-);
+pub(crate) const DETAILS: Format =
+    Format::text::<Elout>("eloutdet", "node", |line| heading(line).is_some_and(Quantity::is_nodal));
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Quantity {
@@ -89,7 +83,7 @@ struct Key {
     names: &'static [&'static str],
 }
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Elout {
     tables: KeyedTables<Key>,
     quantity: Option<Quantity>,
@@ -105,6 +99,7 @@ struct Elout {
 
 impl Body for Elout {
     const EMPTY_STATES: bool = true;
+    const BY_TIME: bool = true;
     const EXPECTED: &'static str = "an element or its values";
 
     fn is_signature(&self, line: &[u8]) -> bool {
@@ -121,6 +116,10 @@ impl Body for Elout {
             }
         }
         Some(())
+    }
+
+    fn continue_cycle(&mut self, cycle: &[u8]) {
+        self.cycle = Some(cycle.to_vec());
     }
 
     fn end(&mut self, states: &mut StateReader<'_>) {
@@ -141,6 +140,7 @@ impl Elout {
         let cycle = step.zip(to).and_then(|(from, to)| line.text.get(from..to));
         let text = super::at_time(line.text).filter(|_| line.is_heading());
         let time = super::heading_time(text, super::TIME, line, states);
+        states.part(line, cycle.unwrap_or_default(), Part::Cycle);
         self.quantity = Some(quantity);
         self.begins = true;
         let is_same = states.is_pending()
@@ -298,6 +298,11 @@ impl Elout {
         let (point, surface) = place(label)
             .or_else(|| location.and(label[..POINT].trim_ascii().is_empty().then_some((1, ""))))
             .filter(|_| !label.contains(&b'*'))?;
+        // The state of the material, such as plastic.
+        let words = label.iter().position(u8::is_ascii_digit).unwrap_or(LABEL);
+        let words = words + label[words..].iter().take_while(|b| b.is_ascii_digit()).count();
+        let is_point = label[..words].trim_ascii_start().first().is_some_and(u8::is_ascii_digit);
+        states.part(line, if is_point { &label[words..] } else { &[] }, Part::Unread);
         let further: &'static [&'static str] = match quantity {
             Quantity::Stress => self.further,
             Quantity::NodalStress => &["yield"],

@@ -3,11 +3,12 @@
 //! A state is label → value, and labels may be absent. Truncation removes them from the end, so a last state that ends
 //! early is incomplete. Unexpected text between the labels is counted.
 
-use super::ascii::{self, Body};
+use super::ascii::Body;
 use super::dotted::split;
 use super::line::{Line, integer, is_whole_real, real, shown};
 use crate::solver::Format;
 use crate::solver::states::StateReader;
+use crate::solver::states::repeat::Part;
 
 const STATE: &[u8] = b" dt of cycle";
 /// "label padded with dots to column 32, value columns 33–46".
@@ -22,9 +23,9 @@ const NAMES: [(&str, &str); 3] = [
 ];
 
 pub(crate) const FORMAT: Format =
-    Format::text("glstat", "entity", |line| line.starts_with(STATE), ascii::read::<Glstat>);
+    Format::text::<Glstat>("glstat", "entity", |line| line.starts_with(STATE));
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Glstat {
     /// Inside a block of mass properties, which ends with a row of stars.
     in_properties: bool,
@@ -38,6 +39,7 @@ impl Body for Glstat {
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         if line.text.starts_with(STATE) {
             states.begin(None, line.into());
+            states.part(line, &line.text[STATE.len()..], Part::Unread);
             if !line.is_heading() {
                 states.mark_damaged();
             }
@@ -77,7 +79,9 @@ impl Body for Glstat {
             states.scalar(&component, line, columns);
             return Some(());
         }
-        match real(line.columns(columns[0], columns[1])).number() {
+        let text = line.columns(columns[0], columns[1]);
+        states.part(line, text, Part::Time);
+        match real(text).number() {
             Some(time) if states.is_pending() && states.pending_time().is_none() => {
                 states.set_time(time);
             }

@@ -12,13 +12,14 @@ use crate::solver::states::StateReader;
 pub(crate) type Label = (&'static str, &'static str);
 
 /// How wide the numbers after each label of a file are, and where that was first seen.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Widths {
     of: Vec<Width>,
     /// Labels come in the same order in every state.
     next: usize,
 }
 
+#[derive(Clone)]
 struct Width {
     label: String,
     excess: isize,
@@ -31,6 +32,13 @@ struct Width {
 const MAX_LABELS: usize = 1_000;
 
 impl Widths {
+    /// Whether the widths are the same, however often they were seen.
+    pub(crate) fn agrees(&self, other: &Self) -> bool {
+        let widths =
+            |of: &Self| of.of.iter().map(|w| (w.label.clone(), w.excess)).collect::<Vec<_>>();
+        widths(self) == widths(other)
+    }
+
     /// Whether a number that is so much wider than usual can be that of the label. A first one that those below do not
     /// confirm is reported.
     pub(crate) fn allow(

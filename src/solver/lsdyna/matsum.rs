@@ -1,6 +1,6 @@
 //! `matsum`: energies, momenta and velocities of parts, labelled, several lines per part.
 
-use super::ascii::{self, Body};
+use super::ascii::Body;
 use super::label_values::{Label, fields};
 use super::line::{Line, integer, shown};
 use crate::history::EntityId;
@@ -46,9 +46,9 @@ const LINES: [(&str, &[Label]); 4] = [
 ];
 
 pub(crate) const FORMAT: Format =
-    Format::text("matsum", "part", |line| line.starts_with(PART), ascii::read::<Matsum>);
+    Format::text::<Matsum>("matsum", "part", |line| line.starts_with(PART));
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Matsum {
     tables: Option<[TableId; 4]>,
 }

@@ -1,8 +1,9 @@
 //! LS-DYNA's time histories: one module per file, named as the solver names it.
 
 pub(super) mod abstat;
-mod ascii;
+pub(super) mod ascii;
 pub(super) mod binout;
+pub(super) mod blocks;
 pub(super) mod curvout;
 pub(crate) mod deck;
 pub(super) mod dotted;
@@ -10,6 +11,8 @@ mod e12;
 pub(super) mod elout;
 pub(super) mod glstat;
 pub(super) mod label_values;
+mod layout;
+pub(super) mod leap;
 pub(super) mod line;
 mod lsda;
 pub(super) mod matsum;
@@ -24,6 +27,7 @@ pub(super) mod spcforc;
 pub(super) mod swforc;
 
 use super::states::StateReader;
+use super::states::repeat::Part;
 use line::{Line, real};
 
 /// What is in `( at time … )` of a state's heading.
@@ -45,6 +49,7 @@ fn heading_time(
     states: &mut StateReader<'_>,
 ) -> Option<f64> {
     let text = text?.trim_ascii();
+    states.part(line, text, Part::Time);
     let time = real(text).number()?;
     if !line::is_whole_real(text) {
         return text.iter().all(|b| !b.is_ascii_alphabetic()).then_some(time);
@@ -55,6 +60,7 @@ fn heading_time(
 
 /// Begins the state whose line ends with its time, `rest`, in `width` columns.
 fn begin_at(rest: &[u8], width: usize, line: &Line<'_>, states: &mut StateReader<'_>) {
+    states.part(line, rest.trim_ascii_end(), Part::Time);
     let time = real(rest).number().filter(|_| rest.trim_ascii_end().len() == width);
     states.begin(time, line.into());
     if time.is_none() {

@@ -6,7 +6,7 @@
 //! converter `l2a`. In `nodfor` they are groups of nodes, numbered by their order, not by the ids of
 //! their node sets; it is read as the source of `l2a` writes it.
 
-use super::ascii::{self, Body};
+use super::ascii::Body;
 use super::label_values::{Label, fields};
 use super::line::{Line, integer};
 use crate::history::EntityId;
@@ -52,7 +52,7 @@ struct Layout {
     block: fn(&[u8]) -> Option<String>,
 }
 
-const PRESCRIBED: Layout = Layout {
+static PRESCRIBED: Layout = Layout {
     time_digits: 6,
     state: b" n o d a l   f o r c e/e n e r g y    o u t p u t",
     // "velocity boundary condition forces/…", "pressure boundary condition …", "discrete nodal
@@ -65,7 +65,7 @@ const PRESCRIBED: Layout = Layout {
     },
 };
 
-const GROUPS: Layout = Layout {
+static GROUPS: Layout = Layout {
     time_digits: 4,
     state: b" n o d a l   f o r c e   g r o u p    o u t p u t",
     block: |line| {
@@ -74,26 +74,15 @@ const GROUPS: Layout = Layout {
     },
 };
 
-pub(crate) const BNDOUT: Format = Format::text(
-    "bndout",
-    "node",
-    |line| line.starts_with(PRESCRIBED.state),
-    |format, source, selection| {
-        ascii::read_with(format, source, selection, || NodeForces::new(&PRESCRIBED))
-    },
-);
+pub(crate) const BNDOUT: Format =
+    Format::text::<NodeForces>("bndout", "node", |line| line.starts_with(PRESCRIBED.state));
 
-pub(crate) const NODFOR: Format = Format::text(
-    "nodfor",
-    "node",
-    |line| line.starts_with(GROUPS.state),
-    |format, source, selection| {
-        ascii::read_with(format, source, selection, || NodeForces::new(&GROUPS))
-    },
-);
+pub(crate) const NODFOR: Format =
+    Format::text::<NodeForces>("nodfor", "node", |line| line.starts_with(GROUPS.state));
 
 /// Reader of either file. Components of all blocks but the first of the file have the
 /// block's name in front, because the same node may be in several.
+#[derive(Clone)]
 struct NodeForces {
     layout: &'static Layout,
     /// Names of the blocks, and their tables once they have rows.
@@ -103,11 +92,13 @@ struct NodeForces {
     begins: bool,
 }
 
-impl NodeForces {
-    fn new(layout: &'static Layout) -> Self {
-        Self { layout, blocks: Vec::new(), current: None, begins: false }
+impl Default for NodeForces {
+    fn default() -> Self {
+        Self { layout: &PRESCRIBED, blocks: Vec::new(), current: None, begins: false }
     }
+}
 
+impl NodeForces {
     /// The current block, and what the names of its components begin with; `None` where its
     /// heading is missing.
     fn block(&mut self) -> Option<(&mut Option<[TableId; 2]>, String)> {
@@ -196,6 +187,12 @@ impl NodeForces {
 
 impl Body for NodeForces {
     const EXPECTED: &'static str = "a node's forces, a sum or a heading";
+    const BY_TIME: bool = true;
+
+    fn of(format: &'static Format) -> Self {
+        let layout = if format.name == NODFOR.name { &GROUPS } else { &PRESCRIBED };
+        Self { layout, ..Self::default() }
+    }
 
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let start = line.text.trim_ascii_start();

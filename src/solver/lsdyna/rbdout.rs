@@ -2,11 +2,12 @@
 //!
 //! Never tested with real data; read as the source of LSTC's converter `l2a` writes it.
 
-use super::ascii::{self, Body};
+use super::ascii::Body;
 use super::label_values::numbers;
 use super::line::{Line, integer};
 use crate::history::EntityId;
 use crate::solver::Format;
+use crate::solver::states::repeat::Part;
 use crate::solver::states::{StateReader, TableId};
 
 const STATE: &[u8] = b"  r i g i d   b o d y   m o t i o n";
@@ -44,9 +45,9 @@ const LINES: [(&[u8], &[&str], &[&str]); 7] = [
 ];
 
 pub(crate) const FORMAT: Format =
-    Format::text("rbdout", "rigid body", |line| line.starts_with(STATE), ascii::read::<Rbdout>);
+    Format::text::<Rbdout>("rbdout", "rigid body", |line| line.starts_with(STATE));
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Rbdout {
     /// Of global and of local directions, by line.
     tables: Option<[[TableId; 2]; LINES.len()]>,
@@ -61,6 +62,11 @@ impl Body for Rbdout {
         if text.starts_with(STATE) {
             states.entity = None;
             let at = memchr::memmem::find(text, b"time=").map(|at| &text[at + 5..]);
+            let cycle = memchr::memmem::find(text, b"cycle=").map(|at| &text[at + 6..]);
+            let digits =
+                |cycle: &[u8]| cycle.iter().take_while(|b| !b.is_ascii_alphabetic()).count();
+            let cycle = cycle.map_or(&[][..], |cycle| &cycle[..digits(cycle)]);
+            states.part(line, cycle, Part::Unread);
             let time = super::heading_time(at, TIME, line, states);
             states.begin(time, line.into());
             return time.map(drop);

@@ -1,6 +1,6 @@
 //! `rcforc`: resultant forces of contact interfaces, one line per side and state.
 
-use super::ascii::{self, Body};
+use super::ascii::Body;
 use super::line::{Line, integer, is_whole_real, real, shown};
 use crate::history::{EntityId, Side};
 use crate::solver::Format;
@@ -32,14 +32,11 @@ const COLUMNS: [Column; 9] = [
 const ALWAYS: usize = 4;
 const MOMENTS: std::ops::Range<usize> = 4..7;
 
-pub(crate) const FORMAT: Format = Format::text(
-    "rcforc",
-    "interface",
-    |line| undefined_interface(line).is_some() || (side(line).is_some() && time_at(line).is_some()),
-    ascii::read::<Rcforc>,
-);
+pub(crate) const FORMAT: Format = Format::text::<Rcforc>("rcforc", "interface", |line| {
+    undefined_interface(line).is_some() || (side(line).is_some() && time_at(line).is_some())
+});
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Rcforc {
     table: Option<TableId>,
     /// Whether a row had moments: then a row without them is cut.
@@ -113,16 +110,17 @@ fn damage(id_from: usize, line: &Line<'_>, states: &mut StateReader<'_>) {
 }
 
 /// Time and columns of a row.
-type Row = (f64, [Option<(usize, usize)>; COLUMNS.len()]);
+type Row<'a> = ((f64, &'a [u8]), [Option<(usize, usize)>; COLUMNS.len()]);
 
 /// A row as every known release prints it; `None` if anything stands elsewhere.
-fn in_columns(text: &[u8], at: usize) -> Option<Row> {
+fn in_columns(text: &[u8], at: usize) -> Option<Row<'_>> {
     let from = at + TIME.len();
-    let time = real(text.get(from..from + WIDTH)?).number()?;
+    let printed = text.get(from..from + WIDTH)?;
+    let time = real(printed).number()?;
     let fields = COLUMNS.each_ref().map(|column| fit(column, text, at));
     let rest = text.get(end_of_columns(text, at)..).unwrap_or_default();
     let whole = fields[..ALWAYS].iter().all(Option::is_some) && rest.trim_ascii().is_empty();
-    whole.then_some((time, fields))
+    whole.then_some(((time, printed), fields))
 }
 
 /// Where the last column ends that is there.
@@ -139,7 +137,7 @@ fn fit(&(_, label, offset, width): &Column, text: &[u8], at: usize) -> Option<(u
 
 /// A row whose numbers have other widths, or that has further labels: each label with the
 /// number after it.
-fn by_labels(text: &[u8], at: usize) -> Option<Row> {
+fn by_labels(text: &[u8], at: usize) -> Option<Row<'_>> {
     let mut end = at + TIME.len();
     let mut word = || {
         let from = end + text[end..].iter().position(|b| !b.is_ascii_whitespace())?;
@@ -148,6 +146,7 @@ fn by_labels(text: &[u8], at: usize) -> Option<Row> {
         Some((from, end))
     };
     let (from, to) = word()?;
+    let end_of_time = to;
     let time = real(&text[from..to]).number().filter(|_| is_whole_real(&text[from..to]))?;
     let mut fields = [None; COLUMNS.len()];
     while let Some((from, mut to)) = word() {
@@ -167,7 +166,8 @@ fn by_labels(text: &[u8], at: usize) -> Option<Row> {
             return None;
         }
     }
-    fields[..ALWAYS].iter().all(Option::is_some).then_some((time, fields))
+    let printed = &text[at + TIME.len()..end_of_time];
+    fields[..ALWAYS].iter().all(Option::is_some).then_some(((time, printed), fields))
 }
 
 /// The side a line begins with, and where its id begins.

@@ -13,14 +13,11 @@ const TIME_END: usize = 12;
 const WALL_END: usize = 20;
 const VALUE_WIDTH: usize = 15;
 
-pub(crate) const FORMAT: Format = Format::text(
-    "rwforc",
-    "rigid wall",
-    |line| is_column_line(line) || is_node_set_heading(line),
-    ascii::read::<Rwforc>,
-);
+pub(crate) const FORMAT: Format = Format::text::<Rwforc>("rwforc", "rigid wall", |line| {
+    is_column_line(line) || is_node_set_heading(line)
+});
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Rwforc {
     /// Inside rows of a layout that is not read: wall segments, node-set transducers.
     is_unread: bool,
@@ -40,6 +37,7 @@ impl Body for Rwforc {
             self.is_unread = true;
         } else if self.is_unread {
             self.unread_rows += 1;
+            states.mark_unlike();
             self.first_unread.get_or_insert(line.into());
         } else {
             row(line, states);
@@ -65,13 +63,14 @@ fn row(line: &Line<'_>, states: &mut StateReader<'_>) {
     let wall = text.get(TIME_END..forces).unwrap_or_default();
     let wall_width = wall.trim_ascii().len().max(WALL_END - TIME_END);
     let width = TIME_END + wall_width + COMPONENTS.len() * VALUE_WIDTH;
-    let time = real(line.columns(1, TIME_END)).number();
+    let printed = line.columns(1, TIME_END);
+    let time = real(printed).number();
     let Some((time, wall)) = time.zip(integer(wall)).filter(|_| text.len() == width) else {
         let expected = format!("time, wall and {} forces in {width} columns", COMPONENTS.len());
         states.unexpected(line, Some([1, width]), &expected, 40);
         return;
     };
-    states.timed_row(TableId(0), EntityId::new(wall), time, line, |k| {
+    states.timed_row(TableId(0), EntityId::new(wall), (time, printed), line, |k| {
         let from = forces + k * VALUE_WIDTH;
         Some((from + 1, from + VALUE_WIDTH))
     });

@@ -16,14 +16,11 @@ const TIME_END: usize = 27;
 const FIELDS: [(usize, usize); 4] = [(28, 42), (43, 54), (55, 66), (67, 78)];
 const WIDTH: usize = FIELDS[3].1;
 
-pub(crate) const FORMAT: Format = Format::text(
-    "secforc",
-    "section",
-    |line| line.trim_ascii_start().starts_with(b"line#1  section#"),
-    ascii::read::<Secforc>,
-);
+pub(crate) const FORMAT: Format = Format::text::<Secforc>("secforc", "section", |line| {
+    line.trim_ascii_start().starts_with(b"line#1  section#")
+});
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Secforc {
     /// Lines read of the section that the states are at.
     seen: usize,
@@ -48,7 +45,8 @@ impl Body for Secforc {
             Some(_) => 0,
         };
         let id = || integer(line.columns(1, ID_END)).map(EntityId::new);
-        let time = || real(line.columns(ID_END + 1, TIME_END)).number();
+        let printed = line.columns(ID_END + 1, TIME_END);
+        let time = || real(printed).number();
         let head = match states.entity.take() {
             Some(section) if self.seen == number => Some((section, None)),
             _ if number == 0 => time().and_then(|time| Some((id()?, Some(time)))),
@@ -62,7 +60,7 @@ impl Body for Secforc {
         };
         let field = |k: usize| Some(FIELDS[k]);
         match time {
-            Some(time) => states.timed_row(TableId(0), section, time, line, field),
+            Some(time) => states.timed_row(TableId(0), section, (time, printed), line, field),
             None => states.row(TableId(number), section, line, field),
         }
         states.entity = Some(section);

@@ -5,6 +5,7 @@ use super::label_values::numbers;
 use super::line::{Line, integer};
 use crate::history::EntityId;
 use crate::solver::Format;
+use crate::solver::states::repeat::Part;
 use crate::solver::states::{StateReader, TableId};
 
 const STATE: &[u8] = b" contact interface energy file, time=";
@@ -25,9 +26,9 @@ const SUMS: [(&[u8], &str); 6] = [
 const SUM_WIDTH: usize = 14;
 
 pub(crate) const FORMAT: Format =
-    Format::text("sleout", "interface", |line| line.starts_with(STATE), ascii::read::<Sleout>);
+    Format::text::<Sleout>("sleout", "interface", |line| line.starts_with(STATE));
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Sleout {
     /// Width of the widest row: with friction all rows have it.
     width: usize,
@@ -40,7 +41,10 @@ impl Body for Sleout {
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         if let Some(rest) = line.text.strip_prefix(STATE) {
             super::begin_at(rest, TIME_WIDTH, line, states);
-        } else if !(line.text.trim_ascii_start().starts_with(b"#") && line.is_heading()) {
+        } else if line.text.trim_ascii_start().starts_with(b"#") && line.is_heading() {
+            let cycle = memchr::memmem::find(line.text, b"cycle=").map(|at| &line.text[at + 6..]);
+            states.part(line, cycle.unwrap_or_default(), Part::Unread);
+        } else {
             self.values(line, states)?;
         }
         Some(())

@@ -2,7 +2,7 @@
 //!
 //! A node in several sets of constraints has a row for each. The components of the second are `x_force_2` and so on.
 
-use super::ascii::{self, Body};
+use super::ascii::Body;
 use super::label_values::numbers;
 use super::line::{Line, integer};
 use crate::history::EntityId;
@@ -23,18 +23,15 @@ const SET_ID: &[u8] = b"setid=";
 /// Sets of constraints that a node may be in.
 const MAX_SETS: usize = 20;
 
-pub(crate) const FORMAT: Format = Format::text(
-    "spcforc",
-    "node",
-    |line| line.trim_ascii() == HEADING || line.starts_with(STATE),
-    ascii::read::<Spcforc>,
-);
+pub(crate) const FORMAT: Format = Format::text::<Spcforc>("spcforc", "node", |line| {
+    line.trim_ascii() == HEADING || line.starts_with(STATE)
+});
 
 /// Forces and moments.
 const COMPONENTS: [[&str; 3]; 2] =
     [["x_force", "y_force", "z_force"], ["x_moment", "y_moment", "z_moment"]];
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Spcforc {
     /// Tables of the nodes' first forces and moments, of their second …
     tables: Vec<[TableId; 2]>,

@@ -1,6 +1,6 @@
 //! `swforc`: forces of spot welds and other connections, one row each.
 
-use super::ascii::{self, Body};
+use super::ascii::Body;
 use super::label_values::{is_number, numbers};
 use super::line::{Line, integer, real};
 use crate::history::EntityId;
@@ -24,9 +24,9 @@ const FAILURE_TIME_WIDTH: usize = 12;
 const MAX_KINDS: usize = 20;
 
 pub(crate) const FORMAT: Format =
-    Format::text("swforc", "weld", |line| line.starts_with(COLUMN_LINE), ascii::read::<Swforc>);
+    Format::text::<Swforc>("swforc", "weld", |line| line.starts_with(COLUMN_LINE));
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 struct Swforc {
     kinds: KeyedTables<Vec<u8>>,
 }
@@ -46,7 +46,8 @@ impl Swforc {
     fn row(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();
         integer(text.get(..AXIAL.0 - 1)?)?;
-        let time = real(line.columns(TIME.0, TIME.1)).number()?;
+        let printed = line.columns(TIME.0, TIME.1);
+        let time = real(printed).number()?;
         let at = FAILURE.1 + memchr::memmem::find(text.get(FAILURE.1..)?, ID)?;
         let kind = text[FAILURE.1..at].trim_ascii().to_vec();
         if kind.is_empty() || kind.contains(&b'*') {
@@ -86,7 +87,7 @@ impl Swforc {
         // Words and blanks are there as well.
         let failure = line.columns(FAILURE.0, FAILURE.1).trim_ascii();
         let failure = failure.first().is_some_and(u8::is_ascii_digit);
-        states.timed_row(table, entity, time, line, |k| match k {
+        states.timed_row(table, entity, (time, printed), line, |k| match k {
             0 => Some(AXIAL),
             1 => Some(SHEAR),
             2 => failure.then_some(FAILURE),

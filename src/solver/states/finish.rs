@@ -38,6 +38,11 @@ impl StateReader<'_> {
                 self.scalars.retain(|s| s.absent < states);
             }
         }
+        self.clear_pending();
+    }
+
+    /// Forgets what the pending state has.
+    pub(super) fn clear_pending(&mut self) {
         for table in &mut self.tables {
             table.next_row = 0;
             let width = table.wanted_columns.len();
@@ -91,11 +96,16 @@ impl StateReader<'_> {
             {
                 Some("it has no rows".into())
             }
-            _ if self.absent_cells > ABSENT_CELLS + ABSENT_PER_PRESENT * self.present_cells => {
+            _ if self.lacks_most() => {
                 Some("the states above already lack most of their entities".into())
             }
             _ => None,
         }
+    }
+
+    /// Whether the kept states lack most of their values.
+    pub(super) fn lacks_most(&self) -> bool {
+        self.absent_cells > ABSENT_CELLS + ABSENT_PER_PRESENT * self.present_cells
     }
 
     fn keep(&mut self, time: f64, pending: &Pending) {
@@ -165,16 +175,8 @@ impl StateReader<'_> {
 
     /// Leaves out the states that a restart wrote again.
     fn resolve_restarts(&mut self) {
-        let cycles = &self.cycles;
-        // Times have few digits: a cycle that does not increase means the same state, or a time that is
-        // known far better than states lie apart.
-        let is_same = |above: usize, below: usize| match (cycles[above], cycles[below]) {
-            (Some(above), Some(below)) => Some(below <= above),
-            _ => Some(is_known_apart(&self.time, above, below, self.time_digits)),
-        };
-        let places = &self.places;
-        let place = |i: usize| places.get(i).copied();
-        let (kept, found) = resolve(&self.time, is_same, place, "");
+        let place = |i: usize| self.places.get(i).copied();
+        let (kept, found) = restarts(&self.time, &self.cycles, self.time_digits, place);
         self.problems.append(found);
         if kept.len() == self.time.len() {
             return;
@@ -188,6 +190,22 @@ impl StateReader<'_> {
             take(&mut scalar.values);
         }
     }
+}
+
+/// The states of a text file that count, and what was left out.
+pub(crate) fn restarts(
+    time: &[f64],
+    cycles: &[Option<i64>],
+    digits: i32,
+    place: impl Fn(usize) -> Option<Place>,
+) -> (Vec<usize>, Diagnostics) {
+    // Times have few digits: a cycle that does not increase means the same state, or a time that is
+    // known far better than states lie apart.
+    let is_same = |above: usize, below: usize| match (cycles[above], cycles[below]) {
+        (Some(above), Some(below)) => Some(below <= above),
+        _ => Some(is_known_apart(time, above, below, digits)),
+    };
+    resolve(time, is_same, place, "")
 }
 
 /// Indices of the states that count, by one rule for all files: of what was written again the
@@ -264,7 +282,7 @@ pub(crate) fn take<T: Copy>(values: &mut Vec<T>, kept: &[usize]) {
     }
 }
 
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Table {
     pub name: &'static str,
     pub components: Vec<Arc<str>>,
@@ -291,6 +309,7 @@ pub(crate) struct Table {
 }
 
 /// One kept history: values of complete states, and the pending state's value.
+#[derive(Clone)]
 pub(crate) struct Channel {
     pub values: Vec<f64>,
     pub pending: f64,

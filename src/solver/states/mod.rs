@@ -6,6 +6,7 @@
 //! every kept history has one value per kept state.
 
 pub(in crate::solver) mod finish;
+pub(in crate::solver) mod repeat;
 
 use std::sync::Arc;
 
@@ -16,6 +17,7 @@ use super::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::history::EntityId;
 use crate::plural::counted;
 use finish::Table;
+use repeat::{Part, Trace};
 
 /// Values that states may lack, beyond a multiple of the values they have: more are no
 /// erosion but damage, and would fill the memory.
@@ -79,6 +81,8 @@ pub(crate) struct StateReader<'a> {
     /// Contacts that the file declares to have no resultants.
     pub single_surfaces: Vec<i64>,
     pub problems: Diagnostics,
+    /// What the parts of the lines are, while the layout of a state is learnt.
+    pub trace: Option<Trace>,
 }
 
 /// Index of a table, from [`StateReader::table`].
@@ -86,6 +90,7 @@ pub(crate) struct StateReader<'a> {
 pub(crate) struct TableId(pub usize);
 
 /// Tables that are made when their first row comes, by what their rows are of.
+#[derive(Clone)]
 pub(crate) struct KeyedTables<K>(Vec<(K, TableId)>);
 
 impl<K> Default for KeyedTables<K> {
@@ -137,6 +142,7 @@ impl<'a> StateReader<'a> {
             entity: None,
             single_surfaces: Vec::new(),
             problems: Diagnostics::default(),
+            trace: None,
         }
     }
 
@@ -245,6 +251,7 @@ impl<'a> StateReader<'a> {
     /// Notes a line of unknown meaning.
     pub(crate) fn skip_line(&mut self, line: &Line<'_>) {
         self.skipped_lines += 1;
+        self.mark_unlike();
         let text = || shown(line.columns(1, 60)).trim().to_string();
         self.first_skipped.get_or_insert_with(|| (line.into(), text()));
     }
@@ -285,12 +292,12 @@ impl<'a> StateReader<'a> {
     /// column (from 1) of the table's k-th component, `None` if this row does not have it.
     pub(crate) fn row(
         &mut self,
-        table: TableId,
+        id: TableId,
         entity: EntityId,
         line: &Line<'_>,
         field: impl Fn(usize) -> Option<(usize, usize)>,
     ) {
-        let table = &mut self.tables[table.0];
+        let table = &mut self.tables[id.0];
         let row = match table.find(entity) {
             Some(row) => row,
             None if !self.sealed || table.varies => {
@@ -309,6 +316,13 @@ impl<'a> StateReader<'a> {
         }
         table.filled_rows.push(row);
         table.next_row = row + 1;
+        if let Some(trace) = &mut self.trace {
+            for (column, place) in (0..table.components.len()).map(|column| (column, field(column)))
+            {
+                let part = Part::Row { table: id, row, column };
+                place.into_iter().for_each(|(from, to)| trace.note(line, from, to, part));
+            }
+        }
         for column in 0..table.components.len() {
             table.seen_columns[column] |= field(column).is_some();
         }
@@ -337,10 +351,11 @@ impl<'a> StateReader<'a> {
         &mut self,
         table: TableId,
         entity: EntityId,
-        time: f64,
+        (time, text): (f64, &[u8]),
         line: &Line<'_>,
         field: impl Fn(usize) -> Option<(usize, usize)>,
     ) {
+        self.part(line, text, Part::Time);
         if self.pending_time() != Some(time) || self.has_row(table, entity) {
             self.begin(Some(time), line.into());
         }
@@ -381,33 +396,8 @@ impl<'a> StateReader<'a> {
         let (value, problem) = read_field(line, columns);
         self.problems.extend(problem.map(|p| *p));
         self.scalars[index].pending = Some(value);
-    }
-
-    pub(crate) fn rows(&self, table: TableId) -> &[EntityId] {
-        &self.tables[table.0].rows
-    }
-
-    pub(crate) fn wanted_rows(&self, table: TableId) -> Vec<usize> {
-        let of = &self.tables[table.0].channel_of;
-        (0..of.len()).filter(|&row| of[row].is_some()).collect()
-    }
-
-    pub(crate) fn wanted_columns(&self, table: TableId) -> &[usize] {
-        &self.tables[table.0].wanted_columns
-    }
-
-    /// Adds complete states that were read at once. Per state: its cycle and time, the place of
-    /// its beginning, and of all tables, wanted rows and wanted columns, in this order, the values.
-    pub(crate) fn extend(&mut self, states: &[((i64, f64), Place)], values: &[Vec<f64>]) {
-        for &((cycle, time), place) in states {
-            self.time.push(time);
-            self.cycles.push(Some(cycle));
-            self.places.push(place);
-        }
-        let channels = self.tables.iter_mut().flat_map(|t| &mut t.channels);
-        for (k, channel) in channels.enumerate() {
-            channel.seen += states.len();
-            channel.values.extend(values.iter().map(|state| state[k]));
+        if let Some(trace) = &mut self.trace {
+            trace.note(line, columns[0], columns[1], Part::Scalar(index));
         }
     }
 }

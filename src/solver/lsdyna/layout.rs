@@ -1,0 +1,611 @@
+//! The layout of a state: which bytes are the same in every state, and which are fields.
+//!
+//! Most solvers print every state of a file in the same number of bytes, line by line as the one above it. The line
+//! reader shows of one state what the parts of its lines are ([`Part`]); a state after it is read by
+//! their places if all other bytes are equal and every field is filled like the one that was shown: digits where
+//! it has digits, a sign or a blank where it can have a sign. A field may also hold any other whole number. So a
+//! state is either read as the line reader would, or left to the line reader.
+
+use std::collections::HashMap;
+use std::io;
+use std::ops::Range;
+
+use super::e12;
+use super::line::{integer, is_whole_real, real};
+use crate::solver::source::Window;
+use crate::solver::states::repeat::{Part, Zone};
+
+/// Bytes of a state whose layout is learnt; those of a longer one would take too much memory.
+pub(crate) const MAX_STATE: u64 = 32 << 20;
+/// Bytes read at once where all lines are read.
+pub(crate) const DENSE_READ: usize = 1 << 18;
+/// Bytes below which two wanted lines are read together rather than apart.
+const PAGE: usize = 4096;
+/// Index of no value.
+const NOWHERE: u32 = u32::MAX;
+
+/// How a byte may differ from the expected one: not at all, as a digit from `0`, as `-` from a blank, as `-` from
+/// `+`, or in any way. (A digit's mark is itself the difference of a digit.)
+const SAME: u8 = 0;
+const DIGIT: u8 = 5;
+const SIGN: u8 = b' ' ^ b'-';
+const EXPONENT_SIGN: u8 = b'+' ^ b'-';
+const ANY: u8 = 0xff;
+
+/// What a field of a line is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Kind {
+    /// `d.dddddE±dd` and `d.ddddE±dd` with their sign at the field's end.
+    E12,
+    E11,
+    Real,
+    Integer,
+    Time,
+    Cycle,
+    Unread,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct Field {
+    from: usize,
+    to: usize,
+    kind: Kind,
+    /// Whether a number may begin at its first byte: it is not known apart by blanks.
+    is_fixed: bool,
+}
+
+/// What lines have in common.
+#[derive(PartialEq, Eq, Hash)]
+struct Class {
+    /// Per byte of the line how it may differ.
+    free: Vec<u8>,
+    fields: Vec<Field>,
+}
+
+#[derive(Clone, Copy)]
+struct Row {
+    /// First byte in the state.
+    at: u32,
+    class: u32,
+    /// Where the indices of its values begin, if any of them is wanted.
+    values: u32,
+}
+
+/// One state's bytes and their meaning.
+pub(crate) struct Layout {
+    expected: Vec<u8>,
+    classes: Vec<Class>,
+    rows: Vec<Row>,
+    /// Indices of the values in the output, field by field.
+    outs: Vec<u32>,
+    /// Bytes after the last line with a field.
+    tail: usize,
+    /// First byte of the cycle.
+    cycle: Option<Range<usize>>,
+    /// Index after the line that holds the time.
+    head: usize,
+}
+
+/// Which lines are read, in reads of neighbours.
+pub(crate) struct Plan {
+    reads: Vec<Range<usize>>,
+    /// Whether all of it is read.
+    is_dense: bool,
+    /// Whether the wanted values are stored, and whether other fields are parsed as well.
+    stores: bool,
+    audit: bool,
+}
+
+/// Time and cycle of a state.
+pub(crate) type Found = (f64, Option<i64>);
+
+impl Layout {
+    /// The layout of a state of these bytes, which begin at byte `start` of the file, from the parts of its lines. `out`: the index of
+    /// a part's value in the output. `None` if something in it is not like a field.
+    pub(crate) fn new(
+        bytes: Vec<u8>,
+        start: u64,
+        zones: &[Zone],
+        out: impl Fn(Part) -> Option<usize>,
+    ) -> Option<Self> {
+        let mut zones: Vec<(usize, &Zone)> =
+            zones.iter().map(|zone| ((zone.at - start) as usize, zone)).collect();
+        zones.sort_by_key(|(at, _)| *at);
+        let mut zones = zones.into_iter().peekable();
+        let mut layout = Self {
+            expected: bytes,
+            classes: Vec::new(),
+            rows: Vec::new(),
+            outs: Vec::new(),
+            tail: 0,
+            cycle: None,
+            head: 0,
+        };
+        let mut known: HashMap<Class, u32> = HashMap::new();
+        let (mut at, mut time, mut last) = (0, None, 0);
+        while at < layout.expected.len() {
+            let rest = &mut layout.expected[at..];
+            let width = memchr::memchr(b'\n', rest)? + 1;
+            let line = &mut rest[..width];
+            let mut class = Class { free: vec![SAME; width], fields: Vec::new() };
+            let (values, mut is_wanted) = (layout.outs.len(), false);
+            let mut end = 0;
+            while let Some((from, zone)) = zones.next_if(|(from, _)| *from < at + width) {
+                let field = Field::of(line, from.checked_sub(at)?, zone, end, &mut class.free)?;
+                end = field.to;
+                let text = at + field.from..at + field.to;
+                match field.kind {
+                    Kind::Time => {
+                        layout.head =
+                            if time.is_none() { layout.rows.len() + 1 } else { layout.head };
+                        time.get_or_insert(text);
+                    }
+                    Kind::Cycle => drop(layout.cycle.get_or_insert(text)),
+                    _ => {}
+                }
+                let index = out(zone.part).map_or(NOWHERE, |index| index as u32);
+                is_wanted |= index != NOWHERE;
+                layout.outs.push(index);
+                class.fields.push(field);
+                last = at + width;
+            }
+            if !is_wanted {
+                layout.outs.truncate(values);
+            }
+            let next = known.len() as u32;
+            let class = *known.entry(class).or_insert(next);
+            let values = if is_wanted { values as u32 } else { NOWHERE };
+            layout.rows.push(Row { at: at as u32, class, values });
+            at += width;
+        }
+        layout.tail = at - last;
+        let mut classes: Vec<(Class, u32)> = known.into_iter().collect();
+        classes.sort_by_key(|(_, number)| *number);
+        layout.classes = classes.into_iter().map(|(class, _)| class).collect();
+        time.filter(|_| zones.next().is_none())?;
+        Some(layout)
+    }
+
+    /// Puts every value where `places` says instead; whether they are all there.
+    pub(crate) fn redirect(&mut self, places: &[Option<usize>], values: usize) -> bool {
+        let mut is_there = vec![false; values];
+        for out in self.outs.iter_mut().filter(|out| **out != NOWHERE) {
+            let place = places.get(*out as usize).copied().flatten();
+            place
+                .and_then(|place| is_there.get_mut(place))
+                .into_iter()
+                .for_each(|there| *there = true);
+            *out = place.map_or(NOWHERE, |place| place as u32);
+        }
+        is_there.iter().all(|there| *there)
+    }
+
+    pub(crate) fn period(&self) -> u64 {
+        self.expected.len() as u64
+    }
+
+    pub(crate) fn lines(&self) -> u64 {
+        self.rows.len() as u64
+    }
+
+    /// Where the cycle is in the state.
+    pub(crate) fn cycle(&self) -> Option<Range<usize>> {
+        self.cycle.clone()
+    }
+
+    /// Number of states between byte `at` and the end of the file, of which the last may lack lines
+    /// after its last field.
+    pub(crate) fn count(&self, size: u64, at: u64) -> usize {
+        let body = self.period() - self.tail as u64;
+        match size.saturating_sub(at).checked_sub(body) {
+            Some(rest) => usize::try_from(rest / self.period()).unwrap_or(usize::MAX - 1) + 1,
+            None => 0,
+        }
+    }
+
+    /// Reads all lines. `audit`: parse the fields that are not wanted as well.
+    pub(crate) fn all(&self, audit: bool) -> Plan {
+        Plan { reads: self.reads(0..self.rows.len()), is_dense: true, stores: true, audit }
+    }
+
+    /// Verifies all lines.
+    pub(crate) fn check(&self) -> Plan {
+        Plan { stores: false, ..self.all(true) }
+    }
+
+    /// Reads only the lines up to the time.
+    pub(crate) fn head(&self) -> Plan {
+        let is_dense = self.period() < DENSE_READ as u64 / 16;
+        Plan { reads: self.reads(0..self.head), is_dense, stores: false, audit: false }
+    }
+
+    /// Reads the wanted lines and those that are no rows, and the first and last of the rows between them,
+    /// unless most pages are wanted.
+    pub(crate) fn some(&self) -> Plan {
+        let is_plain = |row: &Row| {
+            let fields = &self.classes[row.class as usize].fields;
+            !fields.is_empty() && fields.iter().all(|f| !matches!(f.kind, Kind::Time | Kind::Cycle))
+        };
+        let plain: Vec<bool> = self.rows.iter().map(is_plain).collect();
+        let is_end = |k: usize| k == 0 || k + 1 == plain.len() || !plain[k - 1] || !plain[k + 1];
+        let taken = |&k: &usize| self.rows[k].values != NOWHERE || !plain[k] || is_end(k);
+        let reads = self.reads((0..plain.len()).filter(taken));
+        let pages: usize = reads.iter().map(|read| self.bytes(read).len() + PAGE).sum();
+        match 2 * pages > self.expected.len() {
+            true => self.all(false),
+            false => Plan { reads, is_dense: false, stores: true, audit: false },
+        }
+    }
+
+    fn reads(&self, lines: impl Iterator<Item = usize>) -> Vec<Range<usize>> {
+        let mut reads: Vec<Range<usize>> = Vec::new();
+        for line in lines {
+            match reads.last_mut() {
+                Some(read)
+                    if self.from(line) - self.from(read.end) < PAGE
+                        && self.from(line + 1) - self.from(read.start) <= DENSE_READ =>
+                {
+                    read.end = line + 1
+                }
+                _ => reads.push(line..line + 1),
+            }
+        }
+        reads
+    }
+
+    fn from(&self, line: usize) -> usize {
+        self.rows.get(line).map_or(self.expected.len(), |row| row.at as usize)
+    }
+
+    fn bytes(&self, lines: &Range<usize>) -> Range<usize> {
+        self.from(lines.start)..self.from(lines.end)
+    }
+
+    /// Reads the state at byte `at` of a file of `size` bytes into `out`; its time and cycle, or `None` if it is laid
+    /// out in another way. At the end of the file lines after the last field may be missing.
+    pub(crate) fn state(
+        &self,
+        window: &mut Window<'_>,
+        (at, size): (u64, u64),
+        plan: &Plan,
+        out: &mut [f64],
+    ) -> io::Result<Option<Found>> {
+        let there = size.saturating_sub(at).min(self.period()) as usize;
+        let ends = self.rows.partition_point(|row| (row.at as usize) < there);
+        if there + self.tail < self.expected.len() || self.from(ends) != there {
+            return Ok(None);
+        }
+        let mut found = State::default();
+        for (k, lines) in plan.reads.iter().enumerate() {
+            let lines = lines.start..lines.end.min(ends).max(lines.start);
+            let range = self.bytes(&lines);
+            let ahead = match (plan.is_dense, k + 1 < plan.reads.len()) {
+                (true, _) => DENSE_READ,
+                // After the last line comes the head of what follows.
+                (false, false) => self.bytes(&plan.reads[0]).len(),
+                (false, true) => 0,
+            };
+            let bytes = window.get(at + range.start as u64, range.len(), ahead)?;
+            let read = bytes.and_then(|bytes| self.read(bytes, lines, plan, &mut found, out));
+            if read.is_none() {
+                return Ok(None);
+            }
+        }
+        Ok(found.time.map(|(time, _)| (time, found.cycle)))
+    }
+
+    fn read(
+        &self,
+        bytes: &[u8],
+        lines: Range<usize>,
+        plan: &Plan,
+        found: &mut State,
+        out: &mut [f64],
+    ) -> Option<()> {
+        let start = self.from(lines.start);
+        for row in &self.rows[lines] {
+            let class = self.classes.get(row.class as usize)?;
+            let (at, width) = (row.at as usize, class.free.len());
+            let line = bytes.get(at - start..at - start + width)?;
+            let expected = self.expected.get(at..at + width)?;
+            if !conforms(line, expected, &class.free) && !class.holds_numbers(line, expected) {
+                return None;
+            }
+            let outs = self.outs.get(row.values as usize..).unwrap_or_default();
+            let outs = outs.iter().copied().chain(std::iter::repeat(NOWHERE));
+            for (field, index) in class.fields.iter().zip(outs) {
+                match field.kind {
+                    Kind::Time | Kind::Cycle | Kind::Unread => found.note(field, line)?,
+                    _ if index != NOWHERE && plan.stores => {
+                        *out.get_mut(index as usize)? = field.number(line)?
+                    }
+                    Kind::Integer => field.is_integer(line).then_some(())?,
+                    Kind::Real if plan.audit => drop(field.number(line)?),
+                    _ => {}
+                }
+            }
+        }
+        Some(())
+    }
+}
+
+/// Time and cycle of a state, as far as it is read, with the printed time.
+#[derive(Default)]
+struct State {
+    time: Option<(f64, [u8; MAX_TIME])>,
+    cycle: Option<i64>,
+}
+
+/// Columns of the longest time that is read.
+const MAX_TIME: usize = 24;
+
+impl State {
+    /// Reads a field that is no value; `None` if it contradicts those above it.
+    fn note(&mut self, field: &Field, line: &[u8]) -> Option<()> {
+        let text = field.text(line);
+        match field.kind {
+            Kind::Time => {
+                let mut printed = [0; MAX_TIME];
+                printed.get_mut(..text.len())?.copy_from_slice(text);
+                match &self.time {
+                    Some((_, above)) => (*above == printed).then_some(()),
+                    None => {
+                        self.time = Some((real(text).number()?, printed));
+                        Some(())
+                    }
+                }
+            }
+            Kind::Cycle => {
+                let cycle = integer(text)?;
+                (*self.cycle.get_or_insert(cycle) == cycle).then_some(())
+            }
+            _ => text.iter().all(|b| b.is_ascii_alphanumeric() || *b == b' ').then_some(()),
+        }
+    }
+}
+
+/// Bytes that are compared at once.
+const WIDE: usize = 16;
+
+/// Whether every byte differs from the expected one only as it may.
+fn conforms(line: &[u8], expected: &[u8], free: &[u8]) -> bool {
+    let mut found = false;
+    let mut from = 0;
+    while let (Some(line), Some(expected), Some(free)) = (
+        line.get(from..).and_then(|rest| rest.first_chunk::<WIDE>()),
+        expected.get(from..).and_then(|rest| rest.first_chunk::<WIDE>()),
+        free.get(from..).and_then(|rest| rest.first_chunk::<WIDE>()),
+    ) {
+        found |= differs(line, expected, free);
+        from += WIDE;
+    }
+    // The rest with what is above it, so that it is as wide.
+    let last =
+        (line.last_chunk::<WIDE>(), expected.last_chunk::<WIDE>(), free.last_chunk::<WIDE>());
+    match last {
+        _ if from == line.len() => {}
+        (Some(line), Some(expected), Some(free)) => found |= differs(line, expected, free),
+        _ => {
+            for k in 0..line.len() {
+                found |= differs(&[line[k]], &[expected[k]], &[free[k]]);
+            }
+        }
+    }
+    !found
+}
+
+#[inline(always)]
+fn differs<const N: usize>(line: &[u8; N], expected: &[u8; N], free: &[u8; N]) -> bool {
+    let mut found = 0;
+    for k in 0..N {
+        let difference = line[k] ^ expected[k];
+        let is_digit = (free[k] == DIGIT) & (difference < 10);
+        let is_free = is_digit | (difference == SAME) | (difference == free[k]) | (free[k] == ANY);
+        found |= u8::from(!is_free);
+    }
+    found != 0
+}
+
+impl Class {
+    /// The same for a line some of whose fields hold numbers in another form.
+    fn holds_numbers(&self, line: &[u8], expected: &[u8]) -> bool {
+        let part = |range: Range<usize>| {
+            conforms(&line[range.clone()], &expected[range.clone()], &self.free[range])
+        };
+        let mut from = 0;
+        self.fields.iter().all(|field| {
+            let before = part(from..field.from);
+            from = field.to;
+            before && (part(field.from..field.to) || field.holds_number(line))
+        }) && part(from..line.len())
+    }
+}
+
+impl Field {
+    /// The field of a zone, which begins at byte `from` of a line and after byte `end`; notes how its bytes may differ.
+    fn of(line: &mut [u8], from: usize, zone: &Zone, end: usize, free: &mut [u8]) -> Option<Self> {
+        let to = from + zone.length;
+        if from < end || to > line.len() {
+            return None;
+        }
+        let (kind, is_number) = match zone.part {
+            Part::Time => (Kind::Time, true),
+            Part::Cycle => (Kind::Cycle, false),
+            Part::Unread => (Kind::Unread, false),
+            Part::Row { .. } | Part::Scalar(_) => (Kind::Real, true),
+        };
+        if !is_number {
+            free[from..to].fill(ANY);
+            return Some(Self { from, to, kind, is_fixed: true });
+        }
+        let text = line[from..to].trim_ascii();
+        if kind == Kind::Time {
+            let from = from + line[from..to].len() - line[from..to].trim_ascii_start().len();
+            let to = from + text.len();
+            is_form(text).then_some(())?;
+            free_digits(&mut line[from..to], &mut free[from..to]);
+            return Some(Self { from, to, kind, is_fixed: true });
+        }
+        // Before a number that begins without one there may be room for a sign, if not for that alone.
+        let is_fixed = !line[from].is_ascii_digit();
+        let is_blank = |byte: &&u8| **byte == b' ';
+        let room = line[end..from].iter().rev().take_while(is_blank).count();
+        let from = if is_fixed { from } else { from - room };
+        if !line[..to].ends_with(text) {
+            return None;
+        }
+        if !text.is_empty() && text.iter().all(u8::is_ascii_digit) {
+            free[from..to].fill(ANY);
+            return Some(Self { from, to, kind: Kind::Integer, is_fixed });
+        }
+        let digits = text.strip_prefix(b"-").unwrap_or(text);
+        is_form(digits).then_some(())?;
+        let (start, has_sign) =
+            (to - digits.len(), digits.len() + usize::from(!is_fixed) < to - from);
+        let kind = match digits {
+            [_, b'.', fraction @ .., b'E', b'+' | b'-', _, _]
+                if has_sign && fraction.len() == 5 =>
+            {
+                Kind::E12
+            }
+            [_, b'.', fraction @ .., b'E', b'+' | b'-', _, _]
+                if has_sign && fraction.len() == 4 =>
+            {
+                Kind::E11
+            }
+            _ => Kind::Real,
+        };
+        if has_sign {
+            free[start - 1] = SIGN;
+        }
+        free_digits(&mut line[start..to], &mut free[start..to]);
+        Some(Self { from, to, kind, is_fixed })
+    }
+
+    fn text<'a>(&self, line: &'a [u8]) -> &'a [u8] {
+        &line[self.from..self.to]
+    }
+
+    /// The number of a line that conforms; `None` if it is no finite one.
+    #[inline(always)]
+    fn number(&self, line: &[u8]) -> Option<f64> {
+        let quick = match self.kind {
+            Kind::E12 => line[..self.to].last_chunk::<12>().and_then(e12::parse),
+            Kind::E11 => line[..self.to].last_chunk::<11>().and_then(
+                |&[s, d, p, a, b, c, f, e, es, e1, e2]| {
+                    e12::parse(&[s, d, p, a, b, c, f, b'0', e, es, e1, e2])
+                },
+            ),
+            _ => None,
+        };
+        if self.kind == Kind::Integer && !self.is_integer(line) {
+            return None;
+        }
+        quick.or_else(|| real(self.text(line)).number())
+    }
+
+    fn is_integer(&self, line: &[u8]) -> bool {
+        let number = self.text(line).trim_ascii_start();
+        !number.is_empty() && number.iter().all(u8::is_ascii_digit)
+    }
+
+    /// Whether a value is a whole number to the end of the field.
+    fn holds_number(&self, line: &[u8]) -> bool {
+        let text = self.text(line);
+        let number = text.trim_ascii_start();
+        matches!(self.kind, Kind::E12 | Kind::E11 | Kind::Real)
+            && (self.is_fixed || number.len() < text.len())
+            && is_whole_real(number)
+            && real(number).number().is_some()
+    }
+}
+
+/// Whether a text is a real with all its digits.
+fn is_form(text: &[u8]) -> bool {
+    text.first().is_some_and(u8::is_ascii_digit) && is_whole_real(text)
+}
+
+/// Lets digits and the exponent's sign differ.
+fn free_digits(text: &mut [u8], free: &mut [u8]) {
+    for (byte, free) in text.iter_mut().zip(free) {
+        match byte {
+            b'0'..=b'9' => (*byte, *free) = (b'0', DIGIT),
+            b'+' | b'-' => *free = EXPONENT_SIGN,
+            _ => {}
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn zone(at: usize, length: usize, part: Part) -> Zone {
+        Zone { at: at as u64, length, part }
+    }
+
+    /// A state of one row and blank lines.
+    fn layout(row: &str, tail: &str, zones: &[Zone]) -> Option<Layout> {
+        Layout::new(format!("{row}\n{tail}").into_bytes(), 0, zones, |part| match part {
+            Part::Scalar(number) => Some(number),
+            _ => None,
+        })
+    }
+
+    /// Every size of a file and place in it, against counting; and the largest numbers of all.
+    #[test]
+    fn states_are_counted_as_by_hand() {
+        for tail in 0..6_u64 {
+            let blank = "\n".repeat(tail as usize);
+            let layout = layout("1.0E+00", &blank, &[zone(0, 7, Part::Time)]).unwrap();
+            let period = 8 + tail;
+            assert_eq!((layout.period(), layout.lines()), (period, 1 + tail));
+            for (size, at) in (0..60_u64).flat_map(|size| (0..65).map(move |at| (size, at))) {
+                let by_hand = (1..).take_while(|k| at + k * period - tail <= size).count();
+                assert_eq!(layout.count(size, at), by_hand, "{tail} {size} {at}");
+            }
+            assert_eq!(layout.count(u64::MAX, u64::MAX), 0);
+            assert!(layout.count(u64::MAX, 0) as u64 >= u64::MAX / period);
+        }
+    }
+
+    /// What a state of the layout may hold, and its value; all else is left to the line reader.
+    #[test]
+    fn a_state_is_read_by_its_layout_or_not_at_all() {
+        let shown = "t 1.00000E+00 x  2.50000E-01 y=  3.0000E+00   7 words";
+        let zones = [
+            zone(2, 11, Part::Time),
+            zone(16, 12, Part::Scalar(0)),
+            zone(33, 10, Part::Scalar(1)),
+            zone(46, 1, Part::Scalar(2)),
+            zone(47, 6, Part::Unread),
+        ];
+        let layout = layout(shown, "", &zones).unwrap();
+        let read = |text: &str| {
+            let source = format!("{text}\n").into_bytes();
+            let (mut window, mut out) = (Window::new(&source), [0.0; 3]);
+            let size = source.len() as u64;
+            let found = layout.state(&mut window, (0, size), &layout.all(false), &mut out).unwrap();
+            found.map(|(time, _)| (time, out))
+        };
+        assert_eq!(read(shown), Some((1.0, [0.25, 3.0, 7.0])));
+        let other = "t 9.12345E-02 x -1.23456E+05 y= -4.5678E-11 421 other";
+        assert_eq!(read(other), Some((0.0912345, [-123456.0, -4.5678e-11, 421.0])));
+        // A number in another form, but whole.
+        let other = "t 1.00000E+00 x  2.50000-101 y=  3.0000E+00   7 words";
+        assert_eq!(read(other), Some((1.0, [2.5e-101, 3.0, 7.0])));
+        for text in [
+            "t 1.00000E+00 X  2.50000E-01 y=  3.0000E+00   7 words",
+            "t 1.00000E+00 x ************ y=  3.0000E+00   7 words",
+            "t 1.00000E+00 x  2.5000:E-01 y=  3.0000E+00   7 words",
+            "t 1.00000E+00 x  2.50000E-01 y=13.00000E+00   7 words",
+            "t 1.00000E+00 x  2.50000E-01 y=  3.0000E+00     words",
+            "t 1.00000E+00 x  2.50000E-01 y=  3.0000E+00   7 w*rds",
+            "t *.00000E+00 x  2.50000E-01 y=  3.0000E+00   7 words",
+            "t 1.00000E+00 x          NaN y=  3.0000E+00   7 words",
+            "t 1.00000E+00 x  2.50000E-01 y=  3.0000E+00   7 word",
+        ] {
+            assert_eq!(read(text), None, "{text}");
+        }
+    }
+}
