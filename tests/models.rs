@@ -830,6 +830,17 @@ fn jumps_of_the_collapse_are_warned_of() {
     assert!(codes(15.0).contains(&"mode_switch"), "{:?}", model.mode_switches_m_per_s);
     assert!(!codes(12.5).contains(&"mode_switch"));
     assert!(codes(8.0).contains(&"out_of_range"));
+    // The band holds the humps of both neighbours there, and only there.
+    let outside = |v: f64, near: f64| {
+        let curve = curve(&model, v);
+        let high = curve.force_high_n.as_ref().unwrap();
+        let below = |(d, high): (&f64, &f64)| {
+            (d - place(near)).abs() < 0.02 && *high < 0.97 * humps(near)(*d, 0.0)
+        };
+        curve.deflection_m.iter().zip(high).filter(|pair| below(*pair)).count()
+    };
+    assert_eq!([outside(15.0, 14.0), outside(15.0, 16.0)], [0, 0]);
+    assert!(outside(12.5, 16.0) > 0);
 }
 
 /// Parameters are in the manifest, the database, the model and the prediction.
@@ -1026,19 +1037,19 @@ fn validate_prints_and_tells_what_to_run_next() {
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines[0], "lead-car-wall: mean errors over 5 inner speeds left out in turn");
     assert!(
-        lines[8].starts_with(
-            "crush-law chosen (*): the default; the errors of the next best, rate, at 5 "
+        lines[9].starts_with(
+            "crush-law chosen (*): the default; the errors of the next best, gaussian-process, at 5 "
         ),
         "{text}"
     );
     assert_eq!(lines.iter().filter(|line| line.starts_with("band of the ")).count(), 4, "{text}");
-    assert!(lines.len() == 16 && lines[14].starts_with("next run: "), "{text}");
+    assert!(lines.len() == 17 && lines[15].starts_with("next run: "), "{text}");
     let found: Value =
         serde_json::from_str(&crumple_ok(here, &[&arguments[..], &["--json"]].concat())).unwrap();
     let group = &found["groups"][0];
     assert_eq!(group["group"], "lead-car-wall");
     let rows = group["rows"].as_array().unwrap();
-    assert_eq!(rows.len(), 6 * 7, "every model at every speed");
+    assert_eq!(rows.len(), 7 * 7, "every model at every speed");
     for row in rows {
         for key in ["force_l1", "energy_error", "max_crush_error", "velocity_l1", "acceleration_l1"]
         {

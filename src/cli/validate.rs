@@ -406,9 +406,14 @@ fn band_line(force: &str, band: &Band) -> String {
         ),
     };
     let coverage = match band.coverage {
-        Some(share) => {
-            format!("covers {} of the points of the other left-out curves", percent(share))
-        }
+        Some(share) => format!(
+            "covers {} of the points of the other left-out curves (calibration error {:.2}; ±{} for whole curves, which holds {:.0} of {})",
+            percent(share),
+            band.calibration_error.unwrap_or_default(),
+            percent(band.simultaneous_share),
+            band.whole_curves.unwrap_or_default() * band.curves as f64,
+            band.curves
+        ),
         None => format!("one {of} cannot be checked against others"),
     };
     let parts = match band.scatter {

@@ -6,7 +6,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 pub(crate) use super::entry::ModelEntry;
 use super::forest_options::ForestOptions;
-use super::{crush_law_model, extra, forest, linear, nearest, rate};
+use super::{crush_law_model, extra, forest, gaussian_process, linear, nearest, rate};
 use crate::guess;
 
 /// Every model, in the order of the tables. To add one: write its file with an `ENTRY`, add its
@@ -14,6 +14,7 @@ use crate::guess;
 pub(crate) const MODELS: &[ModelEntry] = &[
     nearest::ENTRY,
     linear::ENTRY,
+    gaussian_process::ENTRY,
     rate::ENTRY,
     crush_law_model::ENTRY,
     extra::ENTRY,
