@@ -813,6 +813,27 @@ fn other_masses_come_by_themselves() {
     assert!((found.max_deflection_m / truth - 1.0).abs() < 0.02, "{}", found.max_deflection_m);
 }
 
+/// Of many runs 20 are left out, the ends among them, and the models answer from the runs around the speed.
+#[test]
+fn many_runs_cost_what_twenty_cost() {
+    let speeds: Vec<f64> = (0..24).map(|k| 8.0 + 0.5 * f64::from(k)).collect();
+    let cases = family(&speeds);
+    let best = Selection::Best(Purpose::Vehicle);
+    let found = validate("made", &cases, &ModelKind::candidates(0), best).unwrap();
+    let rows: Vec<_> = found.rows.iter().filter(|row| row.model == "rate").collect();
+    assert_eq!(rows.len(), 20);
+    assert_eq!([rows[0], rows[19]].map(|row| row.speed_m_per_s), [8.0, 19.5]);
+    assert!(
+        found.notes[0].starts_with("20 of 24 cases, spread over the range,"),
+        "{:?}",
+        found.notes
+    );
+    let rate = found.means.iter().find(|m| m.model == "rate").unwrap();
+    assert!(rate.force_l1 < 0.01 && rate.velocity_l1 < 0.01, "{rate:?}");
+    let few = validate("made", &cases[..20], &ModelKind::candidates(0), best).unwrap();
+    assert!(few.notes.iter().all(|note| !note.contains("spread over the range")));
+}
+
 #[test]
 fn jumps_of_the_collapse_are_warned_of() {
     let place = |v: f64| if v < 15.0 { 0.25 + 0.001 * v } else { 0.36 + 0.001 * v };

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use crate::assess::choose::{NextRun, Purpose, Selection, next_run};
 use crate::assess::subsets::{OverSubsets, subsets};
-use crate::assess::validate::{GroupReport, Report, add_nested, validate};
+use crate::assess::validate::{GroupReport, MOST_SPEEDS, Report, add_nested, validate_speeds};
 use crate::curve::Case;
 use crate::database::Database;
 use crate::dataset::{TrainingSet, is_same_speed};
@@ -57,6 +57,9 @@ pub(super) struct Args {
     /// Judge the choice by every subset of 4 and 5 speeds, which predicts the speeds that it lacks (takes longer)
     #[arg(long)]
     subsets: bool,
+    /// Leave out every case, not 20 spread over the range of more (takes longer)
+    #[arg(long)]
+    thorough: bool,
     /// Seed of the forests
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -130,12 +133,10 @@ pub(super) fn print_validation(
 }
 
 fn validated(args: &Args, group: &str, cases: &[Case]) -> Result<GroupReport, Error> {
-    let mut validation = validate(
-        group,
-        cases,
-        &ModelKind::candidates(args.seed),
-        Selection::Best(Purpose::Vehicle),
-    )?;
+    let candidates = ModelKind::candidates(args.seed);
+    let best = Selection::Best(Purpose::Vehicle);
+    let most = if args.thorough { usize::MAX } else { MOST_SPEEDS };
+    let mut validation = validate_speeds(group, cases, &candidates, best, most)?;
     if args.nested {
         add_nested(&mut validation, cases, args.seed)?;
     }

@@ -24,6 +24,9 @@ pub(crate) const MODELS: &[ModelEntry] = &[
 /// Most trees of a forest that is fitted only to compare it with other models.
 const CANDIDATE_TREES: usize = 50;
 
+/// Most rows of a forest that is judged with many runs: those of 20 curves of 400 points.
+const MOST_ROWS: usize = 8_000;
+
 /// Which model, with its options.
 #[derive(Clone, Copy)]
 pub struct ModelKind {
@@ -52,6 +55,15 @@ impl ModelKind {
     pub fn candidates(seed: u64) -> Vec<Self> {
         let fewer = |f: ForestOptions| ForestOptions { trees: f.trees.min(CANDIDATE_TREES), ..f };
         Self::all(seed).into_iter().map(|kind| kind.with_forest(fewer)).collect()
+    }
+
+    /// The same to be judged where there are many runs: a forest of at most 50 trees on at most 8 000 rows.
+    pub(crate) fn judged(self) -> Self {
+        self.with_forest(|f| ForestOptions {
+            trees: f.trees.min(CANDIDATE_TREES),
+            most_rows: Some(MOST_ROWS),
+            ..f
+        })
     }
 
     /// The one run of the nearest speed (FDRM).
@@ -105,7 +117,11 @@ impl ModelKind {
 
     /// Whether it is the reference method's forest (DDTCM), whatever its seed.
     pub(crate) fn is_reference_method(&self) -> bool {
-        let paper = |f: ForestOptions| ForestOptions { seed: f.seed, ..ForestOptions::paper() };
+        let paper = |f: ForestOptions| ForestOptions {
+            seed: f.seed,
+            most_rows: f.most_rows,
+            ..ForestOptions::paper()
+        };
         self.name() == forest::ENTRY.name && self.forest.is_some_and(|f| f == paper(f))
     }
 }

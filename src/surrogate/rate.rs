@@ -18,7 +18,7 @@ use serde_json::value::RawValue;
 use super::alignment::Alignment;
 use super::blend::{Blend, own_share};
 use super::cached::Cached;
-use super::curves::neighbours;
+use super::curves::{answering_at, neighbours};
 use super::entry::{ModelEntry, loaded};
 use super::{CaseCurve, QueryPoint, Surrogate};
 
@@ -158,6 +158,7 @@ impl Rate {
         speed_m_per_s: f64,
         deflection_m: &[f64],
     ) -> Vec<f64> {
+        let cases = &*answering_at(cases, speed_m_per_s);
         let of = || cases.iter().map(|c| [c.speed_m_per_s, c.end_m(), c.envelope().work()]);
         let prepare = || {
             let alignment = self.alignment(cases);
