@@ -119,7 +119,7 @@ impl Run {
             deck_speed: None,
             contact_threshold: recipe.contact_threshold.unwrap_or(0.005),
             stated,
-            others: &[],
+            others: &Vec::new,
         };
         extract(&measured, &setup)
     }

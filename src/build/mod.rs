@@ -84,11 +84,13 @@ pub struct BuildReport {
     pub earlier: Vec<String>,
     /// The database as it is now.
     pub database: Database,
+    /// Where it has the cases.
+    places: HashMap<CasePath, usize>,
 }
 
 impl BuildReport {
     pub(crate) fn case(&self, run: &BuiltRun) -> Option<&Case> {
-        self.database.cases(&run.case.group).iter().find(|case| case.id.name == run.case.name)
+        self.database.cases(&run.case.group).get(*self.places.get(&run.case)?)
     }
 }
 
@@ -155,7 +157,9 @@ pub fn build(
     if changed || !is_there {
         database.write(path)?;
     }
+    let all = database.groups().flat_map(|group| database.cases(group).iter().enumerate());
     Ok(BuildReport {
+        places: all.map(|(i, case)| (CasePath::of(case), i)).collect(),
         group: study.group().into(),
         runs,
         removed: previous.left,

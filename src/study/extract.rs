@@ -66,12 +66,10 @@ impl LocatedRun<'_> {
 
     fn curve(&self, files: &RunFiles<'_>, units: UnitSystem) -> Result<Extracted, Error> {
         let (study, entry) = (self.study, self.entry);
-        let others: Vec<(String, f64)> = study
-            .runs()
-            .iter()
-            .filter(|run| run.case_name() != entry.case_name())
-            .filter_map(|run| Some((run.case_name(), run.speed?.0)))
-            .collect();
+        let others = || -> Vec<(String, f64)> {
+            let others = study.runs().iter().filter(|run| run.case_name() != entry.case_name());
+            others.filter_map(|run| Some((run.case_name(), run.speed?.0))).collect()
+        };
         let setup = Setup {
             filter: study.manifest.recipe.filter,
             sampling: study.manifest.recipe.sampling,
