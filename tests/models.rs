@@ -819,7 +819,7 @@ fn many_runs_cost_what_twenty_cost() {
     let speeds: Vec<f64> = (0..24).map(|k| 8.0 + 0.5 * f64::from(k)).collect();
     let cases = family(&speeds);
     let best = Selection::Best(Purpose::Vehicle);
-    let found = validate("made", &cases, &ModelKind::candidates(0), best).unwrap();
+    let found = validate("made", &cases, &ModelKind::all(0), best).unwrap();
     let rows: Vec<_> = found.rows.iter().filter(|row| row.model == "rate").collect();
     assert_eq!(rows.len(), 20);
     assert_eq!([rows[0], rows[19]].map(|row| row.speed_m_per_s), [8.0, 19.5]);
@@ -830,7 +830,7 @@ fn many_runs_cost_what_twenty_cost() {
     );
     let rate = found.means.iter().find(|m| m.model == "rate").unwrap();
     assert!(rate.force_l1 < 0.01 && rate.velocity_l1 < 0.01, "{rate:?}");
-    let few = validate("made", &cases[..20], &ModelKind::candidates(0), best).unwrap();
+    let few = validate("made", &cases[..20], &ModelKind::all(0), best).unwrap();
     assert!(few.notes.iter().all(|note| !note.contains("spread over the range")));
 }
 
@@ -974,7 +974,7 @@ fn left_out_speeds_of_the_bundled_groups() {
     let of_second = Database::read(&build_fixture(folder.path(), second)).unwrap();
     let (mut means, mut with_second, mut covered) = ([0.0; 3], [0.0; 3], Vec::new());
     for group in GROUPS.into_iter().chain([second]) {
-        let kinds = ModelKind::candidates(0);
+        let kinds = ModelKind::all(0);
         let best = Selection::Best(Purpose::Vehicle);
         let database = if group == second { &of_second } else { databases() };
         let found = validate(group, database.cases(group), &kinds, best).unwrap();
@@ -1014,7 +1014,7 @@ fn a_front_in_two_stages_is_predicted_by_its_events() {
     let folder = tempfile::tempdir().unwrap();
     let database = Database::read(&build_fixture(folder.path(), group)).unwrap();
     let best = Selection::Best(Purpose::Vehicle);
-    let found = validate(group, database.cases(group), &ModelKind::candidates(0), best).unwrap();
+    let found = validate(group, database.cases(group), &ModelKind::all(0), best).unwrap();
     let of = |name: &str| found.means.iter().find(|m| m.model == name).unwrap();
     let chosen = of(&found.chosen);
     let errors = [chosen.force_l1, chosen.velocity_l1, chosen.acceleration_l1];
@@ -1036,7 +1036,7 @@ fn coverage_with_replicates() -> [f64; 2] {
     let mut cases = databases().cases(group).to_vec();
     cases.extend(perturbed.all().map(|case| in_group(case, group)));
     let best = Selection::Best(Purpose::Vehicle);
-    let found = validate(group, &cases, &ModelKind::candidates(0), best).unwrap();
+    let found = validate(group, &cases, &ModelKind::all(0), best).unwrap();
     assert!(found.scatter.is_some(), "four runs at 48 km/h");
     [found.band, found.body_band].map(|band| band.unwrap().coverage.unwrap())
 }

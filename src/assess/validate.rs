@@ -87,11 +87,9 @@ pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Error
             let asked = |kind: ModelKind| {
                 kind.with_forest(|f| ForestOptions { trees: trees.unwrap_or(f.trees), ..f })
             };
-            let candidates: Vec<ModelKind> =
-                ModelKind::candidates(seed).into_iter().map(asked).collect();
+            let candidates: Vec<ModelKind> = ModelKind::all(seed).into_iter().map(asked).collect();
             let validation = validate(group, cases, &candidates, Selection::Best(purpose))?;
-            let kept: Vec<ModelKind> = ModelKind::all(seed).into_iter().map(asked).collect();
-            train_chosen(group, cases, &kept, validation)
+            train_chosen(group, cases, &candidates, validation)
         }
         Choice::Kind(kind) => {
             // Errors of the model itself come before the validation.
@@ -111,7 +109,7 @@ pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Error
 /// it, hence no band, and ends of the range are not left out.
 pub(super) fn choose_and_fit(group: &str, cases: &[Case], seed: u64) -> Result<Model, Error> {
     let set = TrainingSet::new(group, cases)?;
-    let (fitting, _) = fittable(&set, &ModelKind::candidates(seed));
+    let (fitting, _) = fittable(&set, &ModelKind::all(seed));
     let (mut left_out, _) = left_out_cases(&set, MOST_SPEEDS).unwrap_or_default();
     left_out.retain(|case| case.inner);
     let trials = trials(&fitting, &left_out);

@@ -133,7 +133,7 @@ pub(super) fn print_validation(
 }
 
 fn validated(args: &Args, group: &str, cases: &[Case]) -> Result<GroupReport, Error> {
-    let candidates = ModelKind::candidates(args.seed);
+    let candidates = ModelKind::all(args.seed);
     let best = Selection::Best(Purpose::Vehicle);
     let most = if args.thorough { usize::MAX } else { MOST_SPEEDS };
     let mut validation = validate_speeds(group, cases, &candidates, best, most)?;
@@ -150,7 +150,7 @@ fn validated(args: &Args, group: &str, cases: &[Case]) -> Result<GroupReport, Er
     }
     let mut over_subsets = Vec::new();
     if args.subsets {
-        over_subsets = subsets(group, cases, &ModelKind::candidates(args.seed))?;
+        over_subsets = subsets(group, cases, &ModelKind::all(args.seed))?;
         if over_subsets.is_empty() {
             let note = "no subset of 4 or 5 speeds lacks a speed inside its range, or there are more than 12 speeds";
             validation.notes.push(note.into());

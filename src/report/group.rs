@@ -72,7 +72,7 @@ fn known_or_new(
         None => validate(
             group,
             cases,
-            &ModelKind::candidates(settings.seed),
+            &ModelKind::all(settings.seed),
             Selection::Best(Purpose::Vehicle),
         ),
     }
@@ -159,7 +159,7 @@ impl Validated<'_> {
             content.warn(format!("{group}: {note}"));
         }
         let Some(worst) = self.worst() else { return };
-        let mut kinds = ModelKind::candidates(settings.seed).into_iter();
+        let mut kinds = ModelKind::all(settings.seed).into_iter();
         let Some(kind) = kinds.find(|kind| kind.name() == validation.chosen) else { return };
         match charts::left_out_at(group, cases, worst.speed_m_per_s, Choice::Kind(kind)) {
             Ok(chart) => {

@@ -21,7 +21,7 @@ pub(crate) const MODELS: &[ModelEntry] = &[
     forest::ENTRY,
 ];
 
-/// Most trees of a forest that is fitted only to compare it with other models.
+/// Most trees of a forest that is judged with many runs.
 const CANDIDATE_TREES: usize = 50;
 
 /// Most rows of a forest that is judged with many runs: those of 20 curves of 400 points.
@@ -48,13 +48,6 @@ impl ModelKind {
     /// Every model, in the order of `MODELS`.
     pub fn all(seed: u64) -> Vec<Self> {
         MODELS.iter().map(|entry| Self::of(entry, seed)).collect()
-    }
-
-    /// Every model as leaving speeds out compares it: with forests of at most 50 trees, as the
-    /// reference method has: 500 take ten times as long to fit for every left-out speed.
-    pub fn candidates(seed: u64) -> Vec<Self> {
-        let fewer = |f: ForestOptions| ForestOptions { trees: f.trees.min(CANDIDATE_TREES), ..f };
-        Self::all(seed).into_iter().map(|kind| kind.with_forest(fewer)).collect()
     }
 
     /// The same to be judged where there are many runs: a forest of at most 50 trees on at most 8 000 rows.
