@@ -203,12 +203,9 @@ const PLACES: usize = 200;
 
 /// Smallest, largest and mean value over the seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Range {
-    /// Smallest value.
+pub(crate) struct Range {
     pub min: f64,
-    /// Largest value.
     pub max: f64,
-    /// Mean value.
     pub mean: f64,
 }
 
@@ -230,12 +227,10 @@ impl Range {
 
 /// How far laws lie apart along their axis, as `(max − min) / mean` over the seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct LawSpread {
-    /// The largest along the axis.
+pub(crate) struct LawSpread {
     pub largest: f64,
     /// Where that is, in m or m/s.
     pub largest_at: f64,
-    /// The mean along the axis.
     pub mean: f64,
 }
 
@@ -261,18 +256,14 @@ impl LawSpread {
 /// and damper can replace each other, and what the law does at another speed is chance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Identifiability {
-    /// Number of fits.
-    pub seeds: usize,
-    /// Objective of the fits, in m²/s⁴.
-    pub objective: Range,
-    /// `Σ|p − r|/Σ|r|` of the velocity at the fitted speed.
-    pub velocity_l1: Range,
-    /// The same for the acceleration.
-    pub acceleration_l1: Range,
-    /// Spread of the springs.
-    pub stiffness: LawSpread,
-    /// Spread of the dampers.
-    pub damping: LawSpread,
+    pub(crate) seeds: usize,
+    /// In m²/s⁴.
+    pub(crate) objective: Range,
+    /// `Σ|p − r|/Σ|r|` at the fitted speed.
+    pub(crate) velocity_l1: Range,
+    pub(crate) acceleration_l1: Range,
+    pub(crate) stiffness: LawSpread,
+    pub(crate) damping: LawSpread,
 }
 
 impl Identifiability {
