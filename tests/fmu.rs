@@ -187,7 +187,7 @@ fn the_c_law_is_ours_bit_by_bit() {
             seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (seed >> 11) as f64 / (1_u64 << 53) as f64
         };
-        let end = law.tables().deflection_m[law.tables().deflection_m.len() - 1];
+        let end = law.envelope().end_m();
         let pairs: Vec<(f64, f64)> = (0..10_000)
             .map(|i| {
                 let largest = 1.2 * end * random();

@@ -17,7 +17,7 @@ use crate::curve::{
 };
 use crate::database::{self, Database};
 use crate::error::{Error, ErrorCode, error};
-use crate::file::{WriterLock, absolute};
+use crate::file::WriterLock;
 use crate::formats::read::{self, Metadata, ReadCurve, ReadOptions};
 use crate::unit::{Shown, Speed, SpeedKind, UnitSystem, km_per_h};
 
@@ -167,16 +167,9 @@ fn of(item: &Item, settings: &Settings, group: Option<&Case>) -> Result<Case, Er
     for file in &curve.files {
         hash.update(file.blake3.as_bytes());
     }
-    let sources = curve.files.iter().map(|file| SourceFile {
-        path: file.path.display().to_string(),
-        absolute_path: Some(absolute(&file.path)),
-        size_bytes: file.size_bytes,
-        blake3: file.blake3.clone(),
-        format: format.into(),
-        solver: None,
-        version: None,
-        title: curve.title.clone(),
-        problems: 0,
+    let sources = curve.files.iter().map(|file| {
+        let (format, title) = (format.into(), curve.title.clone());
+        SourceFile { format, title, ..file.clone() }
     });
     let notes = curve.notes.iter().cloned().chain(both.notes).chain(quality.notes);
     Ok(Case {
