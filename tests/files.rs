@@ -7,8 +7,8 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::common::{
-    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, edited, entries, fixture,
-    json, python, says, study_in,
+    build_fixture, crumple_fails, crumple_in, crumple_ok, crumple_started, demo_folder, edited,
+    entries, fixture, json, python, says, study_in,
 };
 use hdf5_pure::{AttrValue, File as Hdf5};
 use serde_json::Value;
@@ -766,13 +766,7 @@ fn killed_writers_leave_nothing_that_stays() {
             if line[0] == "build" {
                 let _ = fs::remove_file(here.join("new.h5"));
             }
-            let mut child = Command::new(env!("CARGO_BIN_EXE_crumple"))
-                .args(line)
-                .current_dir(here)
-                .stdout(Stdio::null())
-                .stderr(Stdio::null())
-                .spawn()
-                .unwrap();
+            let mut child = crumple_started(here, line);
             std::thread::sleep(whole * kill / 24);
             child.kill().unwrap();
             child.wait().unwrap();
@@ -801,12 +795,7 @@ fn writers_of_one_file_do_not_mix() {
         .collect();
     for _ in 0..12 {
         let spawn = |input: &PathBuf| {
-            Command::new(env!("CARGO_BIN_EXE_crumple"))
-                .args(["histories", input.to_str().unwrap(), "-o", "out.csv"])
-                .current_dir(here)
-                .stderr(Stdio::piped())
-                .spawn()
-                .unwrap()
+            crumple_started(here, &["histories", input.to_str().unwrap(), "-o", "out.csv"])
         };
         let children: Vec<_> = inputs.iter().map(spawn).collect();
         let mut done = 0;

@@ -320,7 +320,7 @@ fn no_unwrap_outside_tests() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 72016), ("files", 280), ("public types", 182), ("error types", 9)];
+    [("lines", 71884), ("files", 280), ("public types", 181), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {

@@ -173,13 +173,10 @@ impl CurveFile {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FileKind {
-    /// Curve database.
     Database,
-    /// Model.
     Model,
     /// Predicted curve.
     Curve,
-    /// Scenario.
     Scenario,
     /// Result of a multi-body run.
     Result,

@@ -6,7 +6,7 @@ use super::thin::{Softened, from_origin, softened};
 use crate::curve::force_curve::with_tail;
 use crate::curve::{Envelope, ForceCurve, ForceKind, Tail};
 use crate::error::{Error, error};
-use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
+use crate::multibody::{EnvelopeEnd, ForceLaw};
 use crate::surrogate::PredictedCurve;
 use crate::unit::{Shown, km_per_h};
 
@@ -209,7 +209,7 @@ impl ExportCurve {
             Tail::Bottom => EnvelopeEnd::Bottom,
             Tail::None | Tail::Hold => EnvelopeEnd::Hold,
         };
-        ForceLaw::of_curve(&self.driving(), UnloadingChoice::Own, end)
+        ForceLaw::of_curve(&self.driving(), None, end)
     }
 
     /// Separation speed over impact speed in crumple's own runs, whose curve is not softened.

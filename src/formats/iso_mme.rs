@@ -33,7 +33,6 @@ pub(crate) struct Test<'a> {
     pub bodies: Vec<(f64, f64)>,
     /// Time of the first sample, in s.
     pub start_s: f64,
-    /// Time between two samples, in s.
     pub interval_s: f64,
     /// Further lines, as remarks.
     pub remarks: Vec<String>,

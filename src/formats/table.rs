@@ -30,7 +30,6 @@ struct Table {
     force_n: Vec<f64>,
     /// Lower and upper edge of the band, likewise; NaN at a speed without one.
     band: Option<[Vec<f64>; 2]>,
-    /// Description of the band.
     band_meaning: Option<String>,
     max_deflection_m: Vec<f64>,
     unloading_stiffness_n_per_m: Vec<f64>,

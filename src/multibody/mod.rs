@@ -36,7 +36,7 @@ pub use chain::{
 };
 use engine::Scheme;
 pub(crate) use law::StoredBy;
-pub use law::{EnvelopeEnd, ForceLaw, Unloading, UnloadingChoice, UnloadingShape};
+pub use law::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
 use run::Grid;
 pub use run::{BodyHistory, InterfaceHistory, Ledger, Method, Record, Run, RunSettings};
 

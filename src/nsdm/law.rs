@@ -320,22 +320,17 @@ mod tests {
         let refused = |nodes: &[f64], values: &[f64]| {
             PiecewiseLinear::new(nodes.to_vec(), values.to_vec()).unwrap_err().to_string()
         };
+        let expected = "expected nodes that increase from 0 and values of 0 or more, all finite";
+        for (nodes, values, named) in [
+            (&[0.0, 1.0, 1.0][..], &[1.0, 1.0, 2.0][..], "node 3 of a law is (1, 2)"),
+            (&[0.5, 1.0], &[1.0; 2], "node 1 of a law is (0.5, 1)"),
+            (&[0.0, 1.0], &[1.0, -1.0], "node 2 of a law is (1, -1)"),
+        ] {
+            assert_eq!(refused(nodes, values), format!("{named}: {expected}"));
+        }
         assert_eq!(
             refused(&[0.0, 1.0], &[1.0]),
             "a law needs a value at each of at least 2 nodes, found 2 nodes and 1 values"
-        );
-        let expected = "expected nodes that increase from 0 and values of 0 or more, all finite";
-        assert_eq!(
-            refused(&[0.0, 1.0, 1.0], &[1.0, 1.0, 2.0]),
-            format!("node 3 of a law is (1, 2): {expected}")
-        );
-        assert_eq!(
-            refused(&[0.5, 1.0], &[1.0; 2]),
-            format!("node 1 of a law is (0.5, 1): {expected}")
-        );
-        assert_eq!(
-            refused(&[0.0, 1.0], &[1.0, -1.0]),
-            format!("node 2 of a law is (1, -1): {expected}")
         );
         assert!(PiecewiseLinear::new(vec![0.0, f64::INFINITY], vec![1.0; 2]).is_err());
         assert!(PiecewiseLinear::new(vec![0.0, 1.0], vec![f64::NAN, 1.0]).is_err());

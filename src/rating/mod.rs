@@ -59,7 +59,6 @@ pub(crate) struct RatingSettings {
     pub cfc: Option<u32>,
     /// Begin and end of what is rated, in s; without them all common times.
     pub from_s: Option<f64>,
-    /// End of what is rated.
     pub to_s: Option<f64>,
 }
 

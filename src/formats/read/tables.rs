@@ -6,7 +6,7 @@ use super::curve::{Metadata, Place, ReadCurve, expected, shown, stated_units, ti
 use super::encoding::{decoded, lines};
 use super::label::{Label, Quantity};
 use super::layout::layout;
-use super::table::{Fit, Purpose, Row, Table, check_last, is_pair};
+use super::table::{Fit, Purpose, Table, check_last, is_pair};
 use crate::error::{Error, error};
 use crate::guess;
 
@@ -40,10 +40,10 @@ pub(super) fn recognise_pairs(input: &Input<'_>) -> bool {
 /// The curve of a table with a header, or of one without.
 pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     let mut table = Table::of(input.text, Purpose::Curve, &input.options.columns());
-    if let (Fit::Numbers, Some((line, comment))) = (table.fit, last_comment(input, &table)) {
-        table.named_by(line, comment);
-    }
     if table.fit == Fit::Numbers {
+        if let Some((line, _, comment)) = comments(input.text, table.begin()).last() {
+            table.named_by(line, comment);
+        }
         check_last(&table.titles)?;
     }
     let name = table.titles.first().map_or(String::new(), |(_, title)| title.clone());
@@ -73,11 +73,6 @@ fn chosen(tables: &[Table<'_>], asked: Option<&str>) -> Result<usize, Error> {
     choose((1..).zip(tables).map(|(k, t)| (k.to_string(), t.name.clone())), asked)
 }
 
-/// The last comment before a table.
-fn last_comment<'a>(input: &Input<'a>, table: &Table<'_>) -> Option<(u64, &'a str)> {
-    comments(input.text, table.begin()).last().map(|(line, _, comment)| (line, comment))
-}
-
 /// The comments before a line: their lines, marks and texts.
 fn comments(text: &str, before: u64) -> impl Iterator<Item = (u64, &str, &str)> {
     lines(text).take_while(move |(line, _)| *line < before).filter_map(|(at, line)| {
@@ -105,8 +100,9 @@ fn columns(
     let mut values: [Vec<f64>; 3] = Default::default();
     table.each_row(|row| {
         for column in &taken {
+            let place = Place::Field { line: row.line, field: column.field + 1 };
             let value =
-                row.number(column.field).map_err(|found| not_a_number(row, column.field, found))?;
+                row.number(column.field).map_err(|found| expected(place, "a number", found))?;
             values[column.quantity as usize].push(value * column.size);
         }
         lines.push(row.line);
@@ -126,16 +122,11 @@ fn columns(
     })
 }
 
-fn not_a_number(row: &Row<'_>, field: usize, found: &str) -> Error {
-    expected(Place::Field { line: row.line, field: field + 1 }, "a number", found)
-}
-
 /// Values over time, as a table or a curve's file has them.
 #[derive(Clone, Debug)]
 pub(crate) struct History {
     /// Name of the time's column, and its line.
     pub time_name: (u64, String),
-    /// Name of the values.
     pub name: String,
     /// First title above them.
     pub title: String,

@@ -16,7 +16,7 @@ use crate::curve::Envelope;
 pub(super) use pieces::{Branch, OnEnvelope, Piece};
 use unloading::Memory;
 pub(crate) use unloading::StoredBy;
-pub use unloading::{UnloadingChoice, UnloadingShape};
+pub use unloading::UnloadingShape;
 
 /// What happens when the deflection decreases.
 #[derive(Clone, Copy, Debug, PartialEq)]

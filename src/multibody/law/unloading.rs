@@ -183,27 +183,19 @@ impl UnloadingShape {
     }
 }
 
-/// How a curve unloads in a run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum UnloadingChoice {
-    /// As the curve knows it; with the steepest rise of its loading branch if it does not, and
-    /// along the loading branch if that never rises.
-    Own,
-    /// Along the loading branch, whatever the curve knows.
-    Elastic,
-    /// On straight lines of this stiffness in N/m.
-    Stiffness(f64),
-}
-
 impl ForceLaw {
-    /// The law that follows a curve.
-    pub fn of_curve(curve: &ForceCurve, unloading: UnloadingChoice, end: EnvelopeEnd) -> Self {
+    /// The law that follows a curve; on straight lines of a stiffness that is given. Without a
+    /// choice it unloads as the curve knows it; with the steepest rise of its loading branch if it
+    /// does not, and along the loading branch if that never rises.
+    pub fn of_curve(curve: &ForceCurve, unloading: Option<Unloading>, end: EnvelopeEnd) -> Self {
         Self::along(curve, unloading, end).with_data_to(curve.data_end_m)
     }
 
-    fn along(curve: &ForceCurve, unloading: UnloadingChoice, end: EnvelopeEnd) -> Self {
+    fn along(curve: &ForceCurve, unloading: Option<Unloading>, end: EnvelopeEnd) -> Self {
         let loading = curve.loading.clone();
-        let memory = |stiffness_n_per_m: f64| {
+        let own = || {
+            let known = curve.unloading.stiffness_n_per_m();
+            let stiffness_n_per_m = known.unwrap_or_else(|| loading.max_slope());
             if stiffness_n_per_m > 0.0 {
                 Unloading::Memory { stiffness_n_per_m }
             } else {
@@ -211,14 +203,9 @@ impl ForceLaw {
             }
         };
         let law = match unloading {
-            UnloadingChoice::Own => {
-                let known = curve.unloading.stiffness_n_per_m();
-                memory(known.unwrap_or_else(|| loading.max_slope()))
-            }
-            UnloadingChoice::Elastic => Unloading::Elastic,
-            UnloadingChoice::Stiffness(asked) => {
-                return Self::new(loading, Unloading::Memory { stiffness_n_per_m: asked }, end);
-            }
+            Some(line @ Unloading::Memory { .. }) => return Self::new(loading, line, end),
+            Some(Unloading::Elastic) => Unloading::Elastic,
+            None => own(),
         };
         match &curve.unloading {
             CurveUnloading::Recorded { deflection_m, force_n, .. } => {
