@@ -7,7 +7,9 @@ use std::path::Path;
 use crumple::formats::{ReadOptions, read};
 use serde_json::Value;
 
-use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, says};
+use crate::common::{
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, read_json, says,
+};
 use crate::import::{POINTS, channel, given, is_points, read_bytes, rows, speed};
 
 /// The curve of a file of that name, which is a table; its notes.
@@ -526,8 +528,7 @@ fn radioss_functions() {
 fn exported_decks_and_packages_come_back() {
     let folder = demo_folder();
     let here = folder.path();
-    let curve: Value =
-        serde_json::from_str(&fs::read_to_string(here.join("lead50.json")).unwrap()).unwrap();
+    let curve = read_json(&here.join("lead50.json"));
     crumple_ok(here, "export lead50.json --to radioss --deck -o deck");
     crumple_ok(here, "export lead50.json -o x.mo");
     let deck = "deck/lead-car-wall-50kmh_0000.rad";

@@ -242,9 +242,11 @@ fn print(out: &mut dyn Write, section: &Section) -> io::Result<()> {
     Ok(())
 }
 
-/// The files that were named, and those of every run at or below the folders that were; with the
-/// folder of the run where they were found by that.
-fn asked(paths: &[PathBuf]) -> Result<Vec<(Option<PathBuf>, Vec<PathBuf>)>, Failure> {
+/// What is to be inspected: files, with the folder of the run where it was found by that.
+type Asked = (Option<PathBuf>, Vec<PathBuf>);
+
+/// The files that were named, and those of every run at or below the folders that were.
+fn asked(paths: &[PathBuf]) -> Result<Vec<Asked>, Failure> {
     let mut asked = Vec::new();
     for path in paths {
         if !path.is_dir() {

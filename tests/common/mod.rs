@@ -183,6 +183,11 @@ pub fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap()
 }
 
+/// The JSON document of a file.
+pub fn read_json(path: &Path) -> Value {
+    json(&std::fs::read_to_string(path).unwrap())
+}
+
 /// What a failing command said: on standard error, and with --json as a document on standard output.
 pub fn said(output: &Output) -> String {
     let document: Option<Value> = serde_json::from_slice(&output.stdout).ok();
