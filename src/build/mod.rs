@@ -43,28 +43,23 @@ fn listed(problems: &[String]) -> String {
 
 /// How one run ended.
 #[derive(Debug)]
-pub enum RunOutcome {
-    /// Read and extracted.
+pub(crate) enum RunOutcome {
     Built,
     /// Unchanged since it was built.
     Kept,
     /// Not usable, with the reason; an earlier build of it stays in the database.
     Failed {
-        /// Why, with the damage of its files.
         reason: Error,
-        /// Whether the database has the run from an earlier build.
         earlier_kept: bool,
     },
 }
 
 /// One run of a study after a build.
 #[derive(Debug)]
-pub struct BuiltRun {
-    /// Name of the run in the manifest.
+pub(crate) struct BuiltRun {
     pub name: String,
     /// Where its case is, if the database has one.
-    pub(crate) case: CasePath,
-    /// How it ended.
+    pub case: CasePath,
     pub outcome: RunOutcome,
 }
 
@@ -74,7 +69,7 @@ pub struct BuildReport {
     /// Group of the study.
     pub group: String,
     /// Every run, in the order of the manifest.
-    pub runs: Vec<BuiltRun>,
+    pub(crate) runs: Vec<BuiltRun>,
     /// Cases that the study no longer has.
     pub(crate) removed: Vec<CasePath>,
     /// Cases of runs that have another name or group than before: from where to where.

@@ -21,7 +21,10 @@ impl LocatedRun<'_> {
         let extracted = self.curve(&files, units)?;
         if self.study.manifest.study.units.is_none() || extracted.speed_is_decks {
             // What could not be read of it may have changed what was taken from it.
-            remarks.warnings.extend(self.deck_problems());
+            if let Some(RunDeck { file, deck }) = &self.deck {
+                let name = shown_name(&file.path);
+                remarks.warnings.extend(deck.problems.iter().map(|p| format!("deck {name}: {p}")));
+            }
         }
         remarks.notes.extend_from_slice(&extracted.quality.notes);
         remarks.warnings.extend_from_slice(&extracted.quality.warnings);
@@ -141,12 +144,6 @@ impl LocatedRun<'_> {
                 Shown::one_mass(ratio * masses.body_kg)
             )
         })
-    }
-
-    fn deck_problems(&self) -> Vec<String> {
-        let Some(RunDeck { file, deck }) = &self.deck else { return Vec::new() };
-        let name = shown_name(&file.path);
-        deck.problems.iter().map(|p| format!("deck {name}: {p}")).collect()
     }
 
     /// Notes on the files: the side that was chosen, binary files beside texts, and damage.
