@@ -52,7 +52,7 @@ fn predict_one_curve(bencher: Bencher, name: &str) {
 #[divan::bench(sample_count = 3)]
 fn validate_all_models() {
     black_box(
-        validate(GROUP, cases(), &ModelKind::candidates(0), Selection::Best(Purpose::Vehicle))
+        validate(GROUP, cases(), &ModelKind::all(0), Selection::Best(Purpose::Vehicle))
             .expect("a validation"),
     );
 }

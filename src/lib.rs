@@ -41,6 +41,7 @@ mod guess;
 
 mod plural;
 
+#[macro_use]
 mod table;
 
 pub mod plot;

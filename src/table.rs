@@ -1,6 +1,31 @@
-//! Tables of texts: a column is stated once, by its name and what it shows of an item; shown as text and in pages.
+//! Results as they are shown: tables of texts, of which a column is stated once, by its name and what it shows of an item; objects for JSON.
 
 use serde::Serialize;
+
+/// An object for JSON with these fields in this order, made where it is printed; a field marked
+/// `if_any` is left out where it is null or empty.
+macro_rules! document {
+    ($($(#[$attribute:meta])* $key:ident $($if_any:ident)?: $value:expr),* $(,)?) => {{
+        #[derive(serde::Serialize)]
+        #[allow(non_snake_case)]
+        struct Document<$($key),*> {
+            $(
+                $(
+                    #[doc = stringify!($if_any)]
+                    #[serde(skip_serializing_if = "crate::table::is_empty")]
+                )?
+                $(#[$attribute])*
+                $key: $key,
+            )*
+        }
+        Document { $($key: $value),* }
+    }};
+}
+
+/// Whether there is nothing in a value.
+pub(crate) fn is_empty(value: &impl Serialize) -> bool {
+    serde_json::to_string(value).is_ok_and(|json| ["null", "[]", "{}"].contains(&json.as_str()))
+}
 
 /// A table of texts; the first column names, the others hold values.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]

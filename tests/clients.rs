@@ -59,19 +59,9 @@ fn exported_curves_move_one_mass_as_fe_did() {
             export("body.json", &[]);
             export("contact.csv", &["--force", "contact"]);
             let nodout = fixture(&format!("fe/{group}/{speed}kmh/nodout"));
-            let files = [
-                "predicted.csv",
-                "predicted.k",
-                "body.csv",
-                "body-mm.csv",
-                "body-kN.csv",
-                "body.k",
-                "body-si.k",
-                "body.json",
-                "contact.csv",
-            ];
+            let files = "predicted.csv predicted.k body.csv body-mm.csv body-kN.csv body.k body-si.k body.json contact.csv";
             let paths: Vec<String> =
-                files.iter().map(|f| here.join(f).display().to_string()).collect();
+                files.split(' ').map(|f| here.join(f).display().to_string()).collect();
             let paths: Vec<&str> = paths.iter().map(String::as_str).collect();
             let arguments = [&[nodout.to_str().unwrap(), node, scale][..], &paths].concat();
             let found = run_python("one_mass.py", &arguments);

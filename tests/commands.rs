@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use crate::common::{
-    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, fixture, json, says, shared,
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, fixture, json, read_json,
+    says, shared,
 };
 use serde_json::Value;
 
@@ -28,25 +29,21 @@ fn inspect_names_titles_and_components() {
 fn histories_selects_ids_sides_and_components() {
     let here = Path::new(".");
     let rcforc = fixture("fe/lead-car-pair/36kmh/rcforc");
-    let text = crumple_ok(
-        here,
-        &["histories", rcforc.to_str().unwrap(), "--id", "3:surfb", "--component", "x_force"],
-    );
+    let of = |id: &str| {
+        let rcforc = rcforc.to_str().unwrap();
+        crumple_ok(here, &["histories", rcforc, "--id", id, "--component", "x_force"])
+    };
+    let text = of("3:surfb");
     let lines: Vec<&str> = text.lines().collect();
     assert_eq!(lines[0], "time,x_force[3:surfb]");
     assert_eq!(lines[1], "0.0,-200577.0");
     assert_eq!(lines.len(), 401);
-    let both = crumple_ok(
-        here,
-        &["histories", rcforc.to_str().unwrap(), "--id", "3", "--component", "x_force"],
-    );
-    assert_eq!(both.lines().next().unwrap(), "time,x_force[3:surfa],x_force[3:surfb]");
+    assert_eq!(of("3").lines().next().unwrap(), "time,x_force[3:surfa],x_force[3:surfb]");
 }
 
 #[test]
 fn build_is_incremental_by_content() {
-    let folder = tempfile::tempdir().unwrap();
-    copy(&fixture("fe/lead-car-wall"), &folder.path().join("study"));
+    let folder = study_of(WALL);
     let build = || json(&crumple_ok(folder.path(), "build study/study.toml -o c.h5 --json"));
     let outcomes = |report: &Value| -> Vec<String> {
         let runs = report["runs"].as_array().unwrap();
@@ -58,16 +55,14 @@ fn build_is_incremental_by_content() {
     assert_eq!(std::fs::read(folder.path().join("c.h5")).unwrap(), before);
     // One byte of one file.
     let path = folder.path().join("study/36kmh/rwforc");
-    let text = std::fs::read_to_string(&path).unwrap();
-    std::fs::write(&path, text.replacen("rigid wall ", "rigid Wall ", 1)).unwrap();
+    replace(&path, "rigid wall ", "rigid Wall ");
     let only = |built: usize| -> Vec<&str> {
         (0..7).map(|run| if run == built { "built" } else { "unchanged" }).collect()
     };
     assert_eq!(outcomes(&build()), only(3));
     // The mass of one run.
     let path = folder.path().join("study/study.toml");
-    let text = std::fs::read_to_string(&path).unwrap();
-    std::fs::write(&path, text.replacen("\"24t\"", "\"24.5t\"", 1)).unwrap();
+    replace(&path, "\"24t\"", "\"24.5t\"");
     assert_eq!(outcomes(&build()), only(0));
     // A run that left the study leaves the database.
     let text = std::fs::read_to_string(&path).unwrap();
@@ -77,11 +72,17 @@ fn build_is_incremental_by_content() {
     assert_eq!(report["removed"], serde_json::json!(["72kmh"]));
 }
 
+/// Replaces a text of a file once; it must be there.
+fn replace(path: &Path, from: &str, to: &str) {
+    let text = std::fs::read_to_string(path).unwrap();
+    assert!(text.contains(from), "{from}");
+    std::fs::write(path, text.replacen(from, to, 1)).unwrap();
+}
+
 /// What a deck includes decides a curve as the deck itself does.
 #[test]
 fn an_included_file_is_part_of_the_deck() {
-    let folder = tempfile::tempdir().unwrap();
-    copy(&fixture("fe/lead-car-wall"), &folder.path().join("study"));
+    let folder = study_of(WALL);
     let run = folder.path().join("study/36kmh");
     std::fs::write(run.join("main.k"), "*KEYWORD\n*INCLUDE\nmore.k\n*END\n").unwrap();
     let include = |comment: &str| {
@@ -116,6 +117,13 @@ fn histories_from_a_pipe() {
     assert!(read("out.csv") == read("file.csv"));
 }
 
+/// A folder whose folder `study` holds a bundled study and its runs.
+fn study_of(group: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    copy(&fixture(&format!("fe/{group}")), &folder.path().join("study"));
+    folder
+}
+
 fn copy(from: &Path, to: &Path) {
     std::fs::create_dir_all(to).unwrap();
     for entry in from.read_dir().unwrap() {
@@ -133,8 +141,7 @@ fn copy(from: &Path, to: &Path) {
 #[test]
 fn speed_is_taken_from_the_first_state_and_said() {
     for (group, first_speed) in [(WALL, 12.0), ("lead-car-pair", 36.0), ("vehicle-pair", 3.0)] {
-        let folder = tempfile::tempdir().unwrap();
-        copy(&fixture(&format!("fe/{group}")), &folder.path().join("study"));
+        let folder = study_of(group);
         let path = folder.path().join("study/study.toml");
         let text = std::fs::read_to_string(&path).unwrap();
         let bare: Vec<&str> = text.lines().filter(|l| !l.starts_with("speed")).collect();
@@ -151,11 +158,9 @@ fn speed_is_taken_from_the_first_state_and_said() {
 
 #[test]
 fn a_wrong_speed_in_the_manifest_is_noticed() {
-    let folder = tempfile::tempdir().unwrap();
-    copy(&fixture("fe/lead-car-wall"), &folder.path().join("study"));
+    let folder = study_of(WALL);
     let path = folder.path().join("study/study.toml");
-    let text = std::fs::read_to_string(&path).unwrap();
-    std::fs::write(&path, text.replace("\"36km/h\"", "\"38km/h\"")).unwrap();
+    replace(&path, "\"36km/h\"", "\"38km/h\"");
     let output = crumple_in(folder.path(), "build study/study.toml -o c.h5 --strict");
     assert_eq!(output.status.code(), Some(3));
     let error = String::from_utf8(output.stderr).unwrap();
@@ -215,17 +220,19 @@ fn full_runs_and_bundled_runs_agree() {
     assert_eq!(curves("full.h5").len(), 20);
 }
 
+/// A number as Fortran writes it.
+fn e(value: f64, width: usize, decimals: usize) -> String {
+    let text = format!("{value:.decimals$E}");
+    let (mantissa, exponent) = text.split_once('E').unwrap();
+    let exponent: i32 = exponent.parse().unwrap();
+    let sign = if exponent < 0 { '-' } else { '+' };
+    format!("{:>width$}", format!("{mantissa}E{sign}{:02}", exponent.abs()))
+}
+
 /// A rwforc and a nodout of a body that meets a wall with a constant force, each 0.1 ms.
 fn constant_force_run(folder: &Path, contact_s: f64, speed: f64, force: f64) {
     use std::fmt::Write;
     let mass = 24e3;
-    let e = |value: f64, width: usize, decimals: usize| {
-        let text = format!("{value:.decimals$E}");
-        let (mantissa, exponent) = text.split_once('E').unwrap();
-        let exponent: i32 = exponent.parse().unwrap();
-        let sign = if exponent < 0 { '-' } else { '+' };
-        format!("{:>width$}", format!("{mantissa}E{sign}{:02}", exponent.abs()))
-    };
     let header =
         " made up\n                    ls-dyna smp d R14 R14.0_515_8a12796 date 12/12/2022\n\n";
     let (mut nodout, mut rwforc) = (header.to_string(), header.to_string());
@@ -316,16 +323,13 @@ fn pair_and_wall_agree_by_symmetry() {
 #[test]
 fn body_force_from_acceleration_and_from_velocity() {
     for component in ["x_acceleration", "x_velocity"] {
-        let folder = tempfile::tempdir().unwrap();
-        copy(&fixture("fe/lead-car-wall"), &folder.path().join("study"));
+        let folder = study_of(WALL);
         let path = folder.path().join("study/study.toml");
-        let text = std::fs::read_to_string(&path).unwrap();
         let contact = "force      = { file = \"rwforc\", id = 1, component = \"normal_force\" }";
-        assert!(text.contains(contact));
         let body = format!(
             "force = {{ file = \"nodout\", node = 900001, component = \"{component}\", times = \"mass\" }}"
         );
-        std::fs::write(&path, text.replace(contact, &body)).unwrap();
+        replace(&path, contact, &body);
         let report = json(&crumple_ok(folder.path(), "build study/study.toml -o c.h5 --json"));
         for run in report["runs"].as_array().unwrap() {
             let case = &run["case"];
@@ -372,12 +376,7 @@ fn unit_systems_agree() {
 fn rescale(path: &Path, length: f64, time: f64, force: f64) {
     let text = std::fs::read_to_string(path).unwrap();
     let number = |field: &str, factor: f64, width: usize, decimals: usize| {
-        let value: f64 = field.trim().parse().unwrap();
-        let text = format!("{:.decimals$E}", value * factor);
-        let (mantissa, exponent) = text.split_once('E').unwrap();
-        let exponent: i32 = exponent.parse().unwrap();
-        let sign = if exponent < 0 { '-' } else { '+' };
-        format!("{:>width$}", format!("{mantissa}E{sign}{:02}", exponent.abs()))
+        e(field.trim().parse::<f64>().unwrap() * factor, width, decimals)
     };
     let mut out = String::new();
     for line in text.lines() {
@@ -475,19 +474,8 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
         folder.path(),
         "predict lead.model --speed 50km/h --json -o a.json -o a.csv -o a.k",
     ));
-    for key in [
-        "deflection_m",
-        "force_N",
-        "unloading_stiffness_N_per_m",
-        "max_deflection_m",
-        "speed_m_per_s",
-        "speed_kind",
-        "mass_kg",
-        "energy_J",
-        "model",
-        "warnings",
-        "provenance",
-    ] {
+    let keys = "deflection_m force_N unloading_stiffness_N_per_m max_deflection_m speed_m_per_s speed_kind mass_kg energy_J model warnings provenance";
+    for key in keys.split(' ') {
         assert!(!curve[key].is_null(), "{key}");
     }
     let column = |key: &str| -> Vec<f64> { serde_json::from_value(curve[key].clone()).unwrap() };
@@ -496,8 +484,7 @@ fn prediction_has_the_promised_keys_and_starts_at_zero() {
     assert_eq!(d[d.len() - 1], curve["max_deflection_m"].as_f64().unwrap());
     assert!(f.iter().all(|&f| f >= 0.0));
     // All three files hold the same curve: JSON both forces, the others that of one mass.
-    let written: Value =
-        serde_json::from_slice(&std::fs::read(folder.path().join("a.json")).unwrap()).unwrap();
+    let written = read_json(&folder.path().join("a.json"));
     // What is printed says beside it what each file's target makes of the curve.
     let mut printed = curve.clone();
     let exports = printed.as_object_mut().unwrap().remove("exports").unwrap();
@@ -548,11 +535,7 @@ fn lsdyna_export_in_the_decks_units() {
     let deck = |units: &str| -> Vec<(f64, f64)> {
         let text = crumple_ok(
             folder.path(),
-            &[
-                &["export", "a.json", "--to", "lsdyna", "--units", units, "--curve-id", "7"][..],
-                &["--tail", "none"],
-            ]
-            .concat(),
+            &format!("export a.json --to lsdyna --units {units} --curve-id 7 --tail none"),
         );
         assert!(text.contains("\n         7         0"));
         text.lines()
@@ -748,23 +731,8 @@ fn wall_curves_do_not_drive_pairs() {
 
 #[test]
 fn every_command_has_help_with_examples() {
-    for command in [
-        "init",
-        "inspect",
-        "histories",
-        "build",
-        "db",
-        "train",
-        "predict",
-        "simulate",
-        "sweep",
-        "compare",
-        "rate",
-        "export",
-        "demo",
-        "completions",
-        "man",
-    ] {
+    let commands = "init inspect histories build db train predict simulate sweep compare rate export demo completions man";
+    for command in commands.split(' ') {
         let help = crumple_ok(Path::new("."), &[command, "--help"]);
         assert!(help.contains("Examples:"), "{command}");
         assert!(help.contains(&format!("crumple {command}")), "{command}");
@@ -908,7 +876,7 @@ fn scenarios_choose_the_force() {
     assert!(!here.join("-").exists());
     crumple_fails(here, 2, &[&predict[..], &["--json"]].concat());
     // A contact curve without its body force is not passed off as one.
-    let mut curve: Value = json(&std::fs::read_to_string(here.join("a.json")).unwrap());
+    let mut curve = read_json(&here.join("a.json"));
     curve.as_object_mut().unwrap().remove("body_force_N");
     std::fs::write(here.join("old.json"), curve.to_string()).unwrap();
     scenario("file = \"old.json\", force = \"body\"");

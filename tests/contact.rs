@@ -119,7 +119,7 @@ impl Run {
             deck_speed: None,
             contact_threshold: recipe.contact_threshold.unwrap_or(0.005),
             stated,
-            others: &[],
+            others: &Vec::new,
         };
         extract(&measured, &setup)
     }
@@ -407,40 +407,17 @@ fn histories_that_contradict_each_other_are_said() {
     fn clock(run: &mut Run, at: fn(f64) -> f64) {
         run.force.time = run.force.time.iter().map(|&t| at(t)).collect();
     }
+    #[rustfmt::skip]
     let damages: [(&str, Damage, &str); 13] = [
-        (
-            "a state of the force that is wrong",
-            |run| run.force.values[30] *= 4.0,
-            "force: the peak of ",
-        ),
+        ("a state of the force that is wrong", |run| run.force.values[30] *= 4.0, "force: the peak of "),
         ("force 10 ms early", |run| clock(run, |t| t - 0.010), "times: the force starts at -10 ms"),
         ("force 5 ms early", |run| clock(run, |t| t - 0.005), "times: the force starts at -5 ms"),
-        (
-            "force 3 ms late",
-            |run| clock(run, |t| t + 0.003),
-            "the first 40.0 mm of the crush (4.6 %)",
-        ),
+        ("force 3 ms late", |run| clock(run, |t| t + 0.003), "the first 40.0 mm of the crush (4.6 %)"),
         ("force stretched", |run| clock(run, |t| 1.1 * t), "impulse: from"),
-        (
-            "displacement 0.95",
-            |run| each(&mut run.displacement, |_, d| 0.95 * d),
-            "displacement: from",
-        ),
-        (
-            "displacement glitch",
-            |run| run.displacement.values[60] += 300.0,
-            "displacement: from 45.002 ms on it deviates from the integral of the velocity by up to 34.3 %",
-        ),
-        (
-            "velocity 1.05",
-            |run| each(&mut run.velocity, |t, v| if t > 0.05 { 1.05 * v } else { v }),
-            "displacement: from",
-        ),
-        (
-            "force on a body in flight",
-            |run| each(&mut run.force, |t, f| if (0.15..0.195).contains(&t) { 5e6 } else { f }),
-            "after the contact, its impulse is 225.035 kN·s, but the momentum changes by -1.467 kN·s",
-        ),
+        ("displacement 0.95", |run| each(&mut run.displacement, |_, d| 0.95 * d), "displacement: from"),
+        ("displacement glitch", |run| run.displacement.values[60] += 300.0, "displacement: from 45.002 ms on it deviates from the integral of the velocity by up to 34.3 %"),
+        ("velocity 1.05", |run| each(&mut run.velocity, |t, v| if t > 0.05 { 1.05 * v } else { v }), "displacement: from"),
+        ("force on a body in flight", |run| each(&mut run.force, |t, f| if (0.15..0.195).contains(&t) { 5e6 } else { f }), "after the contact, its impulse is 225.035 kN·s, but the momentum changes by -1.467 kN·s"),
         (
             "force long after the contact",
             |run| {

@@ -4,12 +4,11 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::common::{
-    build_fixture, crumple_fails, crumple_in, crumple_ok, edited, entries, fixture, is_thorough,
-    json, python, says, study_in,
+    build_fixture, crumple_fails, crumple_in, crumple_ok as ok, crumple_started, edited, entries,
+    fixture, is_thorough, json, program, python, says, study_in,
 };
 use crumple::curve::Case;
 use crumple::database::Database;
@@ -19,24 +18,21 @@ use serde_json::Value;
 
 const WALL: &str = "lead-car-wall";
 const PAIR: &str = "lead-car-pair";
-
-/// Runs the program with a line of words.
-fn ok(folder: &Path, line: &str) -> String {
-    crumple_ok(folder, &line.split(' ').collect::<Vec<_>>())
-}
+/// A curve that 24 t at 36 km/h may have.
+const TABLE: &str = "d_mm,F_kN\n0,0\n50,1200\n500,1200\n1000,1200\n1020,1200\n";
 
 fn ok_json(folder: &Path, line: &str) -> Value {
     json(&ok(folder, &format!("{line} --json")))
 }
 
+#[track_caller]
 fn fails(folder: &Path, line: &str, expected: &str) {
-    let error = crumple_fails(folder, 1, &line.split(' ').collect::<Vec<_>>());
-    assert!(error.contains(expected), "{line} said:\n{error}");
+    says(&crumple_fails(folder, 1, line), expected);
 }
 
+#[track_caller]
 fn misused(folder: &Path, line: &str, expected: &str) {
-    let error = crumple_fails(folder, 2, &line.split(' ').collect::<Vec<_>>());
-    assert!(error.contains(expected), "{line} said:\n{error}");
+    says(&crumple_fails(folder, 2, line), expected);
 }
 
 fn read(folder: &Path, name: &str) -> Database {
@@ -139,12 +135,8 @@ fn removing_names_what_it_did_and_a_dry_run_does_nothing() {
     assert!(said.ends_with("would remove 2 cases from curves.h5\n"), "{said}");
     assert!(fs::read(here.join("curves.h5")).unwrap() == before);
     let document = ok_json(here, line);
-    let removed: Vec<&str> = document["removed"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|c| c["name"].as_str().unwrap())
-        .collect();
+    let removed = document["removed"].as_array().unwrap().iter();
+    let removed: Vec<&str> = removed.map(|c| c["name"].as_str().unwrap()).collect();
     assert_eq!((removed, &document["dry_run"]), (vec!["12kmh", "18kmh"], &Value::Bool(false)));
     assert_eq!(names(here, "curves.h5").len(), 9);
     // A group of which nothing is left is gone.
@@ -214,7 +206,7 @@ impl Studied {
 
     fn build(&self) -> Value {
         let study = self.study.to_str().unwrap();
-        json(&crumple_ok(self.here(), &["build", study, "-o", "curves.h5", "--json"]))
+        json(&ok(self.here(), &["build", study, "-o", "curves.h5", "--json"]))
     }
 
     fn outcomes(report: &Value) -> BTreeSet<&str> {
@@ -294,11 +286,12 @@ fn a_renamed_study_takes_its_cases_along() {
         of("nose", &["slowest", "18kmh", "25kmh", "reference", "48kmh", "60kmh", "72kmh"]);
     assert_eq!(names(here, "curves.h5"), expected);
     let database = read(here, "curves.h5");
-    assert!(
-        database
-            .all()
-            .all(|case| case.id.study == "a third" && case.provenance.tags == ["reviewed"])
-    );
+    for case in database.all() {
+        assert_eq!(
+            (&*case.id.study, &*case.provenance.tags),
+            ("a third", &["reviewed".into()][..])
+        );
+    }
     studied.is_settled();
 }
 
@@ -363,11 +356,9 @@ fn a_build_goes_on_with_what_was_renamed_in_the_database() {
     assert_eq!(Studied::outcomes(&report), BTreeSet::from(["built"]));
     assert_eq!(report["runs"][3]["renamed"], "nose/reference");
     let database = read(here, "curves.h5");
-    assert!(
-        database
-            .all()
-            .all(|case| case.id.group == "nose" && case.conditions.masses.body_kg == 24.5e3)
-    );
+    for case in database.all() {
+        assert_eq!((&*case.id.group, case.conditions.masses.body_kg), ("nose", 24.5e3));
+    }
     assert_eq!(database.cases("nose")[3].id.name, "reference");
     studied.change("/36kmh\"", "/37kmh\"");
     let output =
@@ -375,12 +366,8 @@ fn a_build_goes_on_with_what_was_renamed_in_the_database() {
     assert_eq!(output.status.code(), Some(1));
     let report = json(&String::from_utf8(output.stdout).unwrap());
     assert_eq!(report["runs"][3]["outcome"], "failed");
-    assert!(
-        report["runs"][3]["error"]
-            .as_str()
-            .unwrap()
-            .ends_with("(the case of an earlier build is kept)")
-    );
+    let error = report["runs"][3]["error"].as_str().unwrap();
+    assert!(error.ends_with("(the case of an earlier build is kept)"));
     assert_eq!(names(here, "curves.h5").len(), 7);
     let text = fs::read_to_string(&studied.study).unwrap();
     let runs: Vec<&str> = text.split("[[run]]").filter(|run| !run.contains("\"36kmh\"")).collect();
@@ -433,10 +420,8 @@ fn equal_curves_are_joined_once_and_different_ones_are_refused() {
     assert_eq!(names(here, "all.h5").len(), 18);
     assert_eq!(read(here, "all.h5").cases(WALL)[1].conditions.masses.body_kg, 30e3);
     // Again: all of it is there.
-    assert!(
-        ok(here, "db merge all.h5 heavy.h5 -o all.h5")
-            .contains("0 cases added, 0 replaced, 7 already present")
-    );
+    let again = ok(here, "db merge all.h5 heavy.h5 -o all.h5");
+    says(&again, "0 cases added, 0 replaced, 7 already present");
     ok(here, "db merge heavy.h5 a.h5 -o heavy.h5 --replace");
     let replaced = read(here, "heavy.h5");
     assert!(
@@ -508,10 +493,8 @@ fn tags_and_notes_stay_when_a_case_is_made_again() {
     let here = studied.here();
     studied.build();
     ok(here, "db tag curves.h5 --group lead-car-wall --add reviewed,a");
-    crumple_ok(
-        here,
-        &["db", "note", "curves.h5", "--case", "72kmh", "--add", "rides up, from 80 ms on"],
-    );
+    let note = "rides up, from 80 ms on";
+    ok(here, &["db", "note", "curves.h5", "--case", "72kmh", "--add", note]);
     let before = studied.bytes();
     // What exists already changes nothing.
     ok(here, "db tag curves.h5 --group lead-car-wall --add a");
@@ -521,14 +504,13 @@ fn tags_and_notes_stay_when_a_case_is_made_again() {
     let last = read(here, "curves.h5").cases(WALL)[6].clone();
     assert_eq!(
         (last.provenance.tags, last.provenance.user_notes),
-        (vec!["a".to_string(), "reviewed".into()], vec!["rides up, from 80 ms on".to_string()])
+        (vec!["a".to_string(), "reviewed".into()], vec![note.to_string()])
     );
     let shown = ok(here, "db show curves.h5 --case 72kmh");
     says(&shown, "user's note: rides up, from 80 ms on\n");
     assert!(shown.contains("\nbuilt 20") && shown.contains("from /"), "{shown}");
     // As that of a file that is added again.
-    fs::write(here.join("t.csv"), "d_mm,F_kN\n0,0\n50,1200\n500,1200\n1000,1200\n1020,1200\n")
-        .unwrap();
+    fs::write(here.join("t.csv"), TABLE).unwrap();
     let add = "db add curves.h5 t.csv --group tests --speed 36km/h --kind wall --mass 24t";
     ok(here, add);
     ok(here, "db tag curves.h5 --case t --add test");
@@ -562,29 +544,9 @@ fn tables_hold_what_the_database_does() {
     let folder = two_groups();
     let here = folder.path();
     ok(here, "db tag curves.h5 --group lead-car-wall --speed ..20km/h --add slow,odd");
-    fs::write(here.join("t.csv"), "d_mm,F_kN\n0,0\n50,1200\n500,1200\n1000,1200\n1020,1200\n")
-        .unwrap();
-    let add = [
-        "db",
-        "add",
-        "curves.h5",
-        "t.csv",
-        "--group",
-        "a \"b\", c",
-        "--case",
-        "x,y",
-        "--speed",
-        "36km/h",
-        "--kind",
-        "wall",
-        "--mass",
-        "24t",
-        "--parameter",
-        "angle_deg=10",
-        "--parameter",
-        "obstacle=a, b",
-    ];
-    crumple_ok(here, &add);
+    fs::write(here.join("t.csv"), TABLE).unwrap();
+    let add = "db|add|curves.h5|t.csv|--group|a \"b\", c|--case|x,y|--speed|36km/h|--kind|wall|--mass|24t|--parameter|angle_deg=10|--parameter|obstacle=a, b";
+    ok(here, &add.split('|').collect::<Vec<_>>());
     let said = ok(here, "db export curves.h5 -o tables --originals");
     assert_eq!(
         said,
@@ -820,8 +782,7 @@ fn builds_are_dated_and_reproducible() {
     let studied = Studied::new();
     let here = studied.here();
     let build = |name: &str, epoch: Option<&str>| {
-        let mut command = Command::new(env!("CARGO_BIN_EXE_crumple"));
-        command.args(["build", "lead-car-wall.toml", "-o", name, "-q"]).current_dir(here);
+        let mut command = program(here, &["build", "lead-car-wall.toml", "-o", name, "-q"]);
         command.env_remove("SOURCE_DATE_EPOCH");
         if let Some(epoch) = epoch {
             command.env("SOURCE_DATE_EPOCH", epoch);
@@ -867,8 +828,7 @@ fn to_be_changed() -> (tempfile::TempDir, String) {
     build_fixture(here, PAIR);
     fs::rename(here.join("curves.h5"), here.join("other.h5")).unwrap();
     build_fixture(here, WALL);
-    fs::write(here.join("t.csv"), "d_mm,F_kN\n0,0\n50,1200\n500,1200\n1000,1200\n1020,1200\n")
-        .unwrap();
+    fs::write(here.join("t.csv"), TABLE).unwrap();
     let study = fixture("fe/lead-car-pair/study.toml").to_str().unwrap().to_string();
     (folder, study)
 }
@@ -879,18 +839,11 @@ type Said = (String, Vec<String>, Vec<String>, Vec<f64>);
 /// Cases with what users say of them; dates differ from run to run.
 fn state(path: &Path) -> Vec<Said> {
     let database = Database::read(path).unwrap();
-    database
-        .all()
-        .map(|case| {
-            let force = case.curves.original.force_n().to_vec();
-            (
-                format!("{}/{}", case.id.group, case.id.name),
-                case.provenance.tags.clone(),
-                case.provenance.user_notes.clone(),
-                force,
-            )
-        })
-        .collect()
+    let said = |case: &Case| {
+        let (path, of) = (format!("{}/{}", case.id.group, case.id.name), &case.provenance);
+        (path, of.tags.clone(), of.user_notes.clone(), case.curves.original.force_n().to_vec())
+    };
+    database.all().map(said).collect()
 }
 
 /// Numbers from 0 to 1 that are spread evenly and look like nothing.
@@ -934,20 +887,14 @@ fn kill_at_many_moments(look: &mut dyn FnMut(&Path)) {
         let before = fs::read(&path).unwrap();
         let old = state(&path);
         let begun = Instant::now();
-        crumple_ok(here, &words);
+        ok(here, &words);
         let mut aim = Aim::at(begun.elapsed());
         let new = state(&path);
         assert!(old != new, "{line}");
         let (mut killed, mut acknowledged) = (0, 0);
         for moment in moments(kills) {
             fs::write(&path, &before).unwrap();
-            let mut child = Command::new(env!("CARGO_BIN_EXE_crumple"))
-                .args(&words)
-                .current_dir(here)
-                .stdout(Stdio::null())
-                .stderr(Stdio::null())
-                .spawn()
-                .unwrap();
+            let mut child = crumple_started(here, &words);
             aim.wait(moment);
             let _ = child.kill();
             let found = if child.wait().unwrap().success() {
@@ -1011,20 +958,10 @@ fn h5py_opens_databases_whose_writers_were_killed() {
 fn every_acknowledged_case_is_there() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    fs::write(here.join("t.csv"), "d_mm,F_kN\n0,0\n50,1200\n500,1200\n1000,1200\n1020,1200\n")
-        .unwrap();
+    fs::write(here.join("t.csv"), TABLE).unwrap();
     let add = |case: &str| {
-        Command::new(env!("CARGO_BIN_EXE_crumple"))
-            .args(
-                "db add c.h5 t.csv --group g --speed 36km/h --kind wall --mass 24t --case"
-                    .split(' '),
-            )
-            .arg(case)
-            .current_dir(here)
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap()
+        let line = "db add c.h5 t.csv --group g --speed 36km/h --kind wall --mass 24t --case";
+        crumple_started(here, &format!("{line} {case}"))
     };
     let begun = Instant::now();
     assert!(add("first").wait().unwrap().success());
@@ -1072,13 +1009,7 @@ fn a_second_writer_is_known() {
     assert!(fs::read(here.join("curves.h5")).unwrap() == before);
     // Two at once: each is done or refused, and nothing is lost.
     let tag = |tag: &str| {
-        Command::new(env!("CARGO_BIN_EXE_crumple"))
-            .args(["db", "tag", "curves.h5", "--group", WALL, "--add", tag])
-            .current_dir(here)
-            .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap()
+        crumple_started(here, &["db", "tag", "curves.h5", "--group", WALL, "--add", tag])
     };
     let mut expected = BTreeSet::new();
     for round in 0..10 {

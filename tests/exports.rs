@@ -8,8 +8,8 @@ use std::path::Path;
 use std::process::Command;
 
 use crate::common::{
-    crumple_fails, crumple_in, crumple_ok, demo_folder, entries, python, python_of, run_python,
-    says,
+    crumple_fails, crumple_in, crumple_ok, demo_folder, entries, python, python_of, read_json,
+    run_python, says,
 };
 use crumple::curve::Tail;
 use crumple::formats::FORMATS;
@@ -202,8 +202,7 @@ fn octave_reads_the_matrices() {
     let numbers =
         |line: &str| -> Vec<f64> { line.split_whitespace().map(|n| n.parse().unwrap()).collect() };
     let (forces, unloading) = (numbers(lines[0]), numbers(lines[1]));
-    let curve: Value =
-        serde_json::from_str(&fs::read_to_string(here.join("lead50.json")).unwrap()).unwrap();
+    let curve = read_json(&here.join("lead50.json"));
     let column = |key: &str| -> Vec<f64> { serde_json::from_value(curve[key].clone()).unwrap() };
     let (d, f) = (column("deflection_m"), column("body_force_N"));
     let envelope = crumple::curve::Envelope::new(d, f).unwrap();
@@ -225,8 +224,7 @@ fn octave_reads_the_matrices() {
 fn bands_stand_beside_their_curves() {
     let folder = demo_folder();
     let here = folder.path();
-    let curve: Value =
-        serde_json::from_str(&fs::read_to_string(here.join("lead50.json")).unwrap()).unwrap();
+    let curve = read_json(&here.join("lead50.json"));
     let column = |key: &str| -> Vec<f64> { serde_json::from_value(curve[key].clone()).unwrap() };
     assert_ne!(column("force_low_N"), column("body_force_low_N"));
     // The body force is what is written unless another is requested.
@@ -445,8 +443,7 @@ fn h5py_reads_the_table_of_a_model() {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let found = run_python(python(), "exports_table.py", &arguments);
     // At 50 km/h, the curve that predict gives.
-    let curve: Value =
-        serde_json::from_str(&fs::read_to_string(here.join("lead50.json")).unwrap()).unwrap();
+    let curve = read_json(&here.join("lead50.json"));
     let column = |key: &str| -> Vec<f64> { serde_json::from_value(curve[key].clone()).unwrap() };
     let envelope =
         crumple::curve::Envelope::new(column("deflection_m"), column("body_force_N")).unwrap();
@@ -679,8 +676,7 @@ fn groups_and_several_speeds_are_exported_at_once() {
     );
     // A case and a prediction have the same keys.
     export(here, "curves.h5", "case.json", &["--group", "lead-car-wall", "--case", "36kmh"]);
-    let case: Value =
-        serde_json::from_str(&fs::read_to_string(here.join("case.json")).unwrap()).unwrap();
+    let case = read_json(&here.join("case.json"));
     for key in ["deflection_m", "force_N", "unloading_stiffness_N_per_m", "provenance", "energy_J"]
     {
         assert!(!case[key].is_null(), "{key}");

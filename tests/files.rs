@@ -7,8 +7,8 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use crate::common::{
-    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, edited, entries, fixture,
-    json, python, says, study_in,
+    build_fixture, crumple_fails, crumple_in, crumple_ok, crumple_started, demo_folder, edited,
+    entries, fixture, json, python, read_json, says, study_in,
 };
 use hdf5_pure::{AttrValue, File as Hdf5};
 use serde_json::Value;
@@ -75,11 +75,8 @@ fn devices_pipes_and_folders_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     fs::write(here.join("nose.csv"), "d_m,force_N\n0,0\n1,1e6\n").unwrap();
-    fs::write(
-        here.join("s.toml"),
-        format!("{SCENARIO}{{ file = \"nose.csv\", unloading = \"80MN/m\" }}\n"),
-    )
-    .unwrap();
+    let nose = format!("{SCENARIO}{{ file = \"nose.csv\", unloading = \"80MN/m\" }}\n");
+    fs::write(here.join("s.toml"), nose).unwrap();
     assert!(Command::new("mkfifo").arg(here.join("pipe")).status().unwrap().success());
     fs::create_dir(here.join("inner")).unwrap();
     let kinds = [
@@ -160,11 +157,8 @@ fn sizes_are_bounded() {
     soon_fails(here, &["export", "c.json", "--to", "csv"], &most(64 << 20));
     soon_fails(here, &["predict", "m.model", "--speed", "40km/h"], &most(1 << 30));
     soon_fails(here, &["rate", "r.csv", "r.csv"], &most(256 << 20));
-    fs::write(
-        here.join("t.toml"),
-        format!("{SCENARIO}{{ file = \"c.csv\", unloading = \"80MN/m\" }}\n"),
-    )
-    .unwrap();
+    let curve = format!("{SCENARIO}{{ file = \"c.csv\", unloading = \"80MN/m\" }}\n");
+    fs::write(here.join("t.toml"), curve).unwrap();
     soon_fails(here, &["simulate", "t.toml"], &most(64 << 20));
     // Within its bound, but more than there is memory for.
     sparse("m.model", 1 << 30);
@@ -247,7 +241,7 @@ fn the_stopped_mass_stands_in_the_database() {
     let built = stopped_mass(&path).unwrap();
     let [d, m, rate, residual] = &built;
     crumple_ok(here, &["train", "curves.h5", "--group", WALL, "--model", "rate", "-o", "a.model"]);
-    let model = json(&fs::read_to_string(here.join("a.model")).unwrap());
+    let model = read_json(&here.join("a.model"));
     let of_model = |key: &str| -> Vec<f64> {
         serde_json::from_value(model["crush_law"][key].clone()).unwrap()
     };
@@ -320,16 +314,8 @@ fn db_check_names_the_value_that_was_changed() {
     let path = build_fixture(folder.path(), WALL);
     let built = fs::read(&path).unwrap();
     let case = "lead-car-wall/36kmh";
-    for dataset in [
-        "time_s",
-        "deflection_m",
-        "force_N",
-        "closing_speed_m_per_s",
-        "body_force_N",
-        "original/time_s",
-        "original/deflection_m",
-        "original/force_N",
-    ] {
+    let datasets = "time_s deflection_m force_N closing_speed_m_per_s body_force_N original/time_s original/deflection_m original/force_N";
+    for dataset in datasets.split(' ') {
         for (index, value) in [(0, 1e300), (37, 1e300), (37, f64::NAN), (120, -3.5)] {
             fs::write(&path, &built).unwrap();
             edited(&path, |file| {
@@ -701,16 +687,10 @@ fn text_of_files_is_printed_without_control_characters() {
     fs::write(here.join("s.toml"), format!("[run]\n\"a{evil}b\" = 1\n").replace('\r', "")).unwrap();
     fs::write(here.join("t.toml"), "[run]\n\"a\\u001b[2Jb\" = 1\n").unwrap();
     fs::write(here.join("nose.csv"), format!("d{evil},force_N\n0,0\n")).unwrap();
-    fs::write(
-        here.join("u.toml"),
-        format!("{SCENARIO}{{ file = \"nose.csv\", unloading = \"80MN/m\" }}\n"),
-    )
-    .unwrap();
-    fs::write(
-        here.join("m.model"),
-        format!("{{\"format\":\"{evil}\",\"version\":1}}").replace('\r', ""),
-    )
-    .unwrap();
+    let nose = format!("{SCENARIO}{{ file = \"nose.csv\", unloading = \"80MN/m\" }}\n");
+    fs::write(here.join("u.toml"), nose).unwrap();
+    let model = format!("{{\"format\":\"{evil}\",\"version\":1}}").replace('\r', "");
+    fs::write(here.join("m.model"), model).unwrap();
     fs::write(here.join("e.model"), "{\"format\":\"\\u001b[2J\",\"version\":1}").unwrap();
     for line in [
         "db ls curves.h5",
@@ -748,10 +728,7 @@ fn killed_writers_leave_nothing_that_stays() {
     build_fixture(here, WALL);
     let nodout = fixture("fe/lead-car-wall/36kmh/nodout");
     let study = fixture("fe/lead-car-wall/study.toml");
-    crumple_ok(
-        here,
-        &["train", "curves.h5", "--group", WALL, "--model", "nearest", "-o", "m.model"],
-    );
+    crumple_ok(here, "train curves.h5 --group lead-car-wall --model nearest -o m.model");
     let lines: Vec<Vec<&str>> = vec![
         vec!["histories", nodout.to_str().unwrap(), "-o", "out.csv"],
         vec!["histories", nodout.to_str().unwrap(), "-o", "out.h5"],
@@ -766,13 +743,7 @@ fn killed_writers_leave_nothing_that_stays() {
             if line[0] == "build" {
                 let _ = fs::remove_file(here.join("new.h5"));
             }
-            let mut child = Command::new(env!("CARGO_BIN_EXE_crumple"))
-                .args(line)
-                .current_dir(here)
-                .stdout(Stdio::null())
-                .stderr(Stdio::null())
-                .spawn()
-                .unwrap();
+            let mut child = crumple_started(here, line);
             std::thread::sleep(whole * kill / 24);
             child.kill().unwrap();
             child.wait().unwrap();
@@ -801,12 +772,7 @@ fn writers_of_one_file_do_not_mix() {
         .collect();
     for _ in 0..12 {
         let spawn = |input: &PathBuf| {
-            Command::new(env!("CARGO_BIN_EXE_crumple"))
-                .args(["histories", input.to_str().unwrap(), "-o", "out.csv"])
-                .current_dir(here)
-                .stderr(Stdio::piped())
-                .spawn()
-                .unwrap()
+            crumple_started(here, &["histories", input.to_str().unwrap(), "-o", "out.csv"])
         };
         let children: Vec<_> = inputs.iter().map(spawn).collect();
         let mut done = 0;
@@ -908,10 +874,7 @@ fn a_folder_that_is_not_there_is_named() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     build_fixture(here, WALL);
-    crumple_ok(
-        here,
-        &["train", "curves.h5", "--group", WALL, "--model", "nearest", "-o", "m.model"],
-    );
+    crumple_ok(here, "train curves.h5 --group lead-car-wall --model nearest -o m.model");
     let nodout = fixture("fe/lead-car-wall/36kmh/nodout");
     let study = fixture("fe/lead-car-wall/study.toml");
     let commands: [&[&str]; 5] = [
@@ -944,10 +907,7 @@ fn the_only_group_needs_no_name() {
     let here = folder.path();
     build_fixture(here, WALL);
     crumple_ok(here, "train curves.h5 --model nearest -o a.model");
-    crumple_ok(
-        here,
-        &["train", "curves.h5", "--group", WALL, "--model", "nearest", "-o", "b.model"],
-    );
+    crumple_ok(here, "train curves.h5 --group lead-car-wall --model nearest -o b.model");
     let read = |name: &str| fs::read(here.join(name)).unwrap();
     assert!(read("a.model") == read("b.model"));
     let compare = ["compare", "curves.h5", "--speed", "48km/h", "--nsdm-seeds", "0"];

@@ -14,8 +14,7 @@ use crumple::database::Database;
 use crumple::dataset::TrainingSet;
 use crumple::formats::{FmiVersion, Spring, archive, binaries};
 use crumple::multibody::{
-    Body, Chain, EnvelopeEnd, ForceLaw, Interface, Method, Run, RunSettings, Unloading,
-    UnloadingChoice, simulate,
+    Body, Chain, EnvelopeEnd, ForceLaw, Interface, Method, Run, RunSettings, Unloading, simulate,
 };
 use crumple::surrogate::ForestOptions;
 use crumple::surrogate::{Model, ModelKind, Query, predict};
@@ -65,7 +64,7 @@ fn recorded() -> ForceLaw {
         cases.iter().find(|c| (c.conditions.speed.m_per_s - SPEED_M_PER_S).abs() < 0.1).unwrap();
     let curve = ForceCurve::recorded(case).unwrap();
     assert!(matches!(curve.unloading, CurveUnloading::Recorded { .. }));
-    ForceLaw::of_curve(&curve, UnloadingChoice::Own, EnvelopeEnd::Hold)
+    ForceLaw::of_curve(&curve, None, EnvelopeEnd::Hold)
 }
 
 /// The curve that a model of the lead car predicts at 50 km/h, with 401 points.
@@ -76,7 +75,7 @@ fn predicted(kind: ModelKind) -> ForceLaw {
     let model = Model::fit(&set, kind).unwrap();
     let curve = predict(&model, &Query::at(50.0 / 3.6)).unwrap();
     let curve = curve.driving(ForceKind::Body).unwrap();
-    ForceLaw::of_curve(&curve, UnloadingChoice::Own, EnvelopeEnd::Hold)
+    ForceLaw::of_curve(&curve, None, EnvelopeEnd::Hold)
 }
 
 /// One of each kind.
@@ -187,7 +186,7 @@ fn the_c_law_is_ours_bit_by_bit() {
             seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
             (seed >> 11) as f64 / (1_u64 << 53) as f64
         };
-        let end = law.tables().deflection_m[law.tables().deflection_m.len() - 1];
+        let end = law.envelope().end_m();
         let pairs: Vec<(f64, f64)> = (0..10_000)
             .map(|i| {
                 let largest = 1.2 * end * random();

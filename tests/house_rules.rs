@@ -9,168 +9,45 @@ use crate::common::{entries, root};
 
 /// Which module may name which others. One way only: a change here is a change of
 /// architecture and belongs into ARCHITECTURE.md.
-const MAY_NAME: [(&str, &[&str]); 37] = [
-    ("plural", &[]),
-    ("table", &[]),
-    ("guess", &[]),
-    ("error", &["guess"]),
-    ("unit", &["guess"]),
-    ("clock", &[]),
-    ("history", &[]),
-    ("piecewise", &[]),
-    ("plot", &[]),
-    ("signal", &["piecewise"]),
-    ("file", &[]),
-    ("hdf5", &["file"]),
-    ("manifest", &["guess", "file"]),
-    ("stream", &[]),
-    ("forest", &["stream"]),
-    ("solver", &["guess", "plural", "signal", "history", "file", "unit"]),
-    ("curve", &["plural", "signal", "piecewise", "history", "unit"]),
-    ("rating", &["guess", "curve", "signal", "history"]),
-    ("study", &["guess", "curve", "solver", "history", "manifest", "file", "unit"]),
-    ("history_hdf5", &["solver", "history", "hdf5", "file", "unit"]),
-    ("dataset", &["curve", "unit"]),
-    ("database", &["guess", "dataset", "curve", "signal", "history", "hdf5", "file", "unit"]),
-    ("build", &["study", "database", "curve", "manifest", "file", "clock"]),
-    ("curate", &["dataset", "database", "curve", "signal", "file", "unit"]),
-    (
-        "surrogate",
-        &["guess", "plural", "dataset", "forest", "curve", "signal", "piecewise", "file", "unit"],
-    ),
-    ("multibody", &["curve", "piecewise", "unit"]),
-    ("nsdm", &["curve", "signal", "piecewise", "stream"]),
-    (
-        "formats",
-        &[
-            "guess",
-            "plural",
-            "multibody",
-            "surrogate",
-            "dataset",
-            "forest",
-            "curve",
-            "signal",
-            "hdf5",
-            "file",
-            "unit",
-        ],
-    ),
-    ("import", &["formats", "database", "curve", "file", "unit", "clock"]),
-    ("plan", &["stream", "unit"]),
-    (
-        "scenario",
-        &[
-            "guess",
-            "plan",
-            "multibody",
-            "surrogate",
-            "formats",
-            "database",
-            "curve",
-            "signal",
-            "manifest",
-            "unit",
-        ],
-    ),
-    (
-        "sweep",
-        &["guess", "scenario", "plan", "multibody", "hdf5", "stream", "manifest", "file", "unit"],
-    ),
-    (
-        "init",
-        &[
-            "guess",
-            "scenario",
-            "surrogate",
-            "study",
-            "solver",
-            "curve",
-            "signal",
-            "history",
-            "file",
-            "unit",
-        ],
-    ),
-    (
-        "assess",
-        &[
-            "guess",
-            "plural",
-            "manifest",
-            "scenario",
-            "nsdm",
-            "rating",
-            "multibody",
-            "surrogate",
-            "dataset",
-            "database",
-            "solver",
-            "curve",
-            "signal",
-            "history",
-            "file",
-            "unit",
-        ],
-    ),
-    (
-        "charts",
-        &[
-            "assess",
-            "multibody",
-            "surrogate",
-            "dataset",
-            "curve",
-            "signal",
-            "history",
-            "plot",
-            "unit",
-        ],
-    ),
-    (
-        "report",
-        &[
-            "plural",
-            "table",
-            "charts",
-            "assess",
-            "scenario",
-            "multibody",
-            "surrogate",
-            "dataset",
-            "database",
-            "curve",
-            "plot",
-            "unit",
-        ],
-    ),
-    (
-        "failure",
-        &[
-            "report",
-            "charts",
-            "sweep",
-            "assess",
-            "scenario",
-            "import",
-            "init",
-            "curate",
-            "nsdm",
-            "formats",
-            "multibody",
-            "surrogate",
-            "dataset",
-            "build",
-            "study",
-            "database",
-            "history_hdf5",
-            "rating",
-            "solver",
-            "manifest",
-            "plot",
-            "file",
-        ],
-    ),
+#[rustfmt::skip]
+const MAY_NAME: [(&str, &str); 37] = [
+    ("plural", ""),
+    ("table", ""),
+    ("guess", ""),
+    ("error", "guess"),
+    ("unit", "guess"),
+    ("clock", ""),
+    ("history", ""),
+    ("piecewise", ""),
+    ("plot", ""),
+    ("signal", "piecewise"),
+    ("file", ""),
+    ("hdf5", "file"),
+    ("manifest", "guess file"),
+    ("stream", ""),
+    ("forest", "stream"),
+    ("solver", "guess plural signal history file unit"),
+    ("curve", "plural signal piecewise history unit"),
+    ("rating", "guess curve signal history"),
+    ("study", "guess curve solver history manifest file unit"),
+    ("history_hdf5", "solver history hdf5 file unit"),
+    ("dataset", "curve unit"),
+    ("database", "guess dataset curve signal history hdf5 file unit"),
+    ("build", "study database curve manifest file clock"),
+    ("curate", "dataset database curve signal file unit"),
+    ("surrogate", "guess plural dataset forest curve signal piecewise file unit"),
+    ("multibody", "curve piecewise unit"),
+    ("nsdm", "curve signal piecewise stream"),
+    ("formats", "guess plural multibody surrogate dataset forest curve signal hdf5 file unit"),
+    ("import", "formats database curve file unit clock"),
+    ("plan", "stream unit"),
+    ("scenario", "guess plan multibody surrogate formats database curve signal manifest unit"),
+    ("sweep", "guess scenario plan multibody hdf5 stream manifest file unit"),
+    ("init", "guess scenario surrogate study solver curve signal history file unit"),
+    ("assess", "guess plural manifest scenario nsdm rating multibody surrogate dataset database solver curve signal history file unit"),
+    ("charts", "assess multibody surrogate dataset curve signal history plot unit"),
+    ("report", "plural table charts assess scenario multibody surrogate dataset database curve plot unit"),
+    ("failure", "report charts sweep assess scenario import init curate nsdm formats multibody surrogate dataset build study database history_hdf5 rating solver manifest plot file"),
 ];
 
 fn files(folder: &Path, extension: &str) -> Vec<PathBuf> {
@@ -196,7 +73,7 @@ fn module(path: &Path) -> String {
 
 #[test]
 fn layers_name_only_what_is_below() {
-    let rules: BTreeMap<&str, &[&str]> = MAY_NAME.into_iter().collect();
+    let rules = BTreeMap::from(MAY_NAME);
     for path in files(&root().join("src"), "rs") {
         let this = module(&path);
         let text = fs::read_to_string(&path).unwrap();
@@ -211,12 +88,9 @@ fn layers_name_only_what_is_below() {
                 .take_while(|c| c.is_ascii_alphanumeric() || *c == '_')
                 .collect();
             // Every room makes errors.
-            assert!(
-                ["error", this.as_str()].contains(&named.as_str())
-                    || allowed.contains(&named.as_str()),
-                "{} names {named}, which is not below it",
-                path.display()
-            );
+            let is_allowed = ["error", &this].contains(&&*named)
+                || allowed.split(' ').any(|module| module == named);
+            assert!(is_allowed, "{} names {named}, which is not below it", path.display());
         }
     }
 }
@@ -225,7 +99,7 @@ fn layers_name_only_what_is_below() {
 fn rules_are_one_way() {
     let position = |name: &str| MAY_NAME.iter().position(|(m, _)| *m == name);
     for (k, (module, below)) in MAY_NAME.iter().enumerate() {
-        for name in *below {
+        for name in below.split_whitespace() {
             assert!(position(name).unwrap() < k, "{module} and {name} could form a circle");
         }
     }
@@ -320,7 +194,7 @@ fn no_unwrap_outside_tests() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 72493), ("files", 280), ("public types", 194), ("error types", 9)];
+    [("lines", 72484), ("files", 281), ("public types", 181), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {

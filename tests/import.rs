@@ -9,7 +9,9 @@ use crumple::unit::UnitSystem;
 use proptest::prelude::*;
 use serde_json::Value;
 
-use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, entries, says};
+use crate::common::{
+    build_fixture, crumple_fails, crumple_in, crumple_ok, entries, read_json, says,
+};
 
 /// The curve of all these files: a rise, a fall, a plateau; in m and N.
 pub const POINTS: [(f64, f64); 5] =
@@ -691,9 +693,7 @@ fn predicted_curves_come_back_as_a_group_that_trains() {
         let (model, out) = (format!("{model}.model"), format!("{model}50.json"));
         crumple_ok(here, &["predict", &model, "--speed", "45km/h", "-o", &out]);
     }
-    let of = |name: &str| -> Value {
-        serde_json::from_slice(&fs::read(here.join(name)).unwrap()).unwrap()
-    };
+    let of = |name: &str| -> Value { read_json(&here.join(name)) };
     let (first, second) = (of("a50.json"), of("b50.json"));
     for key in ["max_deflection_m", "energy_J"] {
         let (a, b) = (first[key].as_f64().unwrap(), second[key].as_f64().unwrap());

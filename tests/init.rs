@@ -22,6 +22,13 @@ fn study(folder: &Path, name: &str) -> Table {
     fs::read_to_string(folder.join(name)).unwrap().parse().unwrap()
 }
 
+/// What a run that does its work says on standard error.
+fn warned(folder: &Path, line: &str) -> String {
+    let output = crumple_in(folder, line);
+    assert!(output.status.success(), "{output:?}");
+    String::from_utf8(output.stderr).unwrap()
+}
+
 /// Copies files of a run by name.
 fn copy_run(from: &Path, to: &Path, files: &[&str]) {
     fs::create_dir_all(to).unwrap();
@@ -290,9 +297,7 @@ fn every_value_says_where_it_is_from() {
 fn half_models_are_asked_for() {
     let folder = group(&fixture("fe/vehicle-pair"), TEXTS);
     let here = folder.path().join("vehicle-pair");
-    let output = crumple_in(&here, "init");
-    assert!(output.status.success());
-    let said = String::from_utf8(output.stderr).unwrap();
+    let said = warned(&here, "init");
     says(&said, "the folders' names state twice the recorded speeds");
     let ours = study(&here, "study.toml");
     assert_eq!(ours["study"]["kind"].as_str(), Some("wall"));
@@ -308,6 +313,10 @@ fn half_models_are_asked_for() {
     fs::remove_file(here.join("study.toml")).unwrap();
     says(&crumple_fails(&here, 1, "init --kind pair"), "only one body moves in these runs");
     assert_eq!(entries(&here).iter().filter(|name| *name == "study.toml").count(), 0);
+}
+
+fn node(id: i64, title: &'static str, body: usize, mass: usize, shakes: f64) -> Node {
+    Node { id, title, on: Some((body, mass)), shakes }
 }
 
 /// Nodes of a car with its crush zone, some hundred on its body, and some that stand still.
@@ -392,7 +401,6 @@ fn pairs_have_both_bodies() {
         ..Crash::default()
     };
     let history = crash.run();
-    let node = |id, title, body, mass, shakes| Node { id, title, on: Some((body, mass)), shakes };
     let nodes = [
         node(5, "", 0, 0, 0.0),
         node(6, "", 0, 4, 0.01),
@@ -454,7 +462,6 @@ const MOTION_ONLY: Crash = Crash {
 #[test]
 fn a_pair_without_forces_is_guessed() {
     let history = MOTION_ONLY.run();
-    let node = |id, title, body, mass, shakes| Node { id, title, on: Some((body, mass)), shakes };
     let nodes = [
         Node { id: 4, title: "ground", on: None, shakes: 0.0 },
         node(5, "", 0, 0, 0.0),
@@ -492,8 +499,7 @@ fn a_pair_without_forces_is_guessed() {
     let speed = document["runs"][0]["speed_m_per_s"]["value"].as_f64().unwrap();
     assert!((speed / 16.0 - 1.0).abs() < 1e-3, "{speed}");
     // One mass for both is not what the velocities say.
-    let output = crumple_in(&here, "init --mass 1.2t -o one.toml");
-    let said = String::from_utf8(output.stderr).unwrap();
+    let said = warned(&here, "init --mass 1.2t -o one.toml");
     says(&said, "mass: by their velocities the other body is 1.6");
     let both = ["init", "--mass", "1.2t", "--other-mass", "2t", "-o", "both.toml"];
     assert_eq!(String::from_utf8(crumple_in(&here, &both).stderr).unwrap(), "");
@@ -550,9 +556,7 @@ fn masses_are_never_made_up() {
     let run = folder.path().join("cars/50kmh");
     let here = folder.path().join("cars");
     layout.nodout(&run, &history, &car_nodes());
-    let output = crumple_in(&here, "init");
-    assert!(output.status.success());
-    let said = String::from_utf8(output.stderr).unwrap();
+    let said = warned(&here, "init");
     says(&said, "fill in mass of 50kmh: no force and no energy give it: use --mass");
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
     says(&text, "# NOT COMPLETE");
@@ -582,8 +586,7 @@ fn a_section_is_the_last_choice() {
     let section = |id, title, along_n| Force { id, title, along_n, across_n: 0.0 };
     layout.nodout(&run, &history, &car_nodes());
     layout.secforc(&run, &history, &[section(5, "both boxes", inner)]);
-    let output = crumple_in(&here, "init");
-    let said = String::from_utf8(output.stderr).unwrap();
+    let said = warned(&here, "init");
     says(&said, "the force is that of a section, which may carry only part");
     says(&said, "fill in mass of 50kmh: a section may carry only part");
     let force = &study(&here, "study.toml")["recipe"]["force"];
@@ -783,8 +786,7 @@ fn groups_in_one_folder_are_told_apart() {
     );
     assert_eq!(entries(folder.path()), ["lead-car-wall", "vehicle-pair"]);
     // As one group their masses show that they are none.
-    let output = crumple_in(folder.path(), "init --group all");
-    let said = String::from_utf8(output.stderr).unwrap();
+    let said = warned(folder.path(), "init --group all");
     says(&said, "the runs' masses differ (20.2, 24 t): are they of one vehicle?");
     let found = study(folder.path(), "study.toml");
     assert_eq!(found["study"]["group"].as_str(), Some("all"));
@@ -862,22 +864,8 @@ fn what_the_caller_knows_stands_above_what_is_found() {
     let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
     write_car(layout, &folder.path().join("cars/50kmh"), &history, &car_nodes());
     let here = folder.path().join("cars");
-    let options = [
-        "init",
-        "--units",
-        "t-mm-s",
-        "--kind",
-        "wall",
-        "--node",
-        "1003",
-        "--force",
-        "rcforc:3:surfb:x_force",
-        "--mass",
-        "1.25t",
-        "--group",
-        "cars at walls",
-    ];
-    crumple_ok(&here, &options);
+    let options = "init|--units|t-mm-s|--kind|wall|--node|1003|--force|rcforc:3:surfb:x_force|--mass|1.25t|--group|cars at walls";
+    crumple_ok(&here, &options.split('|').collect::<Vec<_>>());
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
     for line in [
         "# given: by --group\nname = \"cars at walls\"",

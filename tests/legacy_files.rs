@@ -4,10 +4,12 @@
 use std::fs;
 use std::path::Path;
 
-use crumple::formats::{ColumnNames, ReadOptions, read};
+use crumple::formats::{ReadOptions, read};
 use serde_json::Value;
 
-use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, says};
+use crate::common::{
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, read_json, says,
+};
 use crate::import::{POINTS, channel, given, is_points, read_bytes, rows, speed};
 
 /// The curve of a file of that name, which is a table; its notes.
@@ -117,10 +119,7 @@ fn a_column_of_several_is_chosen() {
     let text = format!("No;Displacement LVDT [mm];Force A [kN];Force B [kN]\n{rows}");
     let error = refused("a.csv", text.as_bytes(), &given(None));
     assert!(error.ends_with("line 1: several columns could be the force: \"Force A [kN]\", \"Force B [kN]\"; choose one with --force-column, by its name or number"), "{error}");
-    let chosen = |force: &str| ReadOptions {
-        columns: ColumnNames { force: Some(force.into()), ..ColumnNames::default() },
-        ..given(None)
-    };
+    let chosen = |force: &str| ReadOptions { force_column: Some(force.into()), ..given(None) };
     for force in ["Force A [kN]", "force a [kn]", "3"] {
         table("a.csv", text.as_bytes(), &chosen(force));
     }
@@ -132,11 +131,8 @@ fn a_column_of_several_is_chosen() {
     assert!(refused("a.csv", text.as_bytes(), &chosen("9")).contains("--force-column \"9\""));
     // Columns that no header names, and those of a table without one.
     let by = |deflection: &str, force: &str, units| ReadOptions {
-        columns: ColumnNames {
-            deflection: Some(deflection.into()),
-            force: Some(force.into()),
-            time: None,
-        },
+        deflection_column: Some(deflection.into()),
+        force_column: Some(force.into()),
         ..given(units)
     };
     let odd = format!("Title\nNo;Kanal 1 [mm];Kanal 2 [kN];Rest\n{rows}");
@@ -180,11 +176,8 @@ fn tables_with_blanks_and_tabs_under_any_name() {
         is_points(&read_bytes(name, text.as_bytes(), &given(Some("SI"))).unwrap().0, &text);
         let odd = ReadOptions {
             format: Some("csv".into()),
-            columns: ColumnNames {
-                deflection: Some("1".into()),
-                force: Some("2".into()),
-                time: None,
-            },
+            deflection_column: Some("1".into()),
+            force_column: Some("2".into()),
             ..given(None)
         };
         table(name, format!("A [m] B [N]\n{si}").as_bytes(), &odd);
@@ -330,11 +323,8 @@ fn factors_of_oasys_curves() {
     ];
     cases.into_iter().for_each(|(x, y, expected)| wrong(x, y, expected));
     let chosen = |deflection: &str, force: &str| ReadOptions {
-        columns: ColumnNames {
-            deflection: Some(deflection.into()),
-            force: Some(force.into()),
-            time: None,
-        },
+        deflection_column: Some(deflection.into()),
+        force_column: Some(force.into()),
         ..given(None)
     };
     let swapped: String = rows(1e-3, 1e3, " ", ".")
@@ -538,8 +528,7 @@ fn radioss_functions() {
 fn exported_decks_and_packages_come_back() {
     let folder = demo_folder();
     let here = folder.path();
-    let curve: Value =
-        serde_json::from_str(&fs::read_to_string(here.join("lead50.json")).unwrap()).unwrap();
+    let curve = read_json(&here.join("lead50.json"));
     crumple_ok(here, "export lead50.json --to radioss --deck -o deck");
     crumple_ok(here, "export lead50.json -o x.mo");
     let deck = "deck/lead-car-wall-50kmh_0000.rad";

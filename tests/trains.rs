@@ -1,7 +1,7 @@
 //! Trains as users write them: shipped scenarios, split vehicles, couplers, dampers, forces that
 //! may drive an interface, speeds of the interfaces, the comparison with FE's run of a train.
 
-use crate::common::{crumple_fails, crumple_ok, demo_folder, json, root, says};
+use crate::common::{crumple_fails, crumple_ok, demo_folder, json, read_json, root, says};
 use serde_json::Value;
 
 /// Runs a scenario text in a folder of its own.
@@ -517,7 +517,7 @@ fn leaving_the_data_is_said() {
     let case = ["--group", "lead-car-wall", "--case", "48kmh", "--tail", "bottom"];
     crumple_ok(here, &[&["export", "curves.h5", "-o", "tail.csv"], &case[..]].concat());
     let largest = {
-        let model: Value = json(&std::fs::read_to_string(here.join("lead.model")).unwrap());
+        let model = read_json(&here.join("lead.model"));
         let cases = model["cases"].as_array().unwrap().clone();
         cases.iter().map(|c| c["max_deflection_m"].as_f64().unwrap()).fold(0.0, f64::max)
     };
@@ -602,7 +602,7 @@ fn curves_of_one_model_go_on_alike() {
     assert!(edge.0 > data_end_m && edge.1 != force_n, "{edge:?}");
     alike("file = \"lead50.json\", force = \"body\", band = 1.0", edge);
     // A continuation that does not belong to its curve is refused.
-    let whole: Value = json(&std::fs::read_to_string(here.join("lead50.json")).unwrap());
+    let whole = read_json(&here.join("lead50.json"));
     for (key, value, said) in [
         ("data_end_m", Value::from(-1.0), "beyond.data_end_m is -1"),
         ("body_force_N", Value::Null, "and 0 of body_force_N"),

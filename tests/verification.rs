@@ -19,130 +19,36 @@ macro_rules! named {
     ($($path:tt)*) => { (stringify!($($path)*), $($path)* as fn()) };
 }
 
+#[rustfmt::skip]
 const CLOSED: [Closed; 10] = [
-    (
-        named!(known_solutions::case_1_constant_force_against_a_wall),
-        "A constant force stops a body at a wall",
-        "d = m v²/2F, t = m v/F",
-    ),
-    (
-        named!(known_solutions::case_2_linear_spring_against_a_wall),
-        "A linear spring stops a body at a wall",
-        "d = v √(m/k), t = (π/2) √(m/k), F = v √(m k)",
-    ),
-    (
-        named!(known_solutions::case_3_two_bodies_with_constant_force),
-        "Two bodies with a constant force between them",
-        "d = μ v²/2F, common velocity m₁ v/(m₁ + m₂)",
-    ),
-    (
-        named!(known_solutions::case_4_unloading_gives_the_restitution),
-        "Unloading on a line",
-        "e² = (F²/2k)/(μ v²/2)",
-    ),
-    (
-        named!(known_solutions::case_5_free_chain_of_two_way_springs),
-        "A free chain of springs that push and pull",
-        "v(t) = Σ q cos(ωt) φ, ω = 2 √(k/m) sin(jπ/2N)",
-    ),
-    (
-        named!(known_solutions::case_6_wall_curve_and_doubled_pair_curve_move_alike),
-        "A body at a wall and one of a pair",
-        "same force, deflection doubled, at twice the speed",
-    ),
-    (
-        named!(known_solutions::case_7_mass_and_force_scale_together),
-        "Mass and force scaled together",
-        "the motion does not change",
-    ),
-    (
-        named!(known_solutions::orders_of_convergence_are_two_and_four),
-        "Orders of the two schemes on a spring",
-        "halving the step divides the error by 4, and by 16",
-    ),
-    (
-        named!(engine::a_damped_spring_follows_its_closed_form),
-        "A spring with a damper",
-        "v = v₀ e^(−ζωt) (cos ω_d t − ζω/ω_d sin ω_d t)",
-    ),
+    (named!(known_solutions::case_1_constant_force_against_a_wall), "A constant force stops a body at a wall", "d = m v²/2F, t = m v/F"),
+    (named!(known_solutions::case_2_linear_spring_against_a_wall), "A linear spring stops a body at a wall", "d = v √(m/k), t = (π/2) √(m/k), F = v √(m k)"),
+    (named!(known_solutions::case_3_two_bodies_with_constant_force), "Two bodies with a constant force between them", "d = μ v²/2F, common velocity m₁ v/(m₁ + m₂)"),
+    (named!(known_solutions::case_4_unloading_gives_the_restitution), "Unloading on a line", "e² = (F²/2k)/(μ v²/2)"),
+    (named!(known_solutions::case_5_free_chain_of_two_way_springs), "A free chain of springs that push and pull", "v(t) = Σ q cos(ωt) φ, ω = 2 √(k/m) sin(jπ/2N)"),
+    (named!(known_solutions::case_6_wall_curve_and_doubled_pair_curve_move_alike), "A body at a wall and one of a pair", "same force, deflection doubled, at twice the speed"),
+    (named!(known_solutions::case_7_mass_and_force_scale_together), "Mass and force scaled together", "the motion does not change"),
+    (named!(known_solutions::orders_of_convergence_are_two_and_four), "Orders of the two schemes on a spring", "halving the step divides the error by 4, and by 16"),
+    (named!(engine::a_damped_spring_follows_its_closed_form), "A spring with a damper", "v = v₀ e^(−ζωt) (cos ω_d t − ζω/ω_d sin ω_d t)"),
     (named!(engine::a_braked_body_slows_down_evenly), "A body that brakes", "v = v₀ − μ g t"),
 ];
 
 /// A second implementation that must agree: the test, what is compared, with what, and how closely.
+#[rustfmt::skip]
 const SECOND: [(&str, &str, &str, &str, &str); 13] = [
-    (
-        "engine",
-        "verlet_moves_random_chains_as_the_reference_does",
-        "random chains of 1 to 16 bodies",
-        "our own reference method, which integrates exactly piece by piece",
-        "largest speed error 3.5e-4 m/s (1.6e-4 for 9 of 10 chains, median 2.5e-5)",
-    ),
-    (
-        "clients",
-        "forest_is_as_accurate_as_scikit_learn_on_the_fe_table",
-        "errors of the forest on the FE table",
-        "scikit-learn",
-        "in the test",
-    ),
-    (
-        "clients",
-        "onnx_runtime_predicts_the_same",
-        "predictions of an exported forest",
-        "ONNX Runtime",
-        "6e-8 of the force",
-    ),
-    (
-        "clients",
-        "objective_rating_metrics_and_numpy_rate_the_same",
-        "ratings of two signals (ISO/TS 18571)",
-        "objective-rating-metrics, NumPy",
-        "1e-9",
-    ),
+    ("engine", "verlet_moves_random_chains_as_the_reference_does", "random chains of 1 to 16 bodies", "our own reference method, which integrates exactly piece by piece", "largest speed error 3.5e-4 m/s (1.6e-4 for 9 of 10 chains, median 2.5e-5)"),
+    ("clients", "forest_is_as_accurate_as_scikit_learn_on_the_fe_table", "errors of the forest on the FE table", "scikit-learn", "in the test"),
+    ("clients", "onnx_runtime_predicts_the_same", "predictions of an exported forest", "ONNX Runtime", "6e-8 of the force"),
+    ("clients", "objective_rating_metrics_and_numpy_rate_the_same", "ratings of two signals (ISO/TS 18571)", "objective-rating-metrics, NumPy", "1e-9"),
     ("clients", "pyisomme_rates_the_same", "ratings of two signals", "pyisomme", "1e-9"),
-    (
-        "clients",
-        "exudyn_moves_eight_cars_against_eight_alike",
-        "a train of 16 vehicles",
-        "Exudyn",
-        "1e-8 of the initial speed",
-    ),
-    (
-        "fmu",
-        "the_c_law_is_ours_bit_by_bit",
-        "the C source of the FMU",
-        "the Rust law",
-        "bit by bit",
-    ),
-    (
-        "fmu",
-        "one_mass_moves_as_in_our_own_runs",
-        "an FMU in a co-simulation",
-        "FMPy",
-        "1e-6 in displacement and speed, 1e-5 in force",
-    ),
-    (
-        "exports",
-        "calculix_moves_a_mass_as_our_elastic_run",
-        "an exported spring",
-        "CalculiX",
-        "1e-4 in displacement and restitution, 1e-3 in speed",
-    ),
-    (
-        "exports",
-        "rumoca_moves_a_mass_as_our_run",
-        "an exported Modelica model",
-        "Rumoca",
-        "1e-5 in displacement, 1e-4 in speed, 2e-3 in force, 1e-3 in restitution",
-    ),
+    ("clients", "exudyn_moves_eight_cars_against_eight_alike", "a train of 16 vehicles", "Exudyn", "1e-8 of the initial speed"),
+    ("fmu", "the_c_law_is_ours_bit_by_bit", "the C source of the FMU", "the Rust law", "bit by bit"),
+    ("fmu", "one_mass_moves_as_in_our_own_runs", "an FMU in a co-simulation", "FMPy", "1e-6 in displacement and speed, 1e-5 in force"),
+    ("exports", "calculix_moves_a_mass_as_our_elastic_run", "an exported spring", "CalculiX", "1e-4 in displacement and restitution, 1e-3 in speed"),
+    ("exports", "rumoca_moves_a_mass_as_our_run", "an exported Modelica model", "Rumoca", "1e-5 in displacement, 1e-4 in speed, 2e-3 in force, 1e-3 in restitution"),
     ("binout", "lasso_reads_the_same", "values of binouts", "lasso-python", "equal"),
     ("clients", "h5py_reads_what_db_show_prints", "values of databases", "h5py", "equal"),
-    (
-        "openradioss",
-        "t01_and_text_of_every_run_agree",
-        "T01 of our own FE runs",
-        "the text files of the same runs",
-        "six digits",
-    ),
+    ("openradioss", "t01_and_text_of_every_run_agree", "T01 of our own FE runs", "the text files of the same runs", "six digits"),
 ];
 
 fn hold(made: &str) {

@@ -123,7 +123,7 @@ pub(crate) fn compare(
     let speed = case.conditions.speed.m_per_s;
     let fixed = fixed_case(group, rest, speed, settings)?;
     let fixed_case: &Case = &fixed.case;
-    let times = rest.cases.iter().map(TrainingCase::solver_time_s);
+    let times = rest.cases.iter().map(|case| case.solver_time_s());
     let training_time_s: Option<f64> =
         times.collect::<Option<Vec<f64>>>().map(|times| times.iter().sum());
     let rows =
@@ -218,8 +218,9 @@ fn fixed_case<'a>(
 ) -> Result<&'a TrainingCase, Error> {
     let Some(asked) = settings.fixed_speed_m_per_s else {
         // A run that ended while loading does not show a whole impact.
-        let whole: Vec<&TrainingCase> = rest.cases.iter().filter(|c| !c.truncated).collect();
-        let all = if whole.is_empty() { rest.cases.iter().collect() } else { whole };
+        let whole: Vec<&TrainingCase> =
+            rest.cases.iter().map(|c| &**c).filter(|c| !c.truncated).collect();
+        let all = if whole.is_empty() { rest.cases.iter().map(|c| &**c).collect() } else { whole };
         return Ok(all[nearest(all.iter().map(|c| c.speed_m_per_s), left_out_m_per_s)]);
     };
     if is_same_speed(asked, left_out_m_per_s) {
@@ -229,7 +230,8 @@ fn fixed_case<'a>(
             asked = km_per_h(asked)
         ));
     }
-    let found = rest.cases.iter().find(|c| is_same_speed(c.speed_m_per_s, asked));
+    let mut all = rest.cases.iter().map(|c| &**c);
+    let found = all.find(|c| is_same_speed(c.speed_m_per_s, asked));
     found.ok_or_else(|| no_case(group, asked, rest))
 }
 

@@ -8,9 +8,7 @@
 use crate::curve::body::filtered;
 use crate::curve::{Case, ForceCurve};
 use crate::error::{Error, error};
-use crate::multibody::{
-    Body, Chain, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, UnloadingChoice, simulate,
-};
+use crate::multibody::{Body, Chain, EnvelopeEnd, ForceLaw, Interface, Run, RunSettings, simulate};
 use crate::signal::{derivative, interpolate, l1_ratio};
 
 /// The comparison ends this long after FE's maximum deflection, so that rebound counts.
@@ -87,7 +85,7 @@ impl Reference {
     /// If the curve makes no run.
     pub fn run(&self, curve: &ForceCurve) -> Result<Run, Error> {
         let body = Body::new("body", self.mass_kg, self.speed_m_per_s);
-        let law = ForceLaw::of_curve(curve, UnloadingChoice::Own, EnvelopeEnd::Hold);
+        let law = ForceLaw::of_curve(curve, None, EnvelopeEnd::Hold);
         let interface = Interface::new("body|wall", law, 0.0);
         let chain = Chain::new(vec![body], vec![interface])?;
         let output_interval_s = self.time_s[1] - self.time_s[0];

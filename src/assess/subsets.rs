@@ -7,7 +7,9 @@ use serde::Serialize;
 
 use super::choose::{Purpose, scores};
 use super::left_out::LeftOutCase;
-use super::validate::{Tables, fittable, left_out_cases, mean, trials};
+use super::validate::{
+    MOST_SPEEDS as MOST_LEFT_OUT, Tables, fittable, left_out_cases, mean, trials,
+};
 use crate::curve::Case;
 use crate::dataset::{TrainingSet, is_same_speed};
 use crate::error::Error;
@@ -86,7 +88,7 @@ fn subset(set: &TrainingSet, speeds: &[f64], candidates: &[ModelKind]) -> Option
         return None;
     }
     let (fitting, _) = fittable(&kept, candidates);
-    let (mut left_out, _) = left_out_cases(&kept).ok()?;
+    let (mut left_out, _) = left_out_cases(&kept, MOST_LEFT_OUT).ok()?;
     left_out.retain(|case| case.inner);
     let own = trials(&fitting, &left_out);
     let tables = Tables::of(&fitting, &own, left_out.len(), (set.force_kind, None));

@@ -25,6 +25,9 @@ use crate::surrogate::leave_one_out::{Floor, LeftOut, Means, Validation};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{MODELS, Model, ModelKind, predict};
 
+/// Most speeds that are left out: each costs what all others share.
+pub(crate) const MOST_SPEEDS: usize = 20;
+
 /// What `crumple validate --json` prints.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Report {
@@ -84,11 +87,9 @@ pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Error
             let asked = |kind: ModelKind| {
                 kind.with_forest(|f| ForestOptions { trees: trees.unwrap_or(f.trees), ..f })
             };
-            let candidates: Vec<ModelKind> =
-                ModelKind::candidates(seed).into_iter().map(asked).collect();
+            let candidates: Vec<ModelKind> = ModelKind::all(seed).into_iter().map(asked).collect();
             let validation = validate(group, cases, &candidates, Selection::Best(purpose))?;
-            let kept: Vec<ModelKind> = ModelKind::all(seed).into_iter().map(asked).collect();
-            train_chosen(group, cases, &kept, validation)
+            train_chosen(group, cases, &candidates, validation)
         }
         Choice::Kind(kind) => {
             // Errors of the model itself come before the validation.
@@ -108,8 +109,8 @@ pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Error
 /// it, hence no band, and ends of the range are not left out.
 pub(super) fn choose_and_fit(group: &str, cases: &[Case], seed: u64) -> Result<Model, Error> {
     let set = TrainingSet::new(group, cases)?;
-    let (fitting, _) = fittable(&set, &ModelKind::candidates(seed));
-    let (mut left_out, _) = left_out_cases(&set).unwrap_or_default();
+    let (fitting, _) = fittable(&set, &ModelKind::all(seed));
+    let (mut left_out, _) = left_out_cases(&set, MOST_SPEEDS).unwrap_or_default();
     left_out.retain(|case| case.inner);
     let trials = trials(&fitting, &left_out);
     let tables = Tables::of(&fitting, &trials, left_out.len(), (set.force_kind, None));
@@ -153,7 +154,7 @@ pub(crate) fn train_chosen(
     Ok(model)
 }
 
-/// Leaves every speed out in turn and predicts it by every candidate.
+/// Leaves every speed out in turn, of more than 20 cases so many that are spread over the range, and predicts it by every candidate.
 ///
 /// A model that cannot be fitted to the group, or has no answer at a speed, is noted with the
 /// reason; one without an answer at every inner speed has no means and cannot be chosen, nor for a
@@ -167,10 +168,28 @@ pub fn validate(
     candidates: &[ModelKind],
     selection: Selection<'_>,
 ) -> Result<Validation, Error> {
+    validate_speeds(group, cases, candidates, selection, MOST_SPEEDS)
+}
+
+/// The same with at most so many speeds left out.
+pub(crate) fn validate_speeds(
+    group: &str,
+    cases: &[Case],
+    candidates: &[ModelKind],
+    selection: Selection<'_>,
+    most_speeds: usize,
+) -> Result<Validation, Error> {
     let set = TrainingSet::new(group, cases)?;
-    let (fitting, unsuited) = fittable(&set, candidates);
+    let (mut fitting, unsuited) = fittable(&set, candidates);
     let (left_out, mut notes) =
-        left_out_cases(&set).unwrap_or_else(|too_few| (Vec::new(), vec![too_few]));
+        left_out_cases(&set, most_speeds).unwrap_or_else(|too_few| (Vec::new(), vec![too_few]));
+    if set.cases.len() > most_speeds {
+        fitting = fitting.into_iter().map(ModelKind::judged).collect();
+        notes.push(format!(
+            "{most_speeds} of {} cases, spread over the range, are left out in turn, and forests judged with at most 50 trees and 8 000 rows: crumple validate --thorough leaves out every speed",
+            set.cases.len()
+        ));
+    }
     let scatter = scatter(&set, cases);
     let declared = set.force_kind;
     let scatter_of = |force| scatter.as_ref()?.of_force(force, declared);
@@ -237,9 +256,10 @@ pub(super) fn fittable(
     (fitting, unsuited)
 }
 
-/// Every case left out in turn, with notes on those that cannot be.
+/// Every case left out in turn, or so many that are spread over the range, with notes on those that cannot be.
 pub(super) fn left_out_cases(
     set: &TrainingSet,
+    most_speeds: usize,
 ) -> Result<(Vec<LeftOutCase<'_>>, Vec<String>), String> {
     let mut speeds = set.speeds_m_per_s();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
@@ -249,7 +269,13 @@ pub(super) fn left_out_cases(
         return Err(format!("the group has {speeds}: leaving one out needs at least 3"));
     }
     let (mut left_out, mut notes) = (Vec::new(), Vec::new());
-    for index in 0..set.cases.len() {
+    let all = set.cases.len();
+    let chosen: Vec<usize> = if all > most_speeds {
+        (0..most_speeds).map(|k| k * (all - 1) / (most_speeds - 1)).collect()
+    } else {
+        (0..all).collect()
+    };
+    for index in chosen {
         match LeftOutCase::new(set, index) {
             Ok(case) => left_out.push(case),
             Err(error) => notes.push(error.to_string()),
@@ -390,7 +416,7 @@ pub(crate) fn add_nested(
         return Ok(());
     }
     // Cases that cannot be left out have been noted.
-    let (mut left_out, _) = left_out_cases(&set).unwrap_or_default();
+    let (mut left_out, _) = left_out_cases(&set, MOST_SPEEDS).unwrap_or_default();
     left_out.retain(|case| case.inner);
     let trials: Vec<LeftOutRun<'_>> = left_out
         .par_iter()

@@ -43,28 +43,23 @@ fn listed(problems: &[String]) -> String {
 
 /// How one run ended.
 #[derive(Debug)]
-pub enum RunOutcome {
-    /// Read and extracted.
+pub(crate) enum RunOutcome {
     Built,
     /// Unchanged since it was built.
     Kept,
     /// Not usable, with the reason; an earlier build of it stays in the database.
     Failed {
-        /// Why, with the damage of its files.
         reason: Error,
-        /// Whether the database has the run from an earlier build.
         earlier_kept: bool,
     },
 }
 
 /// One run of a study after a build.
 #[derive(Debug)]
-pub struct BuiltRun {
-    /// Name of the run in the manifest.
+pub(crate) struct BuiltRun {
     pub name: String,
     /// Where its case is, if the database has one.
-    pub(crate) case: CasePath,
-    /// How it ended.
+    pub case: CasePath,
     pub outcome: RunOutcome,
 }
 
@@ -74,7 +69,7 @@ pub struct BuildReport {
     /// Group of the study.
     pub group: String,
     /// Every run, in the order of the manifest.
-    pub runs: Vec<BuiltRun>,
+    pub(crate) runs: Vec<BuiltRun>,
     /// Cases that the study no longer has.
     pub(crate) removed: Vec<CasePath>,
     /// Cases of runs that have another name or group than before: from where to where.
@@ -84,11 +79,13 @@ pub struct BuildReport {
     pub earlier: Vec<String>,
     /// The database as it is now.
     pub database: Database,
+    /// Where it has the cases.
+    places: HashMap<CasePath, usize>,
 }
 
 impl BuildReport {
     pub(crate) fn case(&self, run: &BuiltRun) -> Option<&Case> {
-        self.database.cases(&run.case.group).iter().find(|case| case.id.name == run.case.name)
+        self.database.cases(&run.case.group).get(*self.places.get(&run.case)?)
     }
 }
 
@@ -155,7 +152,9 @@ pub fn build(
     if changed || !is_there {
         database.write(path)?;
     }
+    let all = database.groups().flat_map(|group| database.cases(group).iter().enumerate());
     Ok(BuildReport {
+        places: all.map(|(i, case)| (CasePath::of(case), i)).collect(),
         group: study.group().into(),
         runs,
         removed: previous.left,

@@ -84,12 +84,15 @@ impl Motion {
         let header = table.headers().map_err(not_csv)?.clone();
         let line = header.position().map_or(1, csv::Position::line);
         let header: Vec<String> = header.iter().map(String::from).collect();
-        if header.first().map(String::as_str) != Some("time_s") || header.len() < 2 {
-            return Err(error!(
+        let other_columns = || {
+            let found = header.join(",");
+            error!(
                 Plot,
-                "line {line}: expected the columns of crumple simulate -o: \"time_s\", then for example \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\"",
-                found = header.join(",")
-            ));
+                "line {line}: expected the columns of crumple simulate -o: \"time_s\", then for example \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\""
+            )
+        };
+        if header.first().map(String::as_str) != Some("time_s") || header.len() < 2 {
+            return Err(other_columns());
         }
         let mut columns = vec![Vec::new(); header.len()];
         for row in table.records() {
@@ -142,11 +145,7 @@ impl Motion {
             })
             .collect();
         if bodies.is_empty() && interfaces.is_empty() {
-            return Err(error!(
-                Plot,
-                "line {line}: expected the columns of crumple simulate -o: \"time_s\", then for example \"v_m_per_s[A1]\" or \"force_N[A1|A2]\"; found \"{found}\"",
-                found = header.join(",")
-            ));
+            return Err(other_columns());
         }
         Ok(Self { time_s: columns.swap_remove(0), bodies, interfaces, energies: None })
     }

@@ -9,7 +9,7 @@ use super::Failure;
 use crate::curve::{ForceKind, Parameter};
 use crate::error::error;
 use crate::file;
-use crate::formats::read::{ColumnNames, ReadOptions};
+use crate::formats::read::ReadOptions;
 use crate::import::Settings;
 use crate::solver::{Selection, WantedId};
 use crate::surrogate::max_crush::MaxCrushRule;
@@ -144,11 +144,9 @@ impl Reading {
         ReadOptions {
             format: self.from.clone(),
             curve: self.curve.clone(),
-            columns: ColumnNames {
-                deflection: self.deflection_column.clone(),
-                force: self.force_column.clone(),
-                time: self.time_column.clone(),
-            },
+            deflection_column: self.deflection_column.clone(),
+            force_column: self.force_column.clone(),
+            time_column: self.time_column.clone(),
             ..ReadOptions::default()
         }
     }
@@ -175,13 +173,10 @@ impl CurveFile {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FileKind {
-    /// Curve database.
     Database,
-    /// Model.
     Model,
     /// Predicted curve.
     Curve,
-    /// Scenario.
     Scenario,
     /// Result of a multi-body run.
     Result,

@@ -17,7 +17,7 @@ use crate::unit::{Shown, km_per_h};
 
 use super::arguments::{self, one_of};
 use super::output::{self, Bar};
-use super::{CommandResult, Failure, GlobalOptions, Outcome, usage};
+use super::{CommandResult, GlobalOptions, Outcome, usage};
 
 /// Compare FE with FDRM, NSDM, DDTCM and the best model, all in the same multi-body model
 #[derive(clap::Args)]
@@ -207,7 +207,7 @@ fn print_nsdm(out: &mut dyn Write, nsdm: &NsdmReport) -> io::Result<()> {
 }
 
 /// Comparisons at several speeds, and their means by method.
-fn several(comparisons: &[Comparison], options: GlobalOptions) -> Result<(), Failure> {
+fn several(comparisons: &[Comparison], options: GlobalOptions) -> CommandResult {
     let rows = comparisons.first().map_or(&[][..], |first| &first.rows);
     let means = rows.iter().map(|row| {
         let mean = |of: &dyn Fn(&Row) -> f64| compare::mean(comparisons, &row.method, of);

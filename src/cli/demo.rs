@@ -183,7 +183,7 @@ impl Flow<'_> {
             validations.push(validate(
                 group,
                 database.cases(group),
-                &ModelKind::candidates(SEED),
+                &ModelKind::all(SEED),
                 Selection::Best(Purpose::Vehicle),
             )?);
         }

@@ -352,7 +352,8 @@ pub(super) fn write(
     };
     options.show(&document, |out| {
         files.iter().try_for_each(|f| writeln!(out, "wrote {}", f.display()))
-    })
+    })?;
+    Ok(())
 }
 
 /// The paths of the files: the one that was named, or theirs within the folder.

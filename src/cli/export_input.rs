@@ -214,6 +214,6 @@ impl Args {
             ..self.file.settings()
         };
         settings.read.units = self.input_units;
-        Ok(import::case_of_file(&item, &settings)?)
+        Ok(import::case_of(&item, &settings, None)?)
     }
 }

@@ -3,8 +3,6 @@
 // `document!` calls the type of a field as the field.
 #![allow(non_camel_case_types)]
 
-#[macro_use]
-mod output;
 mod arguments;
 mod build;
 mod compare;
@@ -15,6 +13,7 @@ mod export_input;
 mod histories;
 mod init;
 mod inspect;
+mod output;
 mod plot;
 mod predict;
 mod rate;
@@ -212,8 +211,9 @@ impl GlobalOptions {
         self,
         document: &impl Serialize,
         text: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-    ) -> Result<(), Failure> {
-        if self.json { output::print_json(document) } else { self.print(text) }
+    ) -> CommandResult {
+        if self.json { output::print_json(document) } else { self.print(text) }?;
+        Ok(Outcome::Clean)
     }
 
     /// The text of a result on standard output.

@@ -10,35 +10,10 @@ use std::time::Duration;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
-use super::{CommandResult, Failure, GlobalOptions, Outcome};
+use super::{CommandResult, Failure, GlobalOptions};
 use crate::error::Place;
 use crate::table::{Cell, Table};
 use terminal_size::{Width, terminal_size_of};
-
-/// An object for JSON with these fields in this order, made where it is printed; a field marked
-/// `if_any` is left out where it is null or empty.
-macro_rules! document {
-    ($($(#[$attribute:meta])* $key:ident $($if_any:ident)?: $value:expr),* $(,)?) => {{
-        #[derive(serde::Serialize)]
-        #[allow(non_snake_case)]
-        struct Document<$($key),*> {
-            $(
-                $(
-                    #[doc = stringify!($if_any)]
-                    #[serde(skip_serializing_if = "crate::cli::output::is_empty")]
-                )?
-                $(#[$attribute])*
-                $key: $key,
-            )*
-        }
-        Document { $($key: $value),* }
-    }};
-}
-
-/// Whether there is nothing in a value.
-pub(super) fn is_empty(value: &impl Serialize) -> bool {
-    serde_json::to_string(value).is_ok_and(|json| ["null", "[]", "{}"].contains(&json.as_str()))
-}
 
 /// Writes text to standard output.
 pub(super) fn print(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
@@ -321,8 +296,7 @@ pub(super) fn formats(
         formats.iter().try_for_each(|(own, extensions, description)| {
             writeln!(out, "{own:<name$}  {:<endings$}  {description}", joined(extensions))
         })
-    })?;
-    Ok(Outcome::Clean)
+    })
 }
 
 /// Narrower is taken as this.

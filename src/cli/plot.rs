@@ -160,8 +160,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         args.output
             .iter()
             .try_for_each(|file| writeln!(out, "wrote {}: {}", file.display(), chart.title))
-    })?;
-    Ok(Outcome::Clean)
+    })
 }
 
 fn names(chart: &Chart) -> Vec<String> {

@@ -82,7 +82,6 @@ struct Address {
     path: PathBuf,
     /// What follows the file's name: a column, or a history.
     within: Option<String>,
-    /// Factor on the values.
     scale: f64,
     /// Of the times.
     unit: Option<TimeUnit>,

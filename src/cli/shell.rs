@@ -114,8 +114,7 @@ fn write_pages(folder: &Path, options: GlobalOptions) -> CommandResult {
     pages(&command, "crumple", folder, &mut written)?;
     options.show(&document! { written: &written }, |out| {
         written.iter().try_for_each(|path| writeln!(out, "wrote {}", path.display()))
-    })?;
-    Ok(Outcome::Clean)
+    })
 }
 
 fn pages(

@@ -300,6 +300,5 @@ fn dry_run(sweep: &Sweep, shard: Shard, global: GlobalOptions) -> CommandResult 
             table.column(&variable.column, |(_, values)| &values[k])
         });
         output::table(out, table)
-    })?;
-    Ok(Outcome::Clean)
+    })
 }

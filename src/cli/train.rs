@@ -42,7 +42,7 @@ pub(super) struct Args {
     /// that auto counts the ends of the range and prefers a force that follows the closing speed
     #[arg(long = "for", value_name = "USE", value_parser = one_of(PURPOSES), default_value = "vehicle")]
     purpose: Purpose,
-    /// Number of trees [default: 50 of a forest, 500 of extra]
+    /// Number of trees of a forest or of extra [default: 50]
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     trees: Option<u32>,
     /// Random seed

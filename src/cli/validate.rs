@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use crate::assess::choose::{NextRun, Purpose, Selection, next_run};
 use crate::assess::subsets::{OverSubsets, subsets};
-use crate::assess::validate::{GroupReport, Report, add_nested, validate};
+use crate::assess::validate::{GroupReport, MOST_SPEEDS, Report, add_nested, validate_speeds};
 use crate::curve::Case;
 use crate::database::Database;
 use crate::dataset::{TrainingSet, is_same_speed};
@@ -57,6 +57,9 @@ pub(super) struct Args {
     /// Judge the choice by every subset of 4 and 5 speeds, which predicts the speeds that it lacks (takes longer)
     #[arg(long)]
     subsets: bool,
+    /// Leave out every case, not 20 spread over the range of more (takes longer)
+    #[arg(long)]
+    thorough: bool,
     /// Seed of the forests
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -130,12 +133,10 @@ pub(super) fn print_validation(
 }
 
 fn validated(args: &Args, group: &str, cases: &[Case]) -> Result<GroupReport, Error> {
-    let mut validation = validate(
-        group,
-        cases,
-        &ModelKind::candidates(args.seed),
-        Selection::Best(Purpose::Vehicle),
-    )?;
+    let candidates = ModelKind::all(args.seed);
+    let best = Selection::Best(Purpose::Vehicle);
+    let most = if args.thorough { usize::MAX } else { MOST_SPEEDS };
+    let mut validation = validate_speeds(group, cases, &candidates, best, most)?;
     if args.nested {
         add_nested(&mut validation, cases, args.seed)?;
     }
@@ -149,7 +150,7 @@ fn validated(args: &Args, group: &str, cases: &[Case]) -> Result<GroupReport, Er
     }
     let mut over_subsets = Vec::new();
     if args.subsets {
-        over_subsets = subsets(group, cases, &ModelKind::candidates(args.seed))?;
+        over_subsets = subsets(group, cases, &ModelKind::all(args.seed))?;
         if over_subsets.is_empty() {
             let note = "no subset of 4 or 5 speeds lacks a speed inside its range, or there are more than 12 speeds";
             validation.notes.push(note.into());
@@ -406,9 +407,14 @@ fn band_line(force: &str, band: &Band) -> String {
         ),
     };
     let coverage = match band.coverage {
-        Some(share) => {
-            format!("covers {} of the points of the other left-out curves", percent(share))
-        }
+        Some(share) => format!(
+            "covers {} of the points of the other left-out curves (calibration error {:.2}; ±{} for whole curves, which holds {:.0} of {})",
+            percent(share),
+            band.calibration_error.unwrap_or_default(),
+            percent(band.simultaneous_share),
+            band.whole_curves.unwrap_or_default() * band.curves as f64,
+            band.curves
+        ),
         None => format!("one {of} cannot be checked against others"),
     };
     let parts = match band.scatter {

@@ -3,6 +3,8 @@
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
+
 use super::Selection;
 use super::labels::{check, merge_labels};
 use crate::curve::Case;
@@ -25,18 +27,27 @@ pub(crate) enum OnConflict {
     Replace,
 }
 
-/// What joining did, or would do: cases by where they were, with their databases.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// A case with its database, and what it is called now if that is another name.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct JoinedCase {
+    pub from: String,
+    pub case: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub now: Option<String>,
+}
+
+/// What joining did, or would do.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct Joined {
-    /// Cases that were added under their own names.
-    pub added: Vec<(PathBuf, CasePath)>,
-    /// Cases that exist already, under these names.
-    pub equal: Vec<(PathBuf, CasePath, CasePath)>,
-    /// Cases that were added under these names.
-    pub renamed: Vec<(PathBuf, CasePath, CasePath)>,
+    /// Under their own names.
+    pub added: Vec<JoinedCase>,
+    /// Cases that exist already.
+    pub equal: Vec<JoinedCase>,
+    pub renamed: Vec<JoinedCase>,
     /// Cases that took the place of others.
-    pub replaced: Vec<(PathBuf, CasePath)>,
+    pub replaced: Vec<JoinedCase>,
     /// What other programs have put into the databases and is not taken along.
+    #[serde(skip)]
     pub not_taken: Vec<(PathBuf, String)>,
 }
 
@@ -146,6 +157,11 @@ impl Join {
         path: &Path,
         incoming: impl IntoIterator<Item = Incoming>,
     ) -> Result<(), Error> {
+        let joined = |case: &CasePath, now: Option<&CasePath>| JoinedCase {
+            from: path.display().to_string(),
+            case: case.to_string(),
+            now: now.map(ToString::to_string),
+        };
         // What came with the same database is not its double.
         let records: HashMap<(String, String), CasePath> = self
             .database
@@ -160,20 +176,20 @@ impl Join {
             if let Some(there) =
                 records.get(&(case.id.group.clone(), database::record_hash(&case)?))
             {
-                self.joined.equal.push((path.into(), from, there.clone()));
+                self.joined.equal.push(joined(&from, Some(there)));
                 doubles.insert(there.clone(), (case.provenance.tags, case.provenance.user_notes));
                 continue;
             }
             self.check_kinds(path, &case)?;
             let own = CasePath::of(&case);
             match (names.contains(&own), self.on_conflict) {
-                (false, _) => self.joined.added.push((path.into(), own)),
+                (false, _) => self.joined.added.push(joined(&own, None)),
                 (true, OnConflict::Refuse) => conflicts.push(own.to_string()),
-                (true, OnConflict::Replace) => self.joined.replaced.push((path.into(), own)),
+                (true, OnConflict::Replace) => self.joined.replaced.push(joined(&own, None)),
                 (true, OnConflict::Rename) => {
                     database::remember_origin(&mut case);
                     case.id.name = free_name(&own, &names);
-                    self.joined.renamed.push((path.into(), from, CasePath::of(&case)));
+                    self.joined.renamed.push(joined(&from, Some(&CasePath::of(&case))));
                 }
             }
             names.insert(CasePath::of(&case));

@@ -10,7 +10,7 @@ mod labels;
 mod selection;
 mod tables;
 
-pub(crate) use join::{Joined, OnConflict, copy, merge};
+pub(crate) use join::{Joined, JoinedCase, OnConflict, copy, merge};
 pub(crate) use labels::{Labels, label, remove, rename_case, rename_group};
 pub(crate) use selection::{Selection, SpeedRange};
 pub(crate) use tables::{Difference, compare, write_tables};

@@ -42,7 +42,7 @@ const NEAR_TEN: f64 = 1.6;
 const NEAR_TWO: f64 = 1.2;
 
 /// What a run's record says of its energy and momentum.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub(crate) struct StatedConditions<'a> {
     pub curve: &'a Curve,
     pub masses: Masses,
@@ -55,7 +55,7 @@ pub(crate) struct StatedConditions<'a> {
     /// Mass times acceleration: scales with lengths and times only.
     pub is_body_force: bool,
     /// Names and speeds of the study's other runs.
-    pub others: &'a [(String, f64)],
+    pub others: &'a (dyn Fn() -> Vec<(String, f64)> + Sync),
 }
 
 /// Energy and impulse of the record relative to those of the impact.
@@ -258,12 +258,13 @@ impl StatedConditions<'_> {
             let other = self.named_other(recorded);
             return Cause::RecordedSpeed(format!("{}{other}", km_per_h(recorded)));
         }
-        let others =
-            self.others.iter().find(|(_, v)| !same(*v, used) && same(work, (v / used).powi(2)));
+        let others = (self.others)()
+            .into_iter()
+            .find(|(_, v)| !same(*v, used) && same(work, (v / used).powi(2)));
         if self.recorded_m_per_s.is_none()
             && let Some((name, speed)) = others
         {
-            return Cause::OtherRun(format!("{name} ({})", km_per_h(*speed)));
+            return Cause::OtherRun(format!("{name} ({})", km_per_h(speed)));
         }
         let mass = balance
             .impulse
@@ -280,7 +281,7 @@ impl StatedConditions<'_> {
 
     /// The run of that speed, for a message.
     fn named_other(&self, speed: f64) -> String {
-        let found = self.others.iter().find(|(_, v)| (v / speed - 1.0).abs() < 0.02);
+        let found = (self.others)().into_iter().find(|(_, v)| (v / speed - 1.0).abs() < 0.02);
         found.map_or(String::new(), |(name, _)| format!(", that of the run {name}"))
     }
 

@@ -91,7 +91,7 @@ fn retraced(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quali
         recorded_m_per_s: None,
         units: impact.units,
         is_body_force: false,
-        others: &[],
+        others: &Vec::new,
     };
     match claim.check() {
         Ok(_) => {}
@@ -162,7 +162,7 @@ fn recorded(
         deck_speed: None,
         contact_threshold: contact::THRESHOLD,
         stated: Stated { contact, accept_energy: impact.accept_energy, ..Stated::default() },
-        others: &[],
+        others: &Vec::new,
     };
     let Extracted { curves, quality, .. } =
         Record::of_columns(time_s, table.deflection_m, table.force_n, impact.units)

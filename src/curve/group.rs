@@ -38,12 +38,11 @@ pub(crate) fn remarks(cases: &[Case]) -> Vec<Remark> {
         ("group_impulse", "impulse over momentum", runs.iter().map(impulse).collect()),
     ];
     for (code, what, points) in measures {
+        let extremes = Extremes::of(points.iter().map(|point| point.1));
         for (i, case) in runs.iter().enumerate() {
             let Some(expected) = expected(&points, i) else { continue };
             let found = points[i].1;
-            let others = || points.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, p)| p.1);
-            let (low, high) =
-                (others().fold(f64::INFINITY, f64::min), others().fold(0.0, f64::max));
+            let (low, high) = extremes.without(found);
             // A line through few runs is not trusted beyond them.
             let is_outside = !(low - OUTSIDE..=high + OUTSIDE).contains(&found);
             if is_outside && (found / expected - 1.0).abs() > UNLIKE {
@@ -70,11 +69,37 @@ fn impulse_ratio(case: &Case) -> f64 {
     impulse / (case.conditions.masses.effective_kg() * case.conditions.speed.m_per_s)
 }
 
+/// The two lowest and the two highest of some values.
+struct Extremes {
+    lowest: [f64; 2],
+    highest: [f64; 2],
+}
+
+impl Extremes {
+    fn of(values: impl Iterator<Item = f64>) -> Self {
+        let mut all = Self { lowest: [f64::INFINITY; 2], highest: [0.0; 2] };
+        for value in values {
+            let [first, second] = all.lowest;
+            all.lowest = [first.min(value), first.max(value).min(second)];
+            let [first, second] = all.highest;
+            all.highest = [first.max(value), first.min(value).max(second)];
+        }
+        all
+    }
+
+    /// The lowest and the highest if one of the values is left out.
+    fn without(&self, value: f64) -> (f64, f64) {
+        let other = |[first, second]: [f64; 2]| if first == value { second } else { first };
+        (other(self.lowest), other(self.highest))
+    }
+}
+
 /// The value of the others at the speed of point `i`: by the median slope and level of those nearest
 /// in speed, or their median where they are few. One wrong run among them does not move it.
 fn expected(points: &[(f64, f64)], i: usize) -> Option<f64> {
-    let mut others: Vec<(f64, f64)> =
-        points.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, p)| *p).collect();
+    // Points are in order of speed.
+    let around = i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(points.len());
+    let mut others: Vec<(f64, f64)> = around.filter(|k| *k != i).map(|k| points[k]).collect();
     let at = points[i].0;
     others.sort_by(|a, b| (a.0 - at).abs().total_cmp(&(b.0 - at).abs()));
     others.truncate(NEIGHBOURS);

@@ -79,7 +79,7 @@ pub struct TrainingSet {
     /// Further parameters in which the cases differ; what all share is left out.
     pub features: Vec<Feature>,
     /// The cases, in order of speed, then features.
-    pub cases: Vec<TrainingCase>,
+    pub cases: Vec<Arc<TrainingCase>>,
 }
 
 impl Feature {
@@ -312,7 +312,7 @@ impl TrainingSet {
             masses: training[0].case.conditions.masses,
             units: first.units().filter(|u| cases.iter().all(|c| c.units() == Some(*u))),
             features,
-            cases: training,
+            cases: training.into_iter().map(Arc::new).collect(),
         })
     }
 
@@ -326,9 +326,9 @@ impl TrainingSet {
     }
 
     /// Those of its cases for which that holds.
-    pub(crate) fn with(&self, keep: impl FnMut(&TrainingCase) -> bool) -> Self {
+    pub(crate) fn with(&self, mut keep: impl FnMut(&TrainingCase) -> bool) -> Self {
         let mut set = self.clone();
-        set.cases.retain(keep);
+        set.cases.retain(|case| keep(case));
         set
     }
 
@@ -339,21 +339,25 @@ impl TrainingSet {
     /// The table {v in m/s, d in m, features} → F in N over the loading branches of all
     /// cases, of the declared force.
     pub fn table(&self, kind: TableKind) -> Dataset<f64, f64, ndarray::Ix1> {
-        self.table_of(kind, self.force_kind)
+        self.table_of(kind, self.force_kind, None)
     }
 
-    /// The same table of the declared force or of the body's.
+    /// The same table of the declared force or of the body's; of so many rows at most, every so manieth of each case.
     pub(crate) fn table_of(
         &self,
         kind: TableKind,
         force: ForceKind,
+        most_rows: Option<usize>,
     ) -> Dataset<f64, f64, ndarray::Ix1> {
         let columns = 2 + self.features.len();
         let mut records = Vec::new();
         let mut targets = Vec::new();
-        for case in &self.cases {
-            let (deflection_m, force_n) = case.points(kind, force == self.force_kind);
-            for (d, f) in deflection_m.into_iter().zip(force_n) {
+        let points: Vec<_> =
+            self.cases.iter().map(|case| case.points(kind, force == self.force_kind)).collect();
+        let rows = points.iter().map(|(d, _)| d.len()).sum::<usize>();
+        let step = most_rows.map_or(1, |most| rows.div_ceil(most).max(1));
+        for (case, (deflection_m, force_n)) in self.cases.iter().zip(points) {
+            for (d, f) in deflection_m.into_iter().zip(force_n).step_by(step) {
                 records.extend([case.speed_m_per_s, d]);
                 records.extend(&case.features);
                 targets.push(f);
@@ -448,7 +452,7 @@ impl TrainingSet {
     }
 }
 
-fn loading_run(case: &TrainingCase) -> Option<LoadingRun> {
+fn loading_run(case: &Arc<TrainingCase>) -> Option<LoadingRun> {
     let deflection_m = grid(case.envelope.end_m(), STEPS);
     let over = |of: &Envelope| {
         let values = deflection_m.iter().map(|&d| of.force_at(d)).collect();

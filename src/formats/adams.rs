@@ -3,7 +3,7 @@
 //! Adams interpolates by Akima's or cubic splines, so kinks are fenced with points; beyond the ends linear extrapolation is
 //! requested. Elastic: a spline has no memory. The `.spr` file is that of Adams/Car, which MotionView reads too.
 
-use super::text::{Lines, nine_digits, title};
+use super::text::{line, nine_digits, title};
 use super::thin::for_splines;
 use super::{ExportCurve, Exported, Options, TargetUnloading};
 use crate::error::{Error, error};
@@ -20,7 +20,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
     let extension = options.extension.as_deref().unwrap_or("cmd");
     let mut files = Vec::new();
     let mut notes = Vec::new();
-    let mut together = Lines::default();
+    let mut together = String::new();
     for (k, curve) in curves.iter().enumerate() {
         let curve = &curve.begun_at_origin()?;
         let spline = Spline::of(curve, units, options.id + k as u32)?;
@@ -60,14 +60,15 @@ impl<'a> Spline<'a> {
         Ok(Self { curve, units, id, points })
     }
 
-    fn comments(&self, lines: &mut Lines, sign: &str) {
-        lines.add(format_args!(
+    fn comments(&self, lines: &mut String, sign: &str) {
+        line!(
+            lines,
             "{sign} units of the points: length {} m, force {} N",
             nine_digits(self.units.length_m),
             nine_digits(self.units.force())
-        ));
+        );
         for (key, value) in self.curve.facts() {
-            lines.add(format_args!("{sign} {}", title(&format!("{key}: {value}"), COMMENT_WIDTH)));
+            line!(lines, "{sign} {}", title(&format!("{key}: {value}"), COMMENT_WIDTH));
         }
     }
 
@@ -78,33 +79,34 @@ impl<'a> Spline<'a> {
     }
 
     /// `data_element create spline`: a line ends in `&` where the command continues.
-    fn view_command(&self, lines: &mut Lines) {
+    fn view_command(&self, lines: &mut String) {
         self.comments(lines, "!");
-        lines.add(format_args!(
+        line!(
+            lines,
             "data_element create spline spline_name=.model_1.{} adams_id={} &",
             self.curve.identifier(),
             self.id
-        ));
+        );
         for (name, numbers) in self.columns() {
             let rows: Vec<&[String]> = numbers.chunks(PER_LINE).collect();
             for (i, row) in rows.iter().enumerate() {
                 let key = if i == 0 { format!("{name}=") } else { String::new() };
                 let comma = if i + 1 < rows.len() { "," } else { "" };
-                lines.add(format_args!("  {key}{}{comma} &", row.join(",")));
+                line!(lines, "  {key}{}{comma} &", row.join(","));
             }
         }
-        lines.add(format_args!("  linear_extrapolate=yes"));
+        line!(lines, "  linear_extrapolate=yes");
     }
 
     /// `SPLINE/id`: a line begins with a comma where the statement continues.
-    fn solver_statement(&self, lines: &mut Lines) {
+    fn solver_statement(&self, lines: &mut String) {
         self.comments(lines, "!");
-        lines.add(format_args!("SPLINE/{}, LINEAR_EXTRAPOLATE", self.id));
+        line!(lines, "SPLINE/{}, LINEAR_EXTRAPOLATE", self.id);
         for (name, numbers) in self.columns() {
             for (i, row) in numbers.chunks(PER_LINE).enumerate() {
                 let key =
                     if i == 0 { format!("{}=", name.to_ascii_uppercase()) } else { String::new() };
-                lines.add(format_args!(", {key}{}", row.join(",")));
+                line!(lines, ", {key}{}", row.join(","));
             }
         }
     }
@@ -112,19 +114,11 @@ impl<'a> Spline<'a> {
     /// The units are in it, with names of their own.
     fn property_file(&self) -> Result<Vec<u8>, Error> {
         let names = LENGTH.name_of(self.units.length_m).zip(FORCE.name_of(self.units.force()));
-        let words = |(length, force): (&str, &str)| {
-            let length = match length {
-                "m" => "meter",
-                other => other,
-            };
-            let force = match force {
-                "N" => "newton",
-                "kN" => "knewton",
-                _ => return None,
-            };
-            Some((length.to_string(), force))
+        let words = |(length, force)| {
+            let length = if length == "m" { "meter" } else { length };
+            Some((length, *[("N", "newton"), ("kN", "knewton")].iter().find(|f| f.0 == force)?))
         };
-        let (length, force) = names.and_then(words).ok_or_else(|| {
+        let (length, (_, force)) = names.and_then(words).ok_or_else(|| {
             error!(
                 Export,
                 "columns need units that have a name: lengths in {lengths}, forces in {forces}",
@@ -132,25 +126,18 @@ impl<'a> Spline<'a> {
                 lengths = LENGTH.known_units()
             )
         })?;
-        let mut lines = Lines::default();
+        let mut lines = String::new();
         self.comments(&mut lines, "$");
-        lines.add(format_args!("[MDI_HEADER]"));
-        lines.add(format_args!("FILE_TYPE = 'spr'"));
-        lines.add(format_args!("FILE_VERSION = 4.0"));
-        lines.add(format_args!("FILE_FORMAT = 'ASCII'"));
-        lines.add(format_args!("[UNITS]"));
-        lines.add(format_args!("LENGTH = '{length}'"));
-        lines.add(format_args!("ANGLE = 'degrees'"));
-        lines.add(format_args!("FORCE = '{force}'"));
-        lines.add(format_args!("MASS = 'kg'"));
-        lines.add(format_args!("TIME = 'second'"));
-        lines.add(format_args!("[SPRING_DATA]"));
-        let reach = self.points[self.points.len() - 1].0;
-        lines.add(format_args!("FREE_LENGTH = {}", nine_digits(1.2 * reach)));
-        lines.add(format_args!("[CURVE]"));
-        lines.add(format_args!("{{ disp force }}"));
+        line!(
+            lines,
+            "[MDI_HEADER]\nFILE_TYPE = 'spr'\nFILE_VERSION = 4.0\nFILE_FORMAT = 'ASCII'\n[UNITS]"
+        );
+        line!(lines, "LENGTH = '{length}'\nANGLE = 'degrees'\nFORCE = '{force}'");
+        let reach = nine_digits(1.2 * self.points[self.points.len() - 1].0);
+        line!(lines, "MASS = 'kg'\nTIME = 'second'\n[SPRING_DATA]\nFREE_LENGTH = {reach}");
+        line!(lines, "[CURVE]\n{{ disp force }}");
         for (d, f) in &self.points {
-            lines.add(format_args!("{} {}", nine_digits(*d), nine_digits(*f)));
+            line!(lines, "{} {}", nine_digits(*d), nine_digits(*f));
         }
         Ok(lines.into_bytes())
     }

@@ -3,10 +3,10 @@
 //! CalculiX 2.20 accepts at most 200 rows and is silently wrong with more, so the curve is thinned to that at equal energy.
 
 use super::lsdyna::InUnits;
-use super::text::{Lines, nine_digits};
+use super::text::{line, nine_digits};
 use super::thin::thinned;
 use super::{ExportCurve, Exported, NUMBER_OF_STATES, Options, TargetUnloading, run_time_s};
-use crate::error::{Error, error};
+use crate::error::Error;
 use crate::unit::UnitSystem;
 
 /// Rows that CalculiX accepts, one of them for tension.
@@ -15,12 +15,8 @@ const MOST_ROWS: usize = 200;
 const STEPS: f64 = 10.0;
 
 pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {
-    if options.deck && curves.len() != 1 {
-        let needs = format!("one curve for a deck of one mass, found {}", curves.len());
-        return Err(error!(Export, "{format} takes {needs}", format = "calculix --deck"));
-    }
     let units = InUnits(options.units.unwrap_or(UnitSystem::SI));
-    let mut lines = Lines::default();
+    let mut lines = String::new();
     let mut notes = Vec::new();
     for (k, curve) in curves.iter().enumerate() {
         let curve = &curve.begun_at_origin()?;
@@ -35,26 +31,23 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
             ));
         }
         notes.push(curve.restitution_note("CalculiX", TargetUnloading::Elastic));
-        lines.add(format_args!("** {}", units.stated()));
+        line!(lines, "** {}", units.stated());
         for (key, value) in curve.facts() {
-            lines.add(format_args!("** {key}: {}", ascii(&value)));
+            line!(lines, "** {key}: {}", ascii(&value));
         }
-        lines.add(format_args!(
-            "** elongation is positive: a crush stands as (-force, -deflection)"
-        ));
+        line!(lines, "** elongation is positive: a crush stands as (-force, -deflection)");
         if options.deck {
             nodes(&mut lines, curve, units, id);
         }
-        lines.add(format_args!("*SPRING, ELSET=IF{id}, NONLINEAR"));
-        // The data line of an orientation, which SPRINGA does not have.
-        lines.add(format_args!(""));
+        // The empty data line is that of an orientation, which SPRINGA does not have.
+        line!(lines, "*SPRING, ELSET=IF{id}, NONLINEAR\n");
         let rows = loading.deflection_m().iter().zip(loading.force_n()).skip(1).rev();
         for (d, f) in rows {
-            lines.add(format_args!("{}, {}", units.force(-f), units.length(-d)));
+            line!(lines, "{}, {}", units.force(-f), units.length(-d));
         }
         let zero = nine_digits(0.0);
-        lines.add(format_args!("{zero}, {zero}"));
-        lines.add(format_args!("{zero}, {}", units.length(0.1 * curve.loading.end_m())));
+        line!(lines, "{zero}, {zero}");
+        line!(lines, "{zero}, {}", units.length(0.1 * curve.loading.end_m()));
         if options.deck {
             step(&mut lines, curve, units);
         }
@@ -72,43 +65,29 @@ fn ascii(text: &str) -> String {
 }
 
 /// The body is node 2 at +x and moves towards −x; node 1 is fixed, or the other body.
-fn nodes(lines: &mut Lines, curve: &ExportCurve, units: InUnits, id: u32) {
-    let mass = |kg: f64| nine_digits(kg / units.0.mass_kg);
-    lines.add(format_args!("*NODE, NSET=NALL"));
-    lines.add(format_args!("1, 0.0, 0.0, 0.0"));
+fn nodes(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u32) {
     // Longer than any crush: otherwise CalculiX reverses the spring.
-    lines.add(format_args!("2, {}, 0.0, 0.0", units.length(1.2 * curve.loading.end_m())));
-    lines.add(format_args!("*ELEMENT, TYPE=SPRINGA, ELSET=IF{id}"));
-    lines.add(format_args!("1, 1, 2"));
-    lines.add(format_args!("*ELEMENT, TYPE=MASS, ELSET=BODY2"));
-    lines.add(format_args!("2, 2"));
-    lines.add(format_args!("*MASS, ELSET=BODY2"));
-    lines.add(format_args!("{}", mass(curve.predicted.mass_kg)));
-    if let Some(other) = curve.other_mass_kg() {
-        lines.add(format_args!("*ELEMENT, TYPE=MASS, ELSET=BODY1"));
-        lines.add(format_args!("3, 1"));
-        lines.add(format_args!("*MASS, ELSET=BODY1"));
-        lines.add(format_args!("{}", mass(other)));
+    let length = units.length(1.2 * curve.loading.end_m());
+    line!(lines, "*NODE, NSET=NALL\n1, 0.0, 0.0, 0.0\n2, {length}, 0.0, 0.0");
+    line!(lines, "*ELEMENT, TYPE=SPRINGA, ELSET=IF{id}\n1, 1, 2");
+    let masses = [(2, 2, 2, Some(curve.predicted.mass_kg)), (1, 3, 1, curve.other_mass_kg())];
+    for (body, element, node, mass) in masses {
+        let Some(mass) = mass else { continue };
+        let mass = nine_digits(mass / units.0.mass_kg);
+        line!(lines, "*ELEMENT, TYPE=MASS, ELSET=BODY{body}\n{element}, {node}");
+        line!(lines, "*MASS, ELSET=BODY{body}\n{mass}");
     }
-    lines.add(format_args!("*BOUNDARY"));
-    lines.add(format_args!("1, {}, 3", if curve.other_mass_kg().is_some() { 2 } else { 1 }));
-    lines.add(format_args!("2, 2, 3"));
-    lines.add(format_args!("*INITIAL CONDITIONS, TYPE=VELOCITY"));
-    let speed = curve.predicted.speed_m_per_s / units.0.speed();
-    lines.add(format_args!("2, 1, {}", nine_digits(-speed)));
+    let first = if curve.other_mass_kg().is_some() { 2 } else { 1 };
+    line!(lines, "*BOUNDARY\n1, {first}, 3\n2, 2, 3");
+    let speed = nine_digits(-curve.predicted.speed_m_per_s / units.0.speed());
+    line!(lines, "*INITIAL CONDITIONS, TYPE=VELOCITY\n2, 1, {speed}");
 }
 
-fn step(lines: &mut Lines, curve: &ExportCurve, units: InUnits) {
+fn step(lines: &mut String, curve: &ExportCurve, units: InUnits) {
     let end = run_time_s(curve) / units.0.time_s;
     let increments = (NUMBER_OF_STATES * STEPS) as usize;
-    lines.add(format_args!("*STEP, NLGEOM, INC={}", 10 * increments));
-    lines.add(format_args!("*DYNAMIC, DIRECT, ALPHA=0.0"));
-    lines.add(format_args!(
-        "{}, {}",
-        nine_digits(end / NUMBER_OF_STATES / STEPS),
-        nine_digits(end)
-    ));
-    lines.add(format_args!("*NODE PRINT, NSET=NALL, FREQUENCY={}", STEPS as usize));
-    lines.add(format_args!("U, V"));
-    lines.add(format_args!("*END STEP"));
+    let [step, end] = [end / NUMBER_OF_STATES / STEPS, end].map(nine_digits);
+    line!(lines, "*STEP, NLGEOM, INC={}", 10 * increments);
+    line!(lines, "*DYNAMIC, DIRECT, ALPHA=0.0\n{step}, {end}");
+    line!(lines, "*NODE PRINT, NSET=NALL, FREQUENCY={}\nU, V\n*END STEP", STEPS as usize);
 }

@@ -1,6 +1,6 @@
 //! Curve as CSV: deflection and force under `#` header lines.
 
-use super::text::{Lines, nine_digits};
+use super::text::{line, nine_digits};
 use super::{ExportCurve, Exported, Options};
 use crate::error::{Error, error};
 use crate::unit::{FORCE, LENGTH, UnitSystem};
@@ -16,19 +16,19 @@ pub(crate) fn write(curve: &ExportCurve, options: &Options) -> Result<Exported, 
                 lengths = LENGTH.known_units()
             )
         })?;
-    let mut lines = Lines::default();
+    let mut lines = String::new();
     for (key, value) in curve.facts() {
-        lines.add(format_args!("# {key}: {}", value.replace('\n', " ")));
+        line!(lines, "# {key}: {}", value.replace('\n', " "));
     }
     let edges = if curve.band.is_some() { ",lo,hi" } else { "" };
-    lines.add(format_args!("d_{length},force_{force}{edges}"));
+    line!(lines, "d_{length},force_{force}{edges}");
     let shown = |force_n: f64| nine_digits(force_n / units.force());
     for (i, (d, f)) in curve.deflection_m().iter().zip(curve.force_n()).enumerate() {
         let edges = match &curve.band {
             Some((low, high)) => format!(",{},{}", shown(low[i]), shown(high[i])),
             None => String::new(),
         };
-        lines.add(format_args!("{},{}{edges}", nine_digits(d / units.length_m), shown(*f)));
+        line!(lines, "{},{}{edges}", nine_digits(d / units.length_m), shown(*f));
     }
     Ok(Exported::file(format!("{}.csv", curve.file_stem()), lines.into_bytes()))
 }

@@ -6,7 +6,7 @@ use super::thin::{Softened, from_origin, softened};
 use crate::curve::force_curve::with_tail;
 use crate::curve::{Envelope, ForceCurve, ForceKind, Tail};
 use crate::error::{Error, error};
-use crate::multibody::{EnvelopeEnd, ForceLaw, UnloadingChoice};
+use crate::multibody::{EnvelopeEnd, ForceLaw};
 use crate::surrogate::PredictedCurve;
 use crate::unit::{Shown, km_per_h};
 
@@ -209,7 +209,7 @@ impl ExportCurve {
             Tail::Bottom => EnvelopeEnd::Bottom,
             Tail::None | Tail::Hold => EnvelopeEnd::Hold,
         };
-        ForceLaw::of_curve(&self.driving(), UnloadingChoice::Own, end)
+        ForceLaw::of_curve(&self.driving(), None, end)
     }
 
     /// Separation speed over impact speed in crumple's own runs, whose curve is not softened.
@@ -268,7 +268,8 @@ impl ExportCurve {
 
     /// Group and speed as a file's name without its extension.
     pub fn file_stem(&self) -> String {
-        numbered(file_stem(&self.predicted), self.ordinal)
+        let name = file_stem(&self.predicted);
+        if self.ordinal > 1 { format!("{name}-{}", self.ordinal) } else { name }
     }
 
     /// Group and speed as an identifier of letters, digits and underscores.
@@ -384,11 +385,6 @@ pub(super) fn identifier(name: &str) -> String {
     let text: String =
         name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     if text.starts_with(|c: char| c.is_ascii_alphabetic()) { text } else { format!("curve_{text}") }
-}
-
-/// A name that is distinguished from earlier ones of the same kind.
-fn numbered(name: String, ordinal: usize) -> String {
-    if ordinal > 1 { format!("{name}-{ordinal}") } else { name }
 }
 
 /// A character that every file system accepts in a name.

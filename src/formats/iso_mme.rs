@@ -3,8 +3,8 @@
 //! Layout: ISO/TS 13499, version 1.6. `NAME.mme` describes the test, `Channel/NAME.chn` lists the channels, and
 //! `Channel/NAME.001` and so on hold one channel each: `key :value` lines, then one value per line.
 
+use super::Exported;
 use super::text::nine_digits;
-use super::{Exported, Options};
 use crate::curve::{Case, ForceKind};
 use crate::error::{Error, error};
 use crate::unit::km_per_h;
@@ -33,7 +33,6 @@ pub(crate) struct Test<'a> {
     pub bodies: Vec<(f64, f64)>,
     /// Time of the first sample, in s.
     pub start_s: f64,
-    /// Time between two samples, in s.
     pub interval_s: f64,
     /// Further lines, as remarks.
     pub remarks: Vec<String>,
@@ -50,14 +49,7 @@ pub(crate) fn object(k: usize) -> Option<char> {
 }
 
 /// The channels of a case: deflection, closing speed, force.
-pub(super) fn write_case(case: &Case, options: &Options) -> Result<Exported, Error> {
-    if options.units.is_some() {
-        return Err(error!(
-            Export,
-            "{format} is always in SI: remove --units, or take a format that has units (csv, lsdyna, radioss, calculix, adams)",
-            format = "iso-mme"
-        ));
-    }
+pub(super) fn write_case(case: &Case) -> Result<Exported, Error> {
     let sampled = &case.curves.sampled;
     let channel = |code: &str, name: &str, unit, values: &[f64]| Channel {
         code: code.into(),

@@ -4,17 +4,10 @@
 //! little-endian doubles, rows, columns, 0 for no imaginary part, length of the name with its NUL), the
 //! name, the doubles column by column.
 
-use super::{ExportCurve, Exported, Options, TargetUnloading};
-use crate::error::{Error, error};
+use super::{ExportCurve, Exported, TargetUnloading};
+use crate::error::Error;
 
-pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {
-    if options.units.is_some() {
-        return Err(error!(
-            Export,
-            "{format} is always in SI: remove --units, or take a format that has units (csv, lsdyna, radioss, calculix, adams)",
-            format = "mat"
-        ));
-    }
+pub(crate) fn write(curves: &[ExportCurve]) -> Result<Exported, Error> {
     let mut bytes = Vec::new();
     let mut notes = Vec::new();
     for (k, curve) in curves.iter().enumerate() {

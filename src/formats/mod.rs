@@ -32,9 +32,9 @@ pub use export_curve::ExportCurve;
 pub(crate) use export_curve::TargetUnloading;
 pub use fmu::{FmiVersion, Spring, archive, binaries};
 pub use lsdyna::Material;
-pub use read::curve::{Metadata, ReadFile};
+pub use read::curve::Metadata;
 pub(crate) use read::history;
-pub use read::{ColumnNames, ReadCurve, ReadOptions, read, readers};
+pub use read::{ReadCurve, ReadOptions, read, readers};
 
 /// One target: its name, file extensions, capabilities and writer.
 pub struct Format {
@@ -47,6 +47,8 @@ pub struct Format {
     /// Default continuation of its curves beyond the maximum crush; `Tail::None` for
     /// files whose curves cannot continue.
     pub tail: Tail,
+    /// Whether it can be in other units than SI (`--units`).
+    pub(crate) units: bool,
     /// Whether it can be a complete input of one mass on the spring (`--deck`).
     pub deck: bool,
     /// Whether it has several spring materials (`--material`).
@@ -67,130 +69,125 @@ enum Writer {
     /// Any number of curves in one file.
     Together(fn(&[ExportCurve], &Options) -> Result<Exported, Error>),
     /// A predicted or recorded curve with both forces.
-    Whole(fn(&PredictedCurve, &Options) -> Result<Exported, Error>),
+    Whole(fn(&PredictedCurve) -> Result<Exported, Error>),
     Model(fn(&Model, &Options) -> Result<Exported, Error>),
     /// A recorded case with its histories.
-    Case(fn(&Case, &Options) -> Result<Exported, Error>),
+    Case(fn(&Case) -> Result<Exported, Error>),
+}
+
+/// A format without further capabilities.
+const fn of(tail: Tail, writer: Writer) -> Format {
+    Format {
+        name: "",
+        extensions: &[],
+        description: "",
+        tail,
+        units: false,
+        deck: false,
+        materials: false,
+        ids: false,
+        band: false,
+        over_speeds: false,
+        writer,
+    }
 }
 
 /// Every format we write. To add one: write its module, add its line here with its capabilities.
 pub const FORMATS: &[Format] = &[
-    Format::new(
-        "json",
-        &["json"],
-        "predicted curve with all its data, SI (master format)",
-        Tail::None,
-        Writer::Whole(json::write),
-    ),
     Format {
-        band: true,
-        ..Format::new(
-            "csv",
-            &["csv"],
-            "columns of deflection and force with # header lines, SI or --units",
-            Tail::Bottom,
-            Writer::Each(csv::write),
-        )
+        name: "json",
+        extensions: &["json"],
+        description: "predicted curve with all its data, SI (master format)",
+        ..of(Tail::None, Writer::Whole(json::write))
     },
     Format {
+        name: "csv",
+        extensions: &["csv"],
+        description: "columns of deflection and force with # header lines, SI or --units",
+        units: true,
+        band: true,
+        ..of(Tail::Bottom, Writer::Each(csv::write))
+    },
+    Format {
+        name: "lsdyna",
+        extensions: &["k", "key", "dyn"],
+        description: "LS-DYNA curves with a spring material, in the study's units or --units; --deck",
+        units: true,
         deck: true,
         materials: true,
         ids: true,
-        ..Format::new(
-            "lsdyna",
-            &["k", "key", "dyn"],
-            "LS-DYNA curves with a spring material, in the study's units or --units; --deck",
-            Tail::Bottom,
-            Writer::Together(lsdyna::write),
-        )
+        ..of(Tail::Bottom, Writer::Together(lsdyna::write))
     },
     Format {
+        name: "radioss",
+        extensions: &["rad"],
+        description: "Radioss /FUNCT and /PROP/TYPE4, in the study's units or --units; --deck",
+        units: true,
         deck: true,
         ids: true,
-        ..Format::new(
-            "radioss",
-            &["rad"],
-            "Radioss /FUNCT and /PROP/TYPE4, in the study's units or --units; --deck",
-            Tail::Bottom,
-            Writer::Together(radioss::write),
-        )
+        ..of(Tail::Bottom, Writer::Together(radioss::write))
     },
     Format {
+        name: "calculix",
+        extensions: &["inp"],
+        description: "CalculiX or Abaqus *SPRING, NONLINEAR (elastic, at most 200 rows), SI or --units",
+        units: true,
         deck: true,
         ids: true,
-        ..Format::new(
-            "calculix",
-            &["inp"],
-            "CalculiX or Abaqus *SPRING, NONLINEAR (elastic, at most 200 rows), SI or --units",
-            Tail::Bottom,
-            Writer::Together(calculix::write),
-        )
+        ..of(Tail::Bottom, Writer::Together(calculix::write))
     },
     Format {
+        name: "adams",
+        extensions: &["cmd", "adm", "spr"],
+        description: "Adams spline: View command, Solver statement or spring property file",
+        units: true,
         ids: true,
-        ..Format::new(
-            "adams",
-            &["cmd", "adm", "spr"],
-            "Adams spline: View command, Solver statement or spring property file",
-            Tail::Bottom,
-            Writer::Together(adams::write),
-        )
+        ..of(Tail::Bottom, Writer::Together(adams::write))
     },
-    Format::new(
-        "fmi2",
-        &["fmu"],
-        "FMU of FMI 2.0, model exchange and co-simulation, complete law with memory, SI",
-        Tail::Bottom,
-        Writer::Each(fmu::write_fmi2),
-    ),
-    Format::new(
-        "fmi3",
-        &["fmu"],
-        "the same for FMI 3.0",
-        Tail::Bottom,
-        Writer::Each(fmu::write_fmi3),
-    ),
-    Format::new(
-        "modelica",
-        &["mo", "txt"],
-        "Modelica package with the spring and its memory, or a CombiTable text, SI",
-        Tail::Bottom,
-        Writer::Together(modelica::write),
-    ),
     Format {
+        name: "fmi2",
+        extensions: &["fmu"],
+        description: "FMU of FMI 2.0, model exchange and co-simulation, complete law with memory, SI",
+        ..of(Tail::Bottom, Writer::Each(|curve, _| fmu::write(curve, FmiVersion::Fmi2)))
+    },
+    Format {
+        name: "fmi3",
+        extensions: &["fmu"],
+        description: "the same for FMI 3.0",
+        ..of(Tail::Bottom, Writer::Each(|curve, _| fmu::write(curve, FmiVersion::Fmi3)))
+    },
+    Format {
+        name: "modelica",
+        extensions: &["mo", "txt"],
+        description: "Modelica package with the spring and its memory, or a CombiTable text, SI",
+        ..of(Tail::Bottom, Writer::Together(modelica::write))
+    },
+    Format {
+        name: "mat",
+        extensions: &["mat"],
+        description: "MAT v4 matrices for MATLAB, Octave, scipy and Modelica, SI",
         band: true,
-        ..Format::new(
-            "mat",
-            &["mat"],
-            "MAT v4 matrices for MATLAB, Octave, scipy and Modelica, SI",
-            Tail::Bottom,
-            Writer::Together(mat::write),
-        )
+        ..of(Tail::Bottom, Writer::Together(|curves, _| mat::write(curves)))
     },
-    Format::new(
-        "iso-mme",
-        &["mme"],
-        "ISO-MME folder of a case's histories: displacement, velocity, force, SI",
-        Tail::None,
-        Writer::Case(iso_mme::write_case),
-    ),
     Format {
-        over_speeds: true,
-        ..Format::new(
-            "table",
-            &["h5", "hdf5"],
-            "force over speed and deflection of a model, HDF5 or CSV, SI",
-            Tail::Hold,
-            Writer::Model(table::write),
-        )
+        name: "iso-mme",
+        extensions: &["mme"],
+        description: "ISO-MME folder of a case's histories: displacement, velocity, force, SI",
+        ..of(Tail::None, Writer::Case(iso_mme::write_case))
     },
-    Format::new(
-        "onnx",
-        &["onnx"],
-        "forest model (of crumple train) as ONNX, SI; splits double, output float",
-        Tail::None,
-        Writer::Model(onnx::write),
-    ),
+    Format {
+        name: "table",
+        extensions: &["h5", "hdf5"],
+        description: "force over speed and deflection of a model, HDF5 or CSV, SI",
+        over_speeds: true,
+        ..of(Tail::Hold, Writer::Model(table::write))
+    },
+    Format {
+        name: "onnx",
+        extensions: &["onnx"],
+        description: "forest model (of crumple train) as ONNX, SI; splits double, output float",
+        ..of(Tail::None, Writer::Model(|model, _| onnx::write(model)))
+    },
 ];
 
 /// Options of some targets.
@@ -264,28 +261,6 @@ pub(crate) const MAX_CURVE_BYTES: u64 = 64 << 20;
 pub(crate) const MIN_POINTS: usize = 4;
 
 impl Format {
-    const fn new(
-        name: &'static str,
-        extensions: &'static [&'static str],
-        description: &'static str,
-        tail: Tail,
-        writer: Writer,
-    ) -> Self {
-        let (deck, materials, ids, band, over_speeds) = (false, false, false, false, false);
-        Self {
-            name,
-            extensions,
-            description,
-            tail,
-            deck,
-            materials,
-            ids,
-            band,
-            over_speeds,
-            writer,
-        }
-    }
-
     /// Whether it takes a whole model, not its curves.
     pub fn takes_model(&self) -> bool {
         matches!(self.writer, Writer::Model(_))
@@ -311,6 +286,7 @@ impl Format {
     /// # Errors
     /// If the target cannot take the model.
     pub fn export_model(&self, model: &Model, options: &Options) -> Result<Exported, Error> {
+        self.check(options)?;
         match self.writer {
             Writer::Model(write) => write(model, options),
             _ => Err(self.unfit("a curve: name its speed with --speed")),
@@ -326,8 +302,8 @@ impl Format {
         let Writer::Case(write) = self.writer else {
             return Err(self.unfit("curves: it has no histories"));
         };
-        let mut all =
-            cases.iter().map(|case| write(case, options)).collect::<Result<Vec<_>, _>>()?;
+        self.check(options)?;
+        let mut all = cases.iter().map(write).collect::<Result<Vec<_>, _>>()?;
         if let [_, _, ..] = &all[..] {
             // Each test has a folder of its own.
             for (exported, case) in all.iter_mut().zip(cases) {
@@ -349,6 +325,14 @@ impl Format {
                 return Err(self.unfit(format!("{MIN_POINTS} points or more, found {points}")));
             }
         }
+        self.check(options)?;
+        if options.deck && self.deck && inputs.len() != 1 {
+            let (name, found) = (self.name, inputs.len());
+            return Err(error!(
+                Export,
+                "{name} --deck takes one curve for a deck of one mass, found {found}"
+            ));
+        }
         let exported = match self.writer {
             Writer::Model(_) => {
                 let how = format!("a model: crumple export MODEL --to {}", self.name);
@@ -359,9 +343,7 @@ impl Format {
                     "histories over time: name a case of a database, which has them, or use crumple simulate -o",
                 ));
             }
-            Writer::Whole(write) => {
-                joined(inputs.iter().map(|i| write(i, options)).collect::<Result<_, _>>()?)
-            }
+            Writer::Whole(write) => joined(inputs.iter().map(write).collect::<Result<_, _>>()?),
             Writer::Each(write) => {
                 let curves = options.ready(inputs, self.tail)?;
                 let files = curves.iter().map(|c| write(c, options)).collect::<Result<_, _>>()?;
@@ -386,6 +368,18 @@ impl Format {
             exported.notes.extend(curves.iter().filter_map(ExportCurve::no_band_note));
         }
         exported
+    }
+
+    fn check(&self, options: &Options) -> Result<(), Error> {
+        if options.units.is_none() || self.units {
+            return Ok(());
+        }
+        let with: Vec<&str> = FORMATS.iter().filter(|f| f.units).map(|f| f.name).collect();
+        let (format, with) = (self.name, with.join(", "));
+        Err(error!(
+            Export,
+            "{format} is always in SI: remove --units, or take a format that has units ({with})"
+        ))
     }
 
     fn unfit(&self, needs: impl std::fmt::Display) -> Error {

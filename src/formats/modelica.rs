@@ -4,11 +4,11 @@
 //! line, its tables are constants of the package. Memory: the maximum deflection is a discrete variable that is updated while
 //! the deflection decreases (`when v < 0`); during loading the force is that of the loading branch.
 
-use crate::error::{Error, error};
+use crate::error::Error;
 use std::fmt::Write;
 
 use super::export_curve::identifier;
-use super::text::{Lines, nine_digits, title};
+use super::text::{line, nine_digits, title};
 use super::thin::thinned;
 use super::{ExportCurve, Exported, Options, TargetUnloading};
 use crate::curve::Tail;
@@ -24,13 +24,6 @@ const KEYWORDS: &str = "algorithm and block class connect connector constant dis
 const PER_LINE: usize = 6;
 
 pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {
-    if options.units.is_some() {
-        return Err(error!(
-            Export,
-            "{format} is always in SI: remove --units, or take a format that has units (csv, lsdyna, radioss, calculix, adams)",
-            format = "modelica"
-        ));
-    }
     let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
     if options.extension.as_deref() == Some("txt") {
         return Ok(combi_table(curves, &stem));
@@ -64,13 +57,13 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
 
 /// One table of loading and one of unloading per curve.
 fn combi_table(curves: &[ExportCurve], stem: &str) -> Exported {
-    let mut lines = Lines::default();
+    let mut lines = String::new();
     let mut notes = Vec::new();
-    lines.add(format_args!("#1"));
+    line!(lines, "#1");
     for (k, curve) in curves.iter().enumerate() {
         let suffix = if k == 0 { String::new() } else { format!("_{}", k + 1) };
         for (key, value) in curve.facts() {
-            lines.add(format_args!("# {key}: {}", title(&value, COMMENT_WIDTH)));
+            line!(lines, "# {key}: {}", title(&value, COMMENT_WIDTH));
         }
         // Tables extrapolate by their last two points: guard points hold the force at 0 before
         // the contact.
@@ -84,9 +77,9 @@ fn combi_table(curves: &[ExportCurve], stem: &str) -> Exported {
         let open_m = end_m - end_n / curve.stiffness_n_per_m();
         let unloading = [(open_m - 0.01 * reach, 0.0), (open_m, 0.0), (end_m, end_n)];
         for (name, points) in [("fd_load", &loading[..]), ("fd_unload", &unloading)] {
-            lines.add(format_args!("double {name}{suffix}({},2)  # d [m], F [N]", points.len()));
+            line!(lines, "double {name}{suffix}({},2)  # d [m], F [N]", points.len());
             for (d, f) in points {
-                lines.add(format_args!("{} {}", nine_digits(*d), nine_digits(*f)));
+                line!(lines, "{} {}", nine_digits(*d), nine_digits(*f));
             }
         }
         notes.push(curve.restitution_note("a table without memory", TargetUnloading::Elastic));
@@ -117,7 +110,7 @@ fn package_name(stem: &str) -> String {
 
 fn package(curve: &ExportCurve, name: &str) -> Vec<u8> {
     let law = curve.law();
-    let tables = law.tables();
+    let (envelope, memory) = (&law.envelope, law.memory.as_ref());
     let mut text = String::new();
     for (key, value) in curve.facts() {
         // Writing to a string cannot fail.
@@ -125,14 +118,13 @@ fn package(curve: &ExportCurve, name: &str) -> Vec<u8> {
     }
     let headline = title(&curve.headline(), COMMENT_WIDTH).replace(['"', '\\'], " ");
     let _ = writeln!(text, "package {name} \"{headline}\"");
-    let points = tables.deflection_m.len();
+    let points = envelope.deflection_m().len();
     let _ = writeln!(text, "  constant Integer points = {points};");
-    text += &array("d", tables.deflection_m.iter().copied(), "Deflection, m");
-    text += &array("f", tables.force_n.iter().copied(), "Force of the loading branch, N");
-    text += &array("slope", tables.slope_n_per_m.iter().copied(), "Slope behind each point, N/m");
-    text += &array("work", tables.work_j.iter().copied(), "Work done to each point, J");
-    let memory = tables.memory.as_ref();
-    let lost = memory.map_or(tables.work_j, |m| m.dissipated_j);
+    text += &array("d", envelope.deflection_m().iter().copied(), "Deflection, m");
+    text += &array("f", envelope.force_n().iter().copied(), "Force of the loading branch, N");
+    text += &array("slope", law.slope_n_per_m.iter().copied(), "Slope behind each point, N/m");
+    text += &array("work", envelope.work_j().iter().copied(), "Work done to each point, J");
+    let lost = memory.map_or(envelope.work_j(), |m| &m.dissipated_j);
     text += &array("lost", lost.iter().copied(), "Energy lost to each point, J");
     let stiffness = memory.map_or(1.0, |m| m.stiffness_n_per_m);
     let steepest = memory.map_or(1.0, |m| m.steepest_n_per_m);

@@ -1,12 +1,12 @@
 //! ONNX: a forest model for other programs' runtimes.
 
-use super::{Exported, Options};
+use super::Exported;
 use crate::error::{Error, error};
 use crate::forest::OnnxDescription;
 use crate::surrogate::Model;
 
 /// The model's forest: speed and deflection to force, in SI.
-pub(crate) fn write(model: &Model, _options: &Options) -> Result<Exported, Error> {
+pub(crate) fn write(model: &Model) -> Result<Exported, Error> {
     let Some(forest) = model.forest() else {
         let needs =
             format!("models of --model forest or extra, this is of --model {}", model.name());

@@ -3,7 +3,7 @@
 //! Each speed's curve continues beyond its maximum crush as a tail that is held, so that the table is a full rectangle.
 
 use super::export_curve::in_lines;
-use super::text::{Lines, nine_digits};
+use super::text::{line, nine_digits};
 use super::{ExportCurve, Exported, Options};
 use crate::curve::{Envelope, ForceKind, Tail};
 use crate::error::{Error, error};
@@ -30,7 +30,6 @@ struct Table {
     force_n: Vec<f64>,
     /// Lower and upper edge of the band, likewise; NaN at a speed without one.
     band: Option<[Vec<f64>; 2]>,
-    /// Description of the band.
     band_meaning: Option<String>,
     max_deflection_m: Vec<f64>,
     unloading_stiffness_n_per_m: Vec<f64>,
@@ -39,13 +38,6 @@ struct Table {
 }
 
 pub(crate) fn write(model: &Model, options: &Options) -> Result<Exported, Error> {
-    if options.units.is_some() {
-        return Err(error!(
-            Export,
-            "{format} is always in SI: remove --units, or take a format that has units (csv, lsdyna, radioss, calculix, adams)",
-            format = "table"
-        ));
-    }
     let table = Table::of(model, options)?;
     let is_csv = options.extension.as_deref() == Some("csv");
     let bytes = if is_csv {
@@ -121,13 +113,13 @@ impl Table {
 
     /// One line per speed and deflection.
     fn to_csv(&self, model: &Model, force: ForceKind) -> Vec<u8> {
-        let mut lines = Lines::default();
+        let mut lines = String::new();
         for (key, value) in self.facts(model, force) {
-            lines.add(format_args!("# {key}: {value}"));
+            line!(lines, "# {key}: {value}");
         }
         let edges =
             if self.band.is_some() { format!(",{}", EDGES.join(",")) } else { String::new() };
-        lines.add(format_args!("speed_m_per_s,d_m,force_N{edges}"));
+        line!(lines, "speed_m_per_s,d_m,force_N{edges}");
         for (i, force) in self.force_n.iter().enumerate() {
             let (row, column) = (i / self.deflection_m.len(), i % self.deflection_m.len());
             let edges = match &self.band {
@@ -136,12 +128,13 @@ impl Table {
                 }
                 None => String::new(),
             };
-            lines.add(format_args!(
+            line!(
+                lines,
                 "{},{},{}{edges}",
                 nine_digits(self.speed_m_per_s[row]),
                 nine_digits(self.deflection_m[column]),
                 nine_digits(*force)
-            ));
+            );
         }
         lines.into_bytes()
     }

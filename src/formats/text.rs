@@ -1,7 +1,5 @@
 //! Numbers, titles, names and lines as text of other tools' files.
 
-use std::fmt::{Arguments, Write};
-
 /// Nine significant digits in Fortran's form: `3.80000000E+06`.
 pub(crate) fn nine_digits(value: f64) -> String {
     // A negative zero would only puzzle readers.
@@ -28,21 +26,15 @@ pub(crate) fn title(text: &str, width: usize) -> String {
         .collect()
 }
 
-/// A text that grows line by line.
-#[derive(Default)]
-pub(crate) struct Lines(String);
-
-impl Lines {
-    /// Adds one line: `lines.add(format_args!("…"))`.
-    pub(super) fn add(&mut self, line: Arguments<'_>) {
+/// Adds a line to a text: `line!(text, "…")`.
+macro_rules! line {
+    ($text:expr, $($line:tt)+) => {{
+        use std::fmt::Write as _;
         // Writing to a string cannot fail.
-        let _ = writeln!(self.0, "{line}");
-    }
-
-    pub(super) fn into_bytes(self) -> Vec<u8> {
-        self.0.into_bytes()
-    }
+        let _ = writeln!($text, $($line)+);
+    }};
 }
+pub(super) use line;
 
 /// Longest identifier: importers unpack into folders of that name, and paths have their limits.
 const LONGEST: usize = 60;

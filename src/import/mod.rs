@@ -6,8 +6,6 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
-
 use crate::clock;
 use crate::curve::from_table::{IMPORTED, from_table};
 use crate::curve::recipe::{Filter, Sampling};
@@ -17,7 +15,7 @@ use crate::curve::{
 };
 use crate::database::{self, Database};
 use crate::error::{Error, ErrorCode, error};
-use crate::file::{WriterLock, absolute};
+use crate::file::WriterLock;
 use crate::formats::read::{self, Metadata, ReadCurve, ReadOptions};
 use crate::unit::{Shown, Speed, SpeedKind, UnitSystem, km_per_h};
 
@@ -65,7 +63,7 @@ pub(crate) fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Ve
     let mut cases: Vec<Case> = Vec::with_capacity(items.len());
     let now = clock::now_utc();
     for item in items {
-        let mut case = of(item, settings, database.cases(&settings.group).first())?;
+        let mut case = case_of(item, settings, database.cases(&settings.group).first())?;
         case.provenance.built_utc = Some(now.clone());
         if let Some(k) = cases.iter().position(|c| c.id.name == case.id.name) {
             return Err(error!(
@@ -90,11 +88,6 @@ pub(crate) fn add(path: &Path, items: &[Item], settings: &Settings) -> Result<Ve
     database.put_all(cases.iter().cloned())?;
     database.write(path)?;
     Ok(cases)
-}
-
-/// The case of the curve of one file, without a database.
-pub(crate) fn case_of_file(item: &Item, settings: &Settings) -> Result<Case, Error> {
-    of(item, settings, None)
 }
 
 fn existing_case<'a>(database: &'a Database, case: &Case) -> Option<&'a Case> {
@@ -131,7 +124,12 @@ fn check_kinds(item: &Item, case: &Case, other: &Case) -> Result<(), Error> {
     ))
 }
 
-fn of(item: &Item, settings: &Settings, group: Option<&Case>) -> Result<Case, Error> {
+/// The case of the curve of one file; `group`: a case of its group in the database, if there is one.
+pub(crate) fn case_of(
+    item: &Item,
+    settings: &Settings,
+    group: Option<&Case>,
+) -> Result<Case, Error> {
     check_name(item, "group", &settings.group)?;
     let (curve, format) = read::read(&item.path, &settings.read)?;
     let name = case_name(item)?;
@@ -167,16 +165,9 @@ fn of(item: &Item, settings: &Settings, group: Option<&Case>) -> Result<Case, Er
     for file in &curve.files {
         hash.update(file.blake3.as_bytes());
     }
-    let sources = curve.files.iter().map(|file| SourceFile {
-        path: file.path.display().to_string(),
-        absolute_path: Some(absolute(&file.path)),
-        size_bytes: file.size_bytes,
-        blake3: file.blake3.clone(),
-        format: format.into(),
-        solver: None,
-        version: None,
-        title: curve.title.clone(),
-        problems: 0,
+    let sources = curve.files.iter().map(|file| {
+        let (format, title) = (format.into(), curve.title.clone());
+        SourceFile { format, title, ..file.clone() }
     });
     let notes = curve.notes.iter().cloned().chain(both.notes).chain(quality.notes);
     Ok(Case {
@@ -197,37 +188,9 @@ fn of(item: &Item, settings: &Settings, group: Option<&Case>) -> Result<Case, Er
     })
 }
 
-/// Everything besides the file that determines the case's numbers.
-#[derive(Serialize)]
-struct Recipe<'a> {
-    study: &'a str,
-    /// Of the file, if they are one system.
-    units: Option<UnitSystem>,
-    kind: SpeedKind,
-    imported: Imported<'a>,
-}
-
-#[derive(Serialize)]
-struct Imported<'a> {
-    path: String,
-    format: &'a str,
-    curve: Option<&'a str>,
-    /// Whether the motion is that of the file's times.
-    has_times: bool,
-    /// Whether the motion was made of the case's own force, which then moves the body, too.
-    moves_by_its_force: bool,
-    force: ForceKind,
-    speed_m_per_s: f64,
-    mass_kg: f64,
-    other_mass_kg: Option<f64>,
-    #[serde(rename = "unloading_stiffness_N_per_m")]
-    unloading_stiffness_n_per_m: Option<f64>,
-    parameters: &'a std::collections::BTreeMap<String, Parameter>,
-    accept_energy: bool,
-    filter: Filter,
-    sampling_interval_ms: f64,
-}
-
+/// Everything besides the file that determines the case's numbers, as JSON.
+// `document!` calls the type of a field as the field.
+#[allow(non_camel_case_types)]
 fn recipe(
     item: &Item,
     settings: &Settings,
@@ -236,21 +199,23 @@ fn recipe(
     impact: &Impact,
 ) -> String {
     let Impact { speed, masses, force_kind, .. } = *impact;
-    let recipe = Recipe {
+    let recipe = document! {
         study: IMPORTED,
         units: curve.units,
         kind: speed.kind,
-        imported: Imported {
+        imported: document! {
             path: item.path.display().to_string(),
-            format,
+            format: format,
             curve: settings.read.curve.as_deref(),
+            // Whether the motion is that of the file's times.
             has_times: curve.time_s.is_some(),
+            // Whether the motion was made of the case's own force, which then moves the body, too.
             moves_by_its_force: curve.time_s.is_none() && curve.body_force_n.is_none(),
             force: force_kind,
             speed_m_per_s: speed.m_per_s,
             mass_kg: masses.body_kg,
             other_mass_kg: masses.other_kg,
-            unloading_stiffness_n_per_m: impact.unloading_stiffness_n_per_m,
+            unloading_stiffness_N_per_m: impact.unloading_stiffness_n_per_m,
             parameters: &settings.parameters,
             accept_energy: settings.accept_energy,
             filter: Filter::None,

@@ -35,7 +35,8 @@ pub use chain::{
     Body, Chain, Damping, Interface, RateFactor, Resistance, STANDARD_GRAVITY_M_PER_S2, Stopping,
 };
 use engine::Scheme;
-pub use law::{EnvelopeEnd, ForceLaw, LawTables, Unloading, UnloadingChoice, UnloadingShape};
+pub(crate) use law::StoredBy;
+pub use law::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
 use run::Grid;
 pub use run::{BodyHistory, InterfaceHistory, Ledger, Method, Record, Run, RunSettings};
 

@@ -203,12 +203,9 @@ const PLACES: usize = 200;
 
 /// Smallest, largest and mean value over the seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Range {
-    /// Smallest value.
+pub(crate) struct Range {
     pub min: f64,
-    /// Largest value.
     pub max: f64,
-    /// Mean value.
     pub mean: f64,
 }
 
@@ -230,12 +227,10 @@ impl Range {
 
 /// How far laws lie apart along their axis, as `(max − min) / mean` over the seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct LawSpread {
-    /// The largest along the axis.
+pub(crate) struct LawSpread {
     pub largest: f64,
     /// Where that is, in m or m/s.
     pub largest_at: f64,
-    /// The mean along the axis.
     pub mean: f64,
 }
 
@@ -261,18 +256,14 @@ impl LawSpread {
 /// and damper can replace each other, and what the law does at another speed is chance.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Identifiability {
-    /// Number of fits.
-    pub seeds: usize,
-    /// Objective of the fits, in m²/s⁴.
-    pub objective: Range,
-    /// `Σ|p − r|/Σ|r|` of the velocity at the fitted speed.
-    pub velocity_l1: Range,
-    /// The same for the acceleration.
-    pub acceleration_l1: Range,
-    /// Spread of the springs.
-    pub stiffness: LawSpread,
-    /// Spread of the dampers.
-    pub damping: LawSpread,
+    pub(crate) seeds: usize,
+    /// In m²/s⁴.
+    pub(crate) objective: Range,
+    /// `Σ|p − r|/Σ|r|` at the fitted speed.
+    pub(crate) velocity_l1: Range,
+    pub(crate) acceleration_l1: Range,
+    pub(crate) stiffness: LawSpread,
+    pub(crate) damping: LawSpread,
 }
 
 impl Identifiability {
@@ -329,22 +320,17 @@ mod tests {
         let refused = |nodes: &[f64], values: &[f64]| {
             PiecewiseLinear::new(nodes.to_vec(), values.to_vec()).unwrap_err().to_string()
         };
+        let expected = "expected nodes that increase from 0 and values of 0 or more, all finite";
+        for (nodes, values, named) in [
+            (&[0.0, 1.0, 1.0][..], &[1.0, 1.0, 2.0][..], "node 3 of a law is (1, 2)"),
+            (&[0.5, 1.0], &[1.0; 2], "node 1 of a law is (0.5, 1)"),
+            (&[0.0, 1.0], &[1.0, -1.0], "node 2 of a law is (1, -1)"),
+        ] {
+            assert_eq!(refused(nodes, values), format!("{named}: {expected}"));
+        }
         assert_eq!(
             refused(&[0.0, 1.0], &[1.0]),
             "a law needs a value at each of at least 2 nodes, found 2 nodes and 1 values"
-        );
-        let expected = "expected nodes that increase from 0 and values of 0 or more, all finite";
-        assert_eq!(
-            refused(&[0.0, 1.0, 1.0], &[1.0, 1.0, 2.0]),
-            format!("node 3 of a law is (1, 2): {expected}")
-        );
-        assert_eq!(
-            refused(&[0.5, 1.0], &[1.0; 2]),
-            format!("node 1 of a law is (0.5, 1): {expected}")
-        );
-        assert_eq!(
-            refused(&[0.0, 1.0], &[1.0, -1.0]),
-            format!("node 2 of a law is (1, -1): {expected}")
         );
         assert!(PiecewiseLinear::new(vec![0.0, f64::INFINITY], vec![1.0; 2]).is_err());
         assert!(PiecewiseLinear::new(vec![0.0, 1.0], vec![f64::NAN, 1.0]).is_err());

@@ -36,7 +36,7 @@ use crate::error::{Error, error};
 use crate::signal::l1_ratio;
 use crate::stream::Stream;
 use genetic::{Genes, Scales};
-pub use law::{Identifiability, LawSpread, Nsdm, PiecewiseLinear, Range};
+pub use law::{Identifiability, Nsdm, PiecewiseLinear};
 pub use motion::Motion;
 use motion::Steps;
 

@@ -46,18 +46,13 @@ pub(crate) fn permuted(k: u64, n: u64, key_of_order: u64) -> u64 {
 pub(crate) enum Distribution {
     /// Every value between the ends is equally likely.
     Uniform {
-        /// Lower end.
         from: f64,
-        /// Upper end.
         to: f64,
     },
     /// The density rises to the mode and falls behind it.
     Triangular {
-        /// Lower end.
         from: f64,
-        /// Likeliest value.
         mode: f64,
-        /// Upper end.
         to: f64,
     },
     /// Of the quantity itself.

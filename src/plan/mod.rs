@@ -241,9 +241,7 @@ pub(crate) enum Spread {
     Names(Vec<String>),
     /// `steps` even values from `from` to `to`.
     Even {
-        /// First value.
         from: f64,
-        /// Last value.
         to: f64,
         /// Number of values, 2 or more.
         steps: u64,
@@ -266,7 +264,6 @@ impl Spread {
 /// The variables of a checked plan, and how many items they make.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Design {
-    /// The values of each variable.
     pub(crate) spreads: Vec<Spread>,
     samples: u64,
     pub(crate) items: u64,

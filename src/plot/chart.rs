@@ -123,7 +123,7 @@ pub enum Shown {
 pub struct Series {
     /// Stands in the legend; series of one name and look have one entry.
     pub name: String,
-    /// Which colour, dash and marker it has: see [`Paint::Series`](super::Paint::Series).
+    /// Which colour, dash and marker it has: eight colours, then again from the first.
     pub look: usize,
     /// Line or points.
     pub shown: Shown,
@@ -177,13 +177,12 @@ pub struct Drawing {
     /// Height in pixels.
     pub height: f64,
     /// The chart's title, for who cannot see it.
-    pub title: String,
+    pub(crate) title: String,
     /// From the lowest to the topmost.
-    pub shapes: Vec<Shape>,
-    /// Where the panels are.
+    pub(crate) shapes: Vec<Shape>,
     pub(crate) panels: Vec<PanelPlace>,
-    /// Where the legend begins, in pixels from the top.
-    pub legend_top: f64,
+    /// In pixels from the top.
+    pub(crate) legend_top: f64,
 }
 
 /// Where a panel's axes are and what they span.
@@ -191,9 +190,8 @@ pub struct Drawing {
 pub(crate) struct PanelPlace {
     /// Left, top, right and bottom of the area between the axes, in pixels.
     pub area: [f64; 4],
-    /// What it spans to the right, in SI.
+    /// In SI.
     pub x_span: (f64, f64),
-    /// What it spans upwards, in SI.
     pub y_span: (f64, f64),
 }
 
@@ -239,14 +237,12 @@ const MOST_GAP: f64 = 4.0;
 
 /// A colour by its meaning, so that a dark page can give it another value.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Paint {
-    /// The ground.
+pub(crate) enum Paint {
     Paper,
     /// Texts and axes.
     Ink,
     /// Texts of less weight.
     Faint,
-    /// Lines at ticks.
     Grid,
     /// The colour of a look: eight, then again from the first.
     Series(usize),
@@ -254,10 +250,8 @@ pub enum Paint {
 
 /// A line's look.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stroke {
-    /// Its colour.
+pub(crate) struct Stroke {
     pub paint: Paint,
-    /// Its width in pixels.
     pub width: f64,
     /// Lengths of strokes and gaps in pixels; empty for a solid line.
     pub dash: Vec<f64>,
@@ -265,53 +259,44 @@ pub struct Stroke {
 
 /// Something that is drawn.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Shape {
+pub(crate) enum Shape {
     /// Lines, each through its points; an area if it is filled.
     Path {
-        /// Points of each line.
         lines: Vec<Vec<(f64, f64)>>,
         /// Whether each line returns to its beginning.
         is_closed: bool,
-        /// The line, if it is drawn.
         stroke: Option<Stroke>,
         /// Colour and opacity of the area, if it is filled.
         fill: Option<(Paint, f64)>,
-        /// Panel and ordinal among its series, or its bands, which it shows.
         shows: Option<Shows>,
     },
-    /// A text of one line.
     Text(Text),
 }
 
 /// What of a panel a shape shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shows {
+pub(crate) enum Shows {
     /// Panel, and ordinal of the series.
     Series(usize, usize),
     /// Panel, and ordinal of the band.
     Band(usize, usize),
     /// Ticks, their lines and numbers: what changes with the span.
     Ticks(usize),
-    /// The legend below the axes.
     Legend,
 }
 
 /// A text of one line.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Text {
-    /// What it says.
+pub(crate) struct Text {
     pub text: String,
     /// Where its baseline begins, in pixels.
     pub x: f64,
-    /// See `x`.
     pub y: f64,
     /// Height of a line in pixels.
     pub size: f64,
     /// Whether it runs upwards.
     pub is_upright: bool,
-    /// Its colour.
     pub paint: Paint,
-    /// What of a panel it belongs to.
     pub shows: Option<Shows>,
 }
 

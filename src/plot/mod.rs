@@ -22,8 +22,6 @@ mod svg;
 mod thin;
 
 pub(crate) use chart::PanelPlace;
-pub use chart::{
-    Axis, Band, Chart, Drawing, Mark, Paint, Panel, Series, Shape, Shown, Shows, Stroke, Text,
-};
+pub use chart::{Axis, Band, Chart, Drawing, Mark, Panel, Series, Shown};
 pub(crate) use style::looks_for_pages;
 pub(crate) use svg::SvgFor;

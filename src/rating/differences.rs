@@ -154,35 +154,6 @@ pub(crate) fn russell(reference: &[f64], prediction: &[f64]) -> Option<Magnitude
     Some(MagnitudePhase { magnitude, phase, combined })
 }
 
-#[cfg(test)]
-mod magnitude_phase_tests {
-    use super::*;
-
-    #[test]
-    fn a_doubled_signal_has_no_phase_error() {
-        let (r, p) = ([3.0, -4.0], [6.0, -8.0]);
-        let sg = sprague_geers(&r, &p).unwrap();
-        assert_eq!((sg.magnitude, sg.phase, sg.combined), (1.0, 0.0, 1.0));
-        // m = (100 − 25)/50 = 1.5.
-        let russell = russell(&r, &p).unwrap();
-        assert!((russell.magnitude - 2.5_f64.log10()).abs() < 1e-15);
-        assert!((russell.combined - FRAC_PI_4.sqrt() * 2.5_f64.log10()).abs() < 1e-15);
-    }
-
-    #[test]
-    fn a_quarter_wave_is_half_and_the_opposite_all() {
-        for rate in [sprague_geers, russell] {
-            let quarter = rate(&[1.0, 0.0], &[0.0, 1.0]).unwrap();
-            assert!(quarter.magnitude == 0.0 && (quarter.phase - 0.5).abs() < 1e-15);
-            assert_eq!(rate(&[1.0, 2.0], &[-1.0, -2.0]).unwrap().phase, 1.0);
-            let angle = rate(&[1.0, 0.0], &[1.0, 1e-12]).unwrap().phase * PI;
-            assert!((angle - 1e-12).abs() < 1e-24, "{angle}");
-            assert_eq!(rate(&[0.0, 0.0], &[1.0, 2.0]), None);
-        }
-        assert!(russell(&[2.0, 0.0], &[1.0, 0.0]).unwrap().magnitude < 0.0);
-    }
-}
-
 /// Exponent K_V of the progression.
 const PROGRESSION_EXPONENT: i32 = 10;
 /// Shifts up to D_MIN of the interval count as none, from D_MAX on as the worst.
@@ -262,7 +233,7 @@ const THRESHOLD: f64 = 0.05;
 const MOVING_MEAN_S: f64 = 0.120;
 
 /// Means of a deceleration, in the unit of the signal.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
 pub(crate) struct Deceleration {
     /// Mean of −a from the first instant at which it exceeds 5 % of its largest value until it
     /// next returns to zero or the interval ends; null if it is never above zero. Where only the
@@ -286,45 +257,33 @@ impl Deceleration {
     /// above zero; of a signal without its force the deceleration itself gives start and end.
     pub(crate) fn of(time_s: &[f64], acceleration: &[f64]) -> Self {
         let deceleration: Vec<f64> = acceleration.iter().map(|a| -a).collect();
-        let phase = phase(time_s, &deceleration);
+        let largest_120ms_mean = largest_moving_mean(time_s, &deceleration, MOVING_MEAN_S);
+        let largest = deceleration.iter().copied().fold(0.0, f64::max);
+        let above = |&d: &f64| d > THRESHOLD * largest && d > 0.0;
+        let Some(first) = deceleration.iter().position(above) else {
+            return Self { largest_120ms_mean, ..Self::default() };
+        };
+        let length = deceleration[first..].iter().take_while(|&&d| d > 0.0).count();
+        let after = first + length;
+        let last = after - 1;
+        let mut area = integral(&time_s[first..after], &deceleration[first..after]);
+        let (from_s, mut to_s) = (time_s[first], time_s[last]);
+        // The zero lies between two samples.
+        if let Some(&below) = deceleration.get(after) {
+            let share = deceleration[last] / (deceleration[last] - below);
+            let part_s = share * (time_s[after] - time_s[last]);
+            area += 0.5 * deceleration[last] * part_s;
+            to_s += part_s;
+        }
+        let mean = if to_s > from_s { area / (to_s - from_s) } else { deceleration[first] };
         Self {
-            mean: phase.map(|p| p.mean),
-            from_s: phase.map(|p| p.from_s),
-            to_s: phase.map(|p| p.to_s),
-            is_cut: phase.is_some_and(|p| p.is_cut),
-            largest_120ms_mean: largest_moving_mean(time_s, &deceleration, MOVING_MEAN_S),
+            mean: Some(mean),
+            from_s: Some(from_s),
+            to_s: Some(to_s),
+            is_cut: after == deceleration.len() && above(&deceleration[last]),
+            largest_120ms_mean,
         }
     }
-}
-
-#[derive(Clone, Copy)]
-struct Phase {
-    mean: f64,
-    from_s: f64,
-    to_s: f64,
-    is_cut: bool,
-}
-
-fn phase(time_s: &[f64], deceleration: &[f64]) -> Option<Phase> {
-    let largest = deceleration.iter().copied().fold(0.0, f64::max);
-    let above = |&d: &f64| d > THRESHOLD * largest && d > 0.0;
-    let first = deceleration.iter().position(above)?;
-    let length = deceleration[first..].iter().take_while(|&&d| d > 0.0).count();
-    let after = first + length;
-    let last = after - 1;
-    let mut area = integral(&time_s[first..after], &deceleration[first..after]);
-    let mut to_s = time_s[last];
-    // The zero lies between two samples.
-    if let Some(&below) = deceleration.get(after) {
-        let share = deceleration[last] / (deceleration[last] - below);
-        let part_s = share * (time_s[after] - time_s[last]);
-        area += 0.5 * deceleration[last] * part_s;
-        to_s += part_s;
-    }
-    let from_s = time_s[first];
-    let mean = if to_s > from_s { area / (to_s - from_s) } else { deceleration[first] };
-    let is_cut = after == deceleration.len() && above(&deceleration[last]);
-    Some(Phase { mean, from_s, to_s, is_cut })
 }
 
 /// Largest mean of `values` over any `length_s` that begins at a sample; equal intervals.
@@ -426,22 +385,14 @@ mod tests {
     fn half_a_sine_has_the_mean_of_two_over_pi() {
         // 100 ms of deceleration from 10 ms on, then a rebound.
         let time = times(200);
-        let a: Vec<f64> = time
-            .iter()
-            .map(|t| {
-                if *t < 0.01 {
-                    0.0
-                } else {
-                    -50.0 * ((t - 0.01) / 0.1 * std::f64::consts::PI).sin()
-                }
-            })
-            .collect();
+        let sine = |t: &f64| -50.0 * ((t - 0.01) / 0.1 * PI).sin();
+        let a: Vec<f64> = time.iter().map(|t| if *t < 0.01 { 0.0 } else { sine(t) }).collect();
         let of = Deceleration::of(&time, &a);
         // 5 % are passed 1.6 ms after the begin: the next sample is the first.
         assert!((of.from_s.unwrap() - 0.012).abs() < 1e-12);
         assert!((of.to_s.unwrap() - 0.110).abs() < 1e-6);
-        let x = 0.002 / 0.1 * std::f64::consts::PI;
-        let mean = 50.0 * (1.0 + x.cos()) / (std::f64::consts::PI - x);
+        let x = 0.002 / 0.1 * PI;
+        let mean = 50.0 * (1.0 + x.cos()) / (PI - x);
         assert!((of.mean.unwrap() - mean).abs() < 1e-2, "{of:?}");
     }
 
@@ -477,5 +428,29 @@ mod tests {
     fn what_only_speeds_up_has_no_mean() {
         assert_eq!(Deceleration::of(&times(5), &[1.0; 5]).mean, None);
         assert_eq!(Deceleration::of(&times(5), &[0.0; 5]).mean, None);
+    }
+
+    #[test]
+    fn a_doubled_signal_has_no_phase_error() {
+        let (r, p) = ([3.0, -4.0], [6.0, -8.0]);
+        let sg = sprague_geers(&r, &p).unwrap();
+        assert_eq!((sg.magnitude, sg.phase, sg.combined), (1.0, 0.0, 1.0));
+        // m = (100 − 25)/50 = 1.5.
+        let russell = russell(&r, &p).unwrap();
+        assert!((russell.magnitude - 2.5_f64.log10()).abs() < 1e-15);
+        assert!((russell.combined - FRAC_PI_4.sqrt() * 2.5_f64.log10()).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_quarter_wave_is_half_and_the_opposite_all() {
+        for rate in [sprague_geers, russell] {
+            let quarter = rate(&[1.0, 0.0], &[0.0, 1.0]).unwrap();
+            assert!(quarter.magnitude == 0.0 && (quarter.phase - 0.5).abs() < 1e-15);
+            assert_eq!(rate(&[1.0, 2.0], &[-1.0, -2.0]).unwrap().phase, 1.0);
+            let angle = rate(&[1.0, 0.0], &[1.0, 1e-12]).unwrap().phase * PI;
+            assert!((angle - 1e-12).abs() < 1e-24, "{angle}");
+            assert_eq!(rate(&[0.0, 0.0], &[1.0, 2.0]), None);
+        }
+        assert!(russell(&[2.0, 0.0], &[1.0, 0.0]).unwrap().magnitude < 0.0);
     }
 }

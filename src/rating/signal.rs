@@ -304,28 +304,6 @@ mod tests {
             error(&[0.0, 1.0, 2.0, 3.0, 4.0], &[0.0, f64::NAN, 0.0, 0.0, 0.0]),
             "sample 2: the value is NaN: expected a finite number up to 1e100"
         );
-        assert_eq!(error(&[0.0], &[0.0]), "a signal needs at least 5 samples, found 1");
-        let none =
-            Pair::new(&line(0.0, 0.125, 5), &line(1.0, 0.125, 5), (None, None), 12).unwrap_err();
-        assert_eq!(
-            none.to_string(),
-            "there are no common times: the reference goes from 0 s to 0.5 s, the prediction from 1 s to 1.5 s; check the units of time"
-        );
-        let a = line(0.0, 0.125, 5);
-        let outside = Pair::new(&a, &a, (Some(2.0), None), 12).unwrap_err();
-        assert_eq!(
-            outside.to_string(),
-            "the requested interval, from 2 s to 0.5 s, lies outside the common times from 0 s to 0.5 s"
-        );
-        let short = Pair::new(&a, &a, (None, Some(0.001)), 12).unwrap_err();
-        assert_eq!(
-            short.to_string(),
-            "the common times from 0 s to 0.001 s hold 11 samples at 10 kHz: at least 12 are needed; check the units of time and the requested interval"
-        );
-        assert_eq!(
-            a.filtered(60).unwrap_err().to_string(),
-            "line: its samples are 1.25e-1 s apart, too far for CFC 60: at most 1.67e-3 s; use a lower class or no filter"
-        );
         let long = line(0.0, 100.0, 10);
         let error = Pair::new(&long, &long, (None, None), 12).unwrap_err().to_string();
         assert!(error.contains("samples at 10 kHz, "), "{error}");

@@ -32,10 +32,11 @@ pub(super) fn add(
     settings: &ReportSettings,
 ) -> Result<(), Error> {
     let number = content.sections.len() + 1;
+    let own = cases.first().map_or(ForceKind::Contact, |case| case.curves.force_kind);
     let mut parts = vec![
         Part::Figure(Figure::new(
             format!("g{number}-curves"),
-            charts::group_curves(group, cases, own_force(cases)),
+            charts::group_curves(group, cases, own),
         )),
         Part::table(format!("FE runs of {group}"), runs(cases)),
     ];
@@ -72,14 +73,10 @@ fn known_or_new(
         None => validate(
             group,
             cases,
-            &ModelKind::candidates(settings.seed),
+            &ModelKind::all(settings.seed),
             Selection::Best(Purpose::Vehicle),
         ),
     }
-}
-
-fn own_force(cases: &[Case]) -> ForceKind {
-    cases.first().map_or(ForceKind::Contact, |case| case.curves.force_kind)
 }
 
 /// Speed, mass, peak, crush and audit of every run.
@@ -159,7 +156,7 @@ impl Validated<'_> {
             content.warn(format!("{group}: {note}"));
         }
         let Some(worst) = self.worst() else { return };
-        let mut kinds = ModelKind::candidates(settings.seed).into_iter();
+        let mut kinds = ModelKind::all(settings.seed).into_iter();
         let Some(kind) = kinds.find(|kind| kind.name() == validation.chosen) else { return };
         match charts::left_out_at(group, cases, worst.speed_m_per_s, Choice::Kind(kind)) {
             Ok(chart) => {
@@ -277,13 +274,15 @@ impl Validated<'_> {
             .collect::<Result<Vec<Comparison>, _>>()?;
         let Some(first) = comparisons.first() else { return Ok(()) };
         let mean = |row: &Row, of: fn(&Row) -> f64| mean(&comparisons, &row.method, of);
+        let crush_m = comparisons.iter().map(|c| c.reference_max_crush_m).sum::<f64>();
+        let crush_m = crush_m / comparisons.len() as f64;
         let table = Table::of(&first.rows)
             .column("method", |row| &row.method)
             .column("driven by", |row| row.driven_by.map_or("spring and damper", ForceKind::name))
             .column("velocity", |row| percent(mean(row, |r| r.velocity_l1)))
             .column("acceleration (CFC 60)", |row| percent(mean(row, |r| r.acceleration_l1)))
             .column("maximum crush", |row| {
-                signed_percent(mean(row, |r| r.max_crush_m) / mean_crush(&comparisons) - 1.0)
+                signed_percent(mean(row, |r| r.max_crush_m) / crush_m - 1.0)
             })
             .chosen(|row| row.method == "best");
         let left_out = left_out_speeds(&speeds);
@@ -304,10 +303,6 @@ fn left_out_speeds(speeds: &[f64]) -> String {
             format!("means over {}, each left out in turn", counted(several.len(), "inner speed"))
         }
     }
-}
-
-fn mean_crush(comparisons: &[Comparison]) -> f64 {
-    comparisons.iter().map(|c| c.reference_max_crush_m).sum::<f64>() / comparisons.len() as f64
 }
 
 fn methods_explained(nsdm_seeds: u64) -> String {

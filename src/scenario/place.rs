@@ -122,8 +122,12 @@ impl Scenario {
         if let Some(i) = key.item_of("bodies") {
             let body = &layout.bodies[i];
             return match body.resistance.wrong_term() {
-                Some(_) => train(self.train.iter().position(has_wrong_resistance).unwrap_or(0))
-                    .key("resistance"),
+                Some(_) => {
+                    let is_wrong = |train: &TrainTable| {
+                        train.resistance.is_some_and(|r| r.wrong_term().is_some())
+                    };
+                    train(self.train.iter().position(is_wrong).unwrap_or(0)).key("resistance")
+                }
                 None => self.vehicle_of(&body.name).key("mass"),
             };
         }
@@ -142,8 +146,4 @@ impl Scenario {
         let found = self.vehicles().find(|(_, vehicle)| is_of(vehicle));
         found.map_or(KeyPath::of("train"), |(path, _)| path)
     }
-}
-
-fn has_wrong_resistance(train: &TrainTable) -> bool {
-    train.resistance.is_some_and(|r| r.wrong_term().is_some())
 }

@@ -14,7 +14,7 @@ use crate::curve::force_curve::ForceCurveError;
 use crate::curve::{CurveUnloading, Envelope, ForceCurve, ForceKind, Tail};
 use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{
-    Damping, EnvelopeEnd, ForceLaw, Interface, RateFactor, Stopping, Unloading, UnloadingChoice,
+    Damping, EnvelopeEnd, ForceLaw, Interface, RateFactor, Stopping, Unloading,
 };
 use crate::surrogate::crush_law::{CrushCurve, CrushLaw, per_crush_force};
 use crate::surrogate::predict::predict_driving;
@@ -199,14 +199,14 @@ impl Spring {
         table: &Table,
     ) -> Result<(ForceLaw, Vec<String>), Error> {
         let (unloading, warnings) = match table.law {
-            LawName::Elastic => (UnloadingChoice::Elastic, Vec::new()),
+            LawName::Elastic => (Some(Unloading::Elastic), Vec::new()),
             LawName::Memory | LawName::Rate => self.memory(table)?,
         };
         self.warnings.extend(warnings);
         Ok((ForceLaw::of_curve(&self.curve, unloading, self.end), self.warnings))
     }
 
-    fn memory(&self, table: &Table) -> Result<(UnloadingChoice, Vec<String>), Error> {
+    fn memory(&self, table: &Table) -> Result<(Option<Unloading>, Vec<String>), Error> {
         let asked = table.unloading.map(|u| u.0);
         let known = self.curve.unloading.stiffness_n_per_m();
         let steepest = self.curve.loading.max_slope();
@@ -238,7 +238,7 @@ impl Spring {
                 "it {why}, so its unloading stiffness must be given: unloading = \"…MN/m\", or law = \"elastic\""
             ));
         }
-        Ok((asked.map_or(UnloadingChoice::Own, UnloadingChoice::Stiffness), warnings))
+        Ok((asked.map(|stiffness_n_per_m| Unloading::Memory { stiffness_n_per_m }), warnings))
     }
 }
 

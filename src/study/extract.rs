@@ -21,7 +21,10 @@ impl LocatedRun<'_> {
         let extracted = self.curve(&files, units)?;
         if self.study.manifest.study.units.is_none() || extracted.speed_is_decks {
             // What could not be read of it may have changed what was taken from it.
-            remarks.warnings.extend(self.deck_problems());
+            if let Some(RunDeck { file, deck }) = &self.deck {
+                let name = shown_name(&file.path);
+                remarks.warnings.extend(deck.problems.iter().map(|p| format!("deck {name}: {p}")));
+            }
         }
         remarks.notes.extend_from_slice(&extracted.quality.notes);
         remarks.warnings.extend_from_slice(&extracted.quality.warnings);
@@ -66,12 +69,10 @@ impl LocatedRun<'_> {
 
     fn curve(&self, files: &RunFiles<'_>, units: UnitSystem) -> Result<Extracted, Error> {
         let (study, entry) = (self.study, self.entry);
-        let others: Vec<(String, f64)> = study
-            .runs()
-            .iter()
-            .filter(|run| run.case_name() != entry.case_name())
-            .filter_map(|run| Some((run.case_name(), run.speed?.0)))
-            .collect();
+        let others = || -> Vec<(String, f64)> {
+            let others = study.runs().iter().filter(|run| run.case_name() != entry.case_name());
+            others.filter_map(|run| Some((run.case_name(), run.speed?.0))).collect()
+        };
         let setup = Setup {
             filter: study.manifest.recipe.filter,
             sampling: study.manifest.recipe.sampling,
@@ -143,12 +144,6 @@ impl LocatedRun<'_> {
                 Shown::one_mass(ratio * masses.body_kg)
             )
         })
-    }
-
-    fn deck_problems(&self) -> Vec<String> {
-        let Some(RunDeck { file, deck }) = &self.deck else { return Vec::new() };
-        let name = shown_name(&file.path);
-        deck.problems.iter().map(|p| format!("deck {name}: {p}")).collect()
     }
 
     /// Notes on the files: the side that was chosen, binary files beside texts, and damage.

@@ -100,6 +100,13 @@ pub struct Band {
     /// span; `None` with fewer than two curves.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<f64>,
+    /// Share of the left-out curves that lie wholly inside `simultaneous_share` of the others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub whole_curves: Option<f64>,
+    /// Mean difference between coverage and level, over all levels from 0 to 1 (integrated absolute error): 0 is
+    /// perfect, 0.5 the worst.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub calibration_error: Option<f64>,
 }
 
 /// Half widths that the scatter between repeated runs gives by itself: Student's t times its root mean
@@ -153,6 +160,17 @@ pub(crate) struct Residuals {
 impl Residuals {
     pub(crate) fn new(span_m_per_s: f64, ratios: Vec<f64>, runs: usize) -> Self {
         Self { stretches: stretches(&ratios), span_m_per_s, ratios, runs }
+    }
+
+    /// Share of the points within a half width.
+    fn inside(&self, share: f64) -> f64 {
+        let inside = self.ratios.iter().filter(|r| r.abs() <= share).count();
+        inside as f64 / self.ratios.len().max(1) as f64
+    }
+
+    /// Of one point, so that every curve weighs the same.
+    fn weight(&self) -> f64 {
+        1.0 / self.ratios.len().max(1) as f64
     }
 }
 
@@ -228,11 +246,23 @@ impl Band {
     ) -> Option<Self> {
         let all: Vec<&Residuals> = curves.iter().collect();
         let mut band = Self::without_coverage(left_out, &all, scatter).filter(Self::is_sound)?;
-        let covered: Vec<f64> =
-            (0..curves.len()).filter_map(|i| coverage(left_out, curves, i, scatter)).collect();
-        if !covered.is_empty() {
-            band.coverage = Some(covered.iter().sum::<f64>() / covered.len() as f64);
-        }
+        let own = |i: usize| Some((&curves[i], without_own(left_out, curves, i, scatter)?));
+        let checked: Vec<(&Residuals, (Self, usize))> = (0..curves.len()).filter_map(own).collect();
+        let mean = |of: &dyn Fn(&Residuals, Self, usize) -> f64| {
+            let sum: f64 = checked.iter().map(|(own, (band, t))| of(own, *band, *t)).sum();
+            (!checked.is_empty()).then(|| sum / checked.len() as f64)
+        };
+        band.coverage = mean(&|own, band, _| own.inside(band.share_of_mean(own.runs)));
+        band.whole_curves =
+            mean(&|own, band, _| f64::from(own.inside(band.simultaneous_share) == 1.0));
+        band.calibration_error = (!checked.is_empty()).then(|| {
+            let levels = checked.iter().flat_map(|(own, (band, degrees))| {
+                let sigma = band.share_of_mean(own.runs) / student_t(*degrees).unwrap_or(1.0);
+                let level = move |r: &f64| (inside_t(r.abs() / sigma, *degrees), own.weight());
+                own.ratios.iter().map(level)
+            });
+            calibration_error(levels.collect())
+        });
         Some(band)
     }
 
@@ -242,10 +272,7 @@ impl Band {
         scatter: Option<ForceScatter>,
     ) -> Option<Self> {
         let t_of_curves = student_t(curves.len())?;
-        let t_of_points = match left_out {
-            LeftOutSpeeds::Inner => student_t(curves.iter().map(|r| r.stretches).sum())?,
-            LeftOutSpeeds::Ends => t_of_curves,
-        };
+        let t_of_points = student_t(degrees_of_freedom(left_out, curves))?;
         let n = curves.len() as f64;
         let span_m_per_s = curves.iter().map(|r| r.span_m_per_s).sum::<f64>() / n;
         let over_span = |of: &dyn Fn(&[f64]) -> f64, scatter: Option<f64>| {
@@ -268,6 +295,8 @@ impl Band {
                 * over_span(&largest, scatter.map(|s| s.largest_force_share)),
             scatter: None,
             coverage: None,
+            whole_curves: None,
+            calibration_error: None,
         };
         Some(band.and(scatter.and_then(ScatterWidths::of)))
     }
@@ -357,6 +386,27 @@ pub(crate) fn at(inner: Option<Band>, ends: Option<Band>, speeds: &[f64], v: f64
     })
 }
 
+/// Degrees of freedom of the width at one deflection.
+fn degrees_of_freedom(left_out: LeftOutSpeeds, curves: &[&Residuals]) -> usize {
+    match left_out {
+        LeftOutSpeeds::Inner => curves.iter().map(|r| r.stretches).sum(),
+        LeftOutSpeeds::Ends => curves.len(),
+    }
+}
+
+/// The band that the curves other than `i` give over its span, with its degrees of freedom.
+fn without_own(
+    left_out: LeftOutSpeeds,
+    curves: &[Residuals],
+    i: usize,
+    scatter: Option<ForceScatter>,
+) -> Option<(Band, usize)> {
+    let others: Vec<&Residuals> =
+        curves.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, r)| r).collect();
+    let band = Band::without_coverage(left_out, &others, scatter)?.over(curves[i].span_m_per_s)?;
+    Some((band, degrees_of_freedom(left_out, &others)))
+}
+
 /// Share of curve `i`'s points inside the band that the other curves give over its span.
 pub(crate) fn coverage(
     left_out: LeftOutSpeeds,
@@ -364,13 +414,44 @@ pub(crate) fn coverage(
     i: usize,
     scatter: Option<ForceScatter>,
 ) -> Option<f64> {
-    let others: Vec<&Residuals> =
-        curves.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, r)| r).collect();
-    let Residuals { span_m_per_s, ratios, runs, .. } = &curves[i];
-    let band = Band::without_coverage(left_out, &others, scatter)?.over(*span_m_per_s)?;
-    let share = band.share_of_mean(*runs);
-    let inside = ratios.iter().filter(|r| r.abs() <= share).count();
-    Some(inside as f64 / ratios.len().max(1) as f64)
+    let (band, _) = without_own(left_out, curves, i, scatter)?;
+    Some(curves[i].inside(band.share_of_mean(curves[i].runs)))
+}
+
+/// The integral over all levels of the difference between a level and the weight of the points that its band covers; each
+/// point with the least level that covers it.
+fn calibration_error(mut points: Vec<(f64, f64)>) -> f64 {
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let whole: f64 = points.iter().map(|(_, weight)| weight).sum();
+    let (mut error, mut from, mut covered) = (0.0, 0.0, 0.0);
+    // |level − covered| over an interval of levels in which nothing more is covered.
+    let over = |from: f64, to: f64, covered: f64| {
+        let area = |x: f64| 0.5 * (x - covered) * (x - covered).abs();
+        area(to) - area(from)
+    };
+    for (level, weight) in points {
+        error += over(from, level, covered);
+        (from, covered) = (level, covered + weight / whole);
+    }
+    error + over(from, 1.0, covered)
+}
+
+/// Probability that Student's t with `n` degrees of freedom lies between −t and t (Abramowitz and Stegun 26.7.3 and
+/// 26.7.4).
+fn inside_t(t: f64, n: usize) -> f64 {
+    let angle = (t / (n as f64).sqrt()).atan();
+    let (sine, cosine) = angle.sin_cos();
+    let odd = n % 2;
+    let (mut term, mut sum) = (if odd == 1 { cosine } else { 1.0 }, 0.0);
+    for k in 0..n / 2 {
+        sum += term;
+        let k = 2 * k + 1 + odd;
+        term *= k as f64 / (k + 1) as f64 * cosine * cosine;
+    }
+    let inside =
+        if odd == 1 { std::f64::consts::FRAC_2_PI * (angle + sine * sum) } else { sine * sum };
+    // Not a number where no residual tells the width: nothing is inside.
+    if inside.is_nan() { 1.0 } else { inside.clamp(0.0, 1.0) }
 }
 
 /// Two-sided 90 % quantile of Student's t with `n` degrees of freedom.
@@ -486,6 +567,28 @@ mod tests {
         assert!(kind == Ends && (outside - 0.584 * 1.5).abs() < 1e-12);
         assert_eq!(at(inner, None, &speeds, 12.0), None);
         assert_eq!(at(None, ends, &speeds, 8.0), None);
+    }
+
+    #[test]
+    fn levels_are_those_of_the_quantiles() {
+        for n in 1..=40 {
+            let inside = inside_t(student_t(n).unwrap(), n);
+            assert!((inside - LEVEL).abs() < 2e-4, "{n}: {inside}");
+        }
+        assert_eq!([inside_t(0.0, 3), inside_t(f64::INFINITY, 4)], [0.0, 1.0]);
+    }
+
+    /// Levels that are spread evenly are covered as stated; one width for all of them is not.
+    #[test]
+    fn calibration_is_the_area_between_level_and_coverage() {
+        let spread: Vec<(f64, f64)> =
+            (0..1000).map(|i| ((f64::from(i) + 0.5) / 1000.0, 1.0)).collect();
+        assert!(calibration_error(spread) < 1e-3);
+        assert!((calibration_error(vec![(0.0, 1.0); 3]) - 0.5).abs() < 1e-12, "far too wide");
+        assert!((calibration_error(vec![(1.0, 2.0)]) - 0.5).abs() < 1e-12, "far too narrow");
+        let half = vec![(0.2, 1.0), (0.6, 1.0)];
+        // 0 to 0.2 covers none, to 0.6 half, then all: 0.02 + 0.045 + 0.005 + 0.08.
+        assert!((calibration_error(half) - 0.15).abs() < 1e-12);
     }
 
     #[test]

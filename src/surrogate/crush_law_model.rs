@@ -44,7 +44,7 @@ struct OfCrushLaw {
 }
 
 fn interval_s(set: &TrainingSet) -> f64 {
-    let of = |case: &TrainingCase| {
+    let of = |case: &Arc<TrainingCase>| {
         let time_s = case.case.curves.sampled.time_s();
         (time_s[time_s.len() - 1] - time_s[0]) / (time_s.len() - 1) as f64
     };

@@ -1,5 +1,7 @@
 //! The training curves of a model, one force of each case, and how they are blended.
 
+use std::borrow::Cow;
+
 use crate::curve::Envelope;
 use crate::error::{Error, ErrorCode};
 
@@ -126,6 +128,36 @@ pub(crate) fn neighbours(speeds: &[f64], v: f64) -> (usize, usize, f64) {
     }
 }
 
+/// Most runs that answer a query together: with more of them the cost would grow with the third power of their number.
+const MOST_RUNS: usize = 20;
+
+/// Indices of the curves that answer at a speed, in their order: all, or of more than 20 the ten around it and ten that are spread
+/// over the others.
+fn answering(speeds: &[f64], v: f64) -> Vec<usize> {
+    let all = speeds.len();
+    if all <= MOST_RUNS {
+        return (0..all).collect();
+    }
+    let near = MOST_RUNS / 2;
+    let first = speeds.partition_point(|s| *s < v).saturating_sub(near / 2).min(all - near);
+    let others = all - near;
+    let spread = (0..MOST_RUNS - near).map(|k| k * (others - 1) / (MOST_RUNS - near - 1));
+    // Counted without those around the speed.
+    let spread = spread.map(|i| if i < first { i } else { i + near });
+    let mut chosen: Vec<usize> = spread.chain(first..first + near).collect();
+    chosen.sort_unstable();
+    chosen
+}
+
+/// The curves that answer at a speed.
+pub(super) fn answering_at(cases: &[CaseCurve], v: f64) -> Cow<'_, [CaseCurve]> {
+    if cases.len() <= MOST_RUNS {
+        return Cow::Borrowed(cases);
+    }
+    let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
+    answering(&speeds, v).into_iter().map(|i| cases[i].clone()).collect()
+}
+
 /// Linear interpolation over points of increasing abscissa, held beyond the ends; `None`
 /// without points.
 pub(crate) fn interpolate_held(points: &[(f64, f64)], x: f64) -> Option<f64> {
@@ -152,6 +184,19 @@ mod tests {
         assert_eq!(neighbours(&speeds, 3.0), (1, 2, 0.5));
         assert_eq!(neighbours(&speeds, 2.0), (1, 2, 0.0));
         assert_eq!(neighbours(&speeds, 9.0), (2, 2, 0.0));
+    }
+
+    #[test]
+    fn the_runs_around_a_speed_and_some_of_the_others_answer() {
+        let speeds: Vec<f64> = (0..200).map(f64::from).collect();
+        assert_eq!(answering(&speeds[..20], 3.0), (0..20).collect::<Vec<_>>());
+        for v in [-5.0, 0.0, 3.0, 77.5, 198.0, 300.0] {
+            let chosen = answering(&speeds, v);
+            assert!(chosen.len() == 20 && chosen.windows(2).all(|w| w[0] < w[1]), "{chosen:?}");
+            assert_eq!((chosen[0], chosen[19]), (0, 199), "{chosen:?}");
+            let (low, high, _) = neighbours(&speeds, v);
+            assert!(chosen.contains(&low) && chosen.contains(&high), "{v}: {chosen:?}");
+        }
     }
 
     /// At 2 m/s and 10 ms the mean is over 10 mm to both sides.

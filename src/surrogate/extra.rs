@@ -23,9 +23,9 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 };
 
 impl ForestOptions {
-    /// Extremely randomised trees: 500 on all points, thresholds at random, so that the
+    /// Extremely randomised trees: 50 on all points, thresholds at random, so that the
     /// forest is nearly continuous in speed.
     pub fn extra() -> Self {
-        Self { trees: 500, thresholds: Thresholds::Random, bootstrap: false, ..Self::default() }
+        Self { thresholds: Thresholds::Random, bootstrap: false, ..Self::default() }
     }
 }

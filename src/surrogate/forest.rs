@@ -50,7 +50,7 @@ impl ForestSurrogate {
         let forest = options
             .params()
             .quantiles(options.quantiles && force == set.force_kind)
-            .fit(&set.table_of(options.table, force))?;
+            .fit(&set.table_of(options.table, force, options.most_rows))?;
         Ok(Self { speeds_m_per_s: set.speeds_m_per_s(), forest })
     }
 

@@ -27,6 +27,9 @@ pub struct ForestOptions {
     /// Whether the leaves keep their members, for quantiles.
     #[serde(default)]
     pub quantiles: bool,
+    /// Most rows that it learns from, evenly chosen; a forest that is only judged needs fewer.
+    #[serde(skip)]
+    pub most_rows: Option<usize>,
 }
 
 fn default_true() -> bool {
@@ -45,6 +48,7 @@ impl Default for ForestOptions {
             table: TableKind::Grid,
             bootstrap: true,
             quantiles: false,
+            most_rows: None,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::curves::interpolate_held;
+use super::curves::{interpolate_held, neighbours};
 use super::entry::ModelEntry;
 use super::{CaseCurve, QueryPoint, Surrogate};
 
@@ -26,15 +26,21 @@ pub(crate) struct Linear;
 impl Surrogate for Linear {
     fn force_n(&self, cases: &[CaseCurve], at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         let furthest = cases.iter().map(CaseCurve::end_m).fold(0.0, f64::max);
-        let at_deflection = |&d: &f64| {
+        let mut reaching: Vec<&CaseCurve> = Vec::with_capacity(cases.len());
+        let mut speeds: Vec<f64> = Vec::with_capacity(cases.len());
+        let mut at_deflection = |&d: &f64| {
             let d = d.min(furthest);
-            let points: Vec<(f64, f64)> = cases
-                .iter()
-                .filter(|c| c.reaches(d))
-                .map(|c| (c.speed_m_per_s, c.force_at(d)))
-                .collect();
-            interpolate_held(&points, at.speed_m_per_s).unwrap_or(f64::NAN)
+            reaching.clear();
+            reaching.extend(cases.iter().filter(|c| c.reaches(d)));
+            speeds.clear();
+            speeds.extend(reaching.iter().map(|c| c.speed_m_per_s));
+            if speeds.is_empty() {
+                return f64::NAN;
+            }
+            let (low, high, _) = neighbours(&speeds, at.speed_m_per_s);
+            let point = |i: usize| (speeds[i], reaching[i].force_at(d));
+            interpolate_held(&[point(low), point(high)], at.speed_m_per_s).unwrap_or(f64::NAN)
         };
-        deflection_m.iter().map(at_deflection).collect()
+        deflection_m.iter().map(&mut at_deflection).collect()
     }
 }

@@ -16,6 +16,7 @@ mod entry;
 mod extra;
 pub(crate) mod forest;
 mod forest_options;
+mod gaussian_process;
 pub(crate) mod leave_one_out;
 mod linear;
 pub(crate) mod max_crush;

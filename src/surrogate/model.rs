@@ -253,6 +253,18 @@ impl Model {
         self.fitted_body.is_some()
     }
 
+    /// The curves of a force at the two training speeds around `v` if the collapse changes its mode between them: a run
+    /// there may follow either.
+    pub(super) fn branches(&self, v: f64, force: ForceKind) -> impl Iterator<Item = &CaseCurve> {
+        let of_body = force != self.force_kind;
+        let curves = if of_body { &self.curves.body } else { &self.curves.declared };
+        let switch =
+            self.mode_switches_m_per_s.iter().find(|(below, above)| *below < v && v < *above);
+        curves.iter().filter(move |curve| {
+            switch.is_some_and(|(a, b)| [*a, *b].contains(&curve.speed_m_per_s))
+        })
+    }
+
     /// Makes its crush law one without stopped mass, in which the contact force itself has the rate.
     pub(crate) fn without_stopped_mass(&mut self) {
         if let Some(law) = &self.crush_law {

@@ -25,7 +25,7 @@ use crate::unit::{Speed, SpeedKind, UnitSystem};
 const FORMAT: &str = "crumple model";
 /// Version of the model files that this program writes and reads.
 pub(super) const VERSION: u32 = 4;
-/// Maximum number of bytes of a model file: a forest of 500 trees has some ten million.
+/// Maximum number of bytes of a model file: a forest of 50 trees has some millions, one of 200 runs a hundred.
 const MAX_BYTES: u64 = 1 << 30;
 
 /// What identifies a model file.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 pub(crate) use super::entry::ModelEntry;
 use super::forest_options::ForestOptions;
-use super::{crush_law_model, extra, forest, linear, nearest, rate};
+use super::{crush_law_model, extra, forest, gaussian_process, linear, nearest, rate};
 use crate::guess;
 
 /// Every model, in the order of the tables. To add one: write its file with an `ENTRY`, add its
@@ -14,14 +14,18 @@ use crate::guess;
 pub(crate) const MODELS: &[ModelEntry] = &[
     nearest::ENTRY,
     linear::ENTRY,
+    gaussian_process::ENTRY,
     rate::ENTRY,
     crush_law_model::ENTRY,
     extra::ENTRY,
     forest::ENTRY,
 ];
 
-/// Most trees of a forest that is fitted only to compare it with other models.
+/// Most trees of a forest that is judged with many runs.
 const CANDIDATE_TREES: usize = 50;
+
+/// Most rows of a forest that is judged with many runs: those of 20 curves of 400 points.
+const MOST_ROWS: usize = 8_000;
 
 /// Which model, with its options.
 #[derive(Clone, Copy)]
@@ -46,11 +50,13 @@ impl ModelKind {
         MODELS.iter().map(|entry| Self::of(entry, seed)).collect()
     }
 
-    /// Every model as leaving speeds out compares it: with forests of at most 50 trees, as the
-    /// reference method has: 500 take ten times as long to fit for every left-out speed.
-    pub fn candidates(seed: u64) -> Vec<Self> {
-        let fewer = |f: ForestOptions| ForestOptions { trees: f.trees.min(CANDIDATE_TREES), ..f };
-        Self::all(seed).into_iter().map(|kind| kind.with_forest(fewer)).collect()
+    /// The same to be judged where there are many runs: a forest of at most 50 trees on at most 8 000 rows.
+    pub(crate) fn judged(self) -> Self {
+        self.with_forest(|f| ForestOptions {
+            trees: f.trees.min(CANDIDATE_TREES),
+            most_rows: Some(MOST_ROWS),
+            ..f
+        })
     }
 
     /// The one run of the nearest speed (FDRM).
@@ -104,7 +110,11 @@ impl ModelKind {
 
     /// Whether it is the reference method's forest (DDTCM), whatever its seed.
     pub(crate) fn is_reference_method(&self) -> bool {
-        let paper = |f: ForestOptions| ForestOptions { seed: f.seed, ..ForestOptions::paper() };
+        let paper = |f: ForestOptions| ForestOptions {
+            seed: f.seed,
+            most_rows: f.most_rows,
+            ..ForestOptions::paper()
+        };
         self.name() == forest::ENTRY.name && self.forest.is_some_and(|f| f == paper(f))
     }
 }

@@ -219,7 +219,8 @@ impl<'a> Prediction<'a> {
         })
     }
 
-    /// The band around one force; what was reported for the other force is not repeated.
+    /// The band around one force, with both branches where the collapse changes its mode; what was reported for the other
+    /// force is not repeated.
     fn banded(&self, force: ForceKind, envelope: &Envelope, warnings: &mut Vec<Warning>) -> Banded {
         let asked = &self.motion.asked;
         let band = asked.model.band(&asked.at(), force).unwrap_or_else(|warning| {
@@ -228,7 +229,19 @@ impl<'a> Prediction<'a> {
             }
             None
         });
-        let (low_n, high_n) = band.map(|band| band.around(envelope.force_n())).unzip();
+        let edges = band.map(|band| {
+            let (mut low_n, mut high_n) = band.around(envelope.force_n());
+            for branch in asked.model.branches(asked.v, force) {
+                for (i, &d) in envelope.deflection_m().iter().enumerate() {
+                    if branch.reaches(d) {
+                        low_n[i] = low_n[i].min(branch.force_at(d).max(0.0));
+                        high_n[i] = high_n[i].max(branch.force_at(d));
+                    }
+                }
+            }
+            (low_n, high_n)
+        });
+        let (low_n, high_n) = edges.unzip();
         Banded { band, low_n, high_n }
     }
 

@@ -18,7 +18,7 @@ use serde_json::value::RawValue;
 use super::alignment::Alignment;
 use super::blend::{Blend, own_share};
 use super::cached::Cached;
-use super::curves::neighbours;
+use super::curves::{answering_at, neighbours};
 use super::entry::{ModelEntry, loaded};
 use super::{CaseCurve, QueryPoint, Surrogate};
 
@@ -70,6 +70,16 @@ struct Prepared {
     levels: Vec<f64>,
     /// What the runs have of their own, for [`Blend`].
     own: f64,
+    /// Along the deflections that were asked for first: each query follows the body's motion along the same.
+    along: Cached<Along>,
+}
+
+/// What a blend needs of the curves along deflections, whatever the speed.
+#[derive(Clone, Debug)]
+struct Along {
+    deflection_m: Vec<f64>,
+    /// At each deflection the `Q` of each curve in N, carried on beyond its end, and the share of it that is left.
+    curves: Vec<Vec<(f64, f64)>>,
 }
 
 /// Of the β that fits best, this is taken: two runs that overlap also differ by how they fold.
@@ -158,29 +168,44 @@ impl Rate {
         speed_m_per_s: f64,
         deflection_m: &[f64],
     ) -> Vec<f64> {
+        let cases = &*answering_at(cases, speed_m_per_s);
         let of = || cases.iter().map(|c| [c.speed_m_per_s, c.end_m(), c.envelope().work()]);
         let prepare = || {
             let alignment = self.alignment(cases);
             let curves = alignment.as_ref().map_or(cases, Alignment::curves);
             let levels = self.find_levels(curves);
             let own = self.of_impact.map_or(0.0, |of_impact| self.own_share(curves, of_impact));
-            Prepared { of: of().collect(), alignment, levels, own }
+            Prepared { of: of().collect(), alignment, levels, own, along: Cached::default() }
         };
         let kept = self.prepared.get_or_compute(prepare);
         let own;
-        let Prepared { alignment, levels, own, .. } = if kept.of.iter().copied().eq(of()) {
+        let Prepared { alignment, levels, own, along, .. } = if kept.of.iter().copied().eq(of()) {
             kept
         } else {
             own = prepare();
             &own
         };
-        let blended_n = |cases: &[CaseCurve], d: &[f64]| match self.of_impact {
-            Some(of_impact) => self.blended_n(cases, (levels, *own), of_impact, speed_m_per_s, d),
-            None => self.between_n(cases, levels, speed_m_per_s, d),
+        let Some(of_impact) = self.of_impact else {
+            let blended_n =
+                |cases: &[CaseCurve], d: &[f64]| self.between_n(cases, levels, speed_m_per_s, d);
+            return match alignment {
+                Some(alignment) => alignment.blended_n(speed_m_per_s, deflection_m, blended_n),
+                None => blended_n(cases, deflection_m),
+            };
         };
-        match alignment {
-            Some(alignment) => alignment.blended_n(speed_m_per_s, deflection_m, blended_n),
-            None => blended_n(cases, deflection_m),
+        let blended_n = |cases: &[CaseCurve], along: &Along| {
+            self.blended_n(cases, *own, of_impact, speed_m_per_s, along)
+        };
+        if let Some(alignment) = alignment {
+            return alignment.blended_n(speed_m_per_s, deflection_m, |cases, d| {
+                blended_n(cases, &self.along(cases, levels, d))
+            });
+        }
+        let kept = along.get_or_compute(|| self.along(cases, levels, deflection_m));
+        if kept.deflection_m == deflection_m {
+            blended_n(cases, kept)
+        } else {
+            blended_n(cases, &self.along(cases, levels, deflection_m))
         }
     }
 
@@ -232,10 +257,10 @@ impl Rate {
     fn blended_n(
         &self,
         cases: &[CaseCurve],
-        (levels, own): (&[f64], f64),
+        own: f64,
         of_impact: f64,
         speed_m_per_s: f64,
-        deflection_m: &[f64],
+        along: &Along,
     ) -> Vec<f64> {
         let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
         let v = speed_m_per_s.clamp(speeds[0], speeds[speeds.len() - 1]);
@@ -248,26 +273,37 @@ impl Rate {
                 of.iter().zip(&speeds).map(|(w, &s)| w * level / of_impact(s)).collect()
             })
             .collect();
-        let ends_m = furthest_m(cases);
         let mut now = vec![0.0; cases.len()];
-        let mut standing_n = |d: f64| {
-            let is_gone = |i: &usize| self.fading(ends_m[*i], d) == 0.0;
-            let first = (0..cases.len() - 1).rev().find(is_gone).map_or(0, |i| i + 1);
+        let mut standing_n = |curves: &[(f64, f64)]| {
+            let is_gone = |i: &usize| curves[*i].1 == 0.0;
+            let first = (0..curves.len() - 1).rev().find(is_gone).map_or(0, |i| i + 1);
             now.copy_from_slice(&weights[first]);
-            let ended = ends_m[first..].iter().take_while(|end_m| **end_m < d);
-            for (&end_m, faster) in ended.zip(&weights[first + 1..]) {
-                let fading = self.fading(end_m, d);
-                let fade = |(w, after): (&mut f64, &f64)| *w = fading * *w + (1.0 - fading) * after;
+            let ended = curves[first..].iter().take_while(|(_, left)| *left < 1.0);
+            for ((_, left), faster) in ended.zip(&weights[first + 1..]) {
+                let fade = |(w, after): (&mut f64, &f64)| *w = left * *w + (1.0 - left) * after;
                 now.iter_mut().zip(faster).for_each(fade);
             }
-            let (mut next_n, mut sum_n) = (0.0, 0.0);
-            for i in (first..cases.len()).rev() {
-                next_n = self.carried_n(cases, levels, i, d, next_n);
-                sum_n += now[i] * next_n;
-            }
+            let parts = (first..curves.len()).rev().map(|i| now[i] * curves[i].0);
+            let sum_n = parts.sum::<f64>();
             if sum_n < 0.0 { 0.0 } else { sum_n }
         };
-        deflection_m.iter().map(|&d| standing_n(d)).collect()
+        along.curves.iter().map(|curves| standing_n(curves)).collect()
+    }
+
+    /// The curves along deflections in m.
+    fn along(&self, cases: &[CaseCurve], levels: &[f64], deflection_m: &[f64]) -> Along {
+        let ends_m = furthest_m(cases);
+        let curves_at = |&d: &f64| {
+            let mut curves = vec![(0.0, 0.0); cases.len()];
+            let mut next_n = 0.0;
+            for i in (0..cases.len()).rev() {
+                next_n = self.carried_n(cases, levels, i, d, next_n);
+                curves[i] = (next_n, self.fading(ends_m[i], d));
+            }
+            curves
+        };
+        let curves = deflection_m.iter().map(curves_at).collect();
+        Along { deflection_m: deflection_m.to_vec(), curves }
     }
 
     /// What is left of a run at a deflection, as a share that fades beyond its end.

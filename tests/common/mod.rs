@@ -9,7 +9,7 @@ pub mod crash;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, OnceLock};
 
 use serde_json::Value;
@@ -138,14 +138,22 @@ impl Arguments for Vec<&str> {
     }
 }
 
+/// The program, to be run in `folder`.
+pub fn program(folder: &Path, arguments: &(impl Arguments + ?Sized)) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_crumple"));
+    command.args(arguments.words()).current_dir(folder);
+    command
+}
+
+/// Starts the program in `folder`; what it says on standard error is kept.
+pub fn crumple_started(folder: &Path, arguments: &(impl Arguments + ?Sized)) -> Child {
+    let mut command = program(folder, arguments);
+    command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
+}
+
 /// Runs the program in `folder`.
 pub fn crumple_in(folder: &Path, arguments: &(impl Arguments + ?Sized)) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_crumple"))
-        .args(arguments.words())
-        .env("SOURCE_DATE_EPOCH", DATE)
-        .current_dir(folder)
-        .output()
-        .unwrap()
+    program(folder, arguments).env("SOURCE_DATE_EPOCH", DATE).output().unwrap()
 }
 
 /// Runs the program in `folder`, which must exit with 0; returns its standard output.
@@ -173,6 +181,11 @@ pub fn says(text: &str, expected: &str) {
 
 pub fn json(text: &str) -> Value {
     serde_json::from_str(text).unwrap()
+}
+
+/// The JSON document of a file.
+pub fn read_json(path: &Path) -> Value {
+    json(&std::fs::read_to_string(path).unwrap())
 }
 
 /// What a failing command said: on standard error, and with --json as a document on standard output.

@@ -4,10 +4,8 @@ use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use crate::curate::{self, Joined, OnConflict};
-use crate::database::CasePath;
+use crate::curate::{self, Joined, JoinedCase, OnConflict};
 use crate::plural::counted;
-use serde::Serialize;
 
 use super::{Chosen, CommandResult, GlobalOptions, usage};
 
@@ -83,46 +81,18 @@ pub(super) fn copy(args: &CopyArgs, options: GlobalOptions) -> CommandResult {
     report(&joined, output, args.how.dry_run, options)
 }
 
-/// A case with its database, and what it is called now if that is another name.
-#[derive(Serialize)]
-struct CaseOrigin {
-    from: String,
-    case: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    now: Option<String>,
-}
-
-impl CaseOrigin {
-    fn own((path, case): &(PathBuf, CasePath)) -> Self {
-        Self { from: path.display().to_string(), case: case.to_string(), now: None }
-    }
-
-    fn other((path, case, now): &(PathBuf, CasePath, CasePath)) -> Self {
-        Self { now: Some(now.to_string()), ..Self::own(&(path.clone(), case.clone())) }
-    }
-}
-
 fn report(joined: &Joined, path: &Path, dry_run: bool, options: GlobalOptions) -> CommandResult {
     let outcome = options.warn_all(joined.not_taken.iter().map(|(from, items)| {
         let from = from.display();
         format!("{from} holds objects that crumple did not write and does not copy: {items}")
     }));
     let database = path.display().to_string();
-    let own = |cases: &[_]| cases.iter().map(CaseOrigin::own).collect::<Vec<_>>();
-    let other = |cases: &[_]| cases.iter().map(CaseOrigin::other).collect::<Vec<_>>();
-    let (added, replaced) = (own(&joined.added), own(&joined.replaced));
-    let (equal, renamed) = (other(&joined.equal), other(&joined.renamed));
-    let document = document! {
-        database: &database,
-        added: &added,
-        equal: &equal,
-        renamed: &renamed,
-        replaced: &replaced,
-        dry_run: dry_run,
-    };
+    let Joined { added, equal, renamed, replaced, .. } = joined;
+    let document =
+        document! { database: &database, #[serde(flatten)] joined: joined, dry_run: dry_run };
     options.show(&document, |out| {
-        print_together(out, "added", &added)?;
-        let (same, other): (Vec<&CaseOrigin>, Vec<&CaseOrigin>) =
+        print_together(out, "added", added)?;
+        let (same, other): (Vec<&JoinedCase>, Vec<&JoinedCase>) =
             equal.iter().partition(|case| case.now.as_ref() == Some(&case.case));
         print_together(out, "already present:", same)?;
         for (what, cases) in [
@@ -130,7 +100,7 @@ fn report(joined: &Joined, path: &Path, dry_run: bool, options: GlobalOptions) -
             ("renamed", renamed.iter().collect()),
             ("replaced", replaced.iter().collect()),
         ] {
-            for CaseOrigin { from, case, now } in cases {
+            for JoinedCase { from, case, now } in cases {
                 let now = now.as_ref().map_or(String::new(), |now| format!(" as {now}"));
                 writeln!(out, "{what} {case}{now} (of {from})")?;
             }
@@ -151,10 +121,10 @@ fn report(joined: &Joined, path: &Path, dry_run: bool, options: GlobalOptions) -
 fn print_together<'a>(
     out: &mut dyn Write,
     what: &str,
-    cases: impl IntoIterator<Item = &'a CaseOrigin>,
+    cases: impl IntoIterator<Item = &'a JoinedCase>,
 ) -> io::Result<()> {
     let mut groups: BTreeMap<(&str, &str), usize> = BTreeMap::new();
-    for CaseOrigin { from, case, .. } in cases {
+    for JoinedCase { from, case, .. } in cases {
         let group = case.split('/').next().unwrap_or_default();
         *groups.entry((from, group)).or_default() += 1;
     }

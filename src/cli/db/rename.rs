@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::list::{case_row, print_group};
-use super::{Chosen, CommandResult, GlobalOptions, Outcome, usage};
+use super::{Chosen, CommandResult, GlobalOptions, usage};
 use crate::curate::{self, Labels, Selection};
 use crate::database::CasePath;
 use crate::plural::counted;
@@ -38,8 +38,7 @@ pub(super) fn remove(args: &RemoveArgs, options: GlobalOptions) -> CommandResult
         }
         let did = if args.dry_run { "would remove" } else { "removed" };
         writeln!(out, "{did} {} from {database}", counted(cases.len(), "case"))
-    })?;
-    Ok(Outcome::Clean)
+    })
 }
 
 /// A database, and what of it is called how.
@@ -74,9 +73,7 @@ pub(super) fn rename(args: &RenameArgs, options: GlobalOptions) -> CommandResult
     };
     let document = document! { database: &database, from: &from, to: &to, cases: &cases };
     let count = counted(cases.len(), "case");
-    options
-        .show(&document, |out| writeln!(out, "renamed {from} to {to} in {database} ({count})"))?;
-    Ok(Outcome::Clean)
+    options.show(&document, |out| writeln!(out, "renamed {from} to {to} in {database} ({count})"))
 }
 
 /// Cases, and the tags that they get and lose.
@@ -168,6 +165,5 @@ fn run(
             }
         }
         writeln!(out, "wrote {database} ({})", counted(cases.len(), "case"))
-    })?;
-    Ok(Outcome::Clean)
+    })
 }

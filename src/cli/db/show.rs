@@ -140,8 +140,7 @@ fn compare(cases: &[&Case], options: GlobalOptions) -> CommandResult {
     let table = comparison.cases.iter().enumerate().fold(quantities, |table, (k, case)| {
         table.column(name(case), |(_, cell)| cell(case, k == 0))
     });
-    options.show(&comparison, |out| output::table(out, table))?;
-    Ok(Outcome::Clean)
+    options.show(&comparison, |out| output::table(out, table))
 }
 
 /// A quantity's name, and its cell for a case; the reference has no difference.

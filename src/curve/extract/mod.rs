@@ -239,7 +239,7 @@ pub enum MeasuredForce<'a> {
 }
 
 /// Settings of a run in the manifest.
-#[derive(Clone, Debug)]
+#[derive(Clone)]
 pub struct Setup<'a> {
     /// Of the force.
     pub filter: Filter,
@@ -262,7 +262,7 @@ pub struct Setup<'a> {
     /// Settings of the record in the run's entry.
     pub stated: Stated,
     /// Names and speeds of the study's other runs, to name what was mistaken for what.
-    pub others: &'a [(String, f64)],
+    pub others: &'a (dyn Fn() -> Vec<(String, f64)> + Sync),
 }
 
 /// What a run's entry states of its record, in the place of what would be found in it.

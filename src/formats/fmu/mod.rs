@@ -14,7 +14,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use super::thin::thinned;
-use super::{ExportCurve, Exported, Options};
+use super::{ExportCurve, Exported};
 use crate::error::{Error, error};
 use crate::formats::text::{escaped, identifier};
 use crate::multibody::ForceLaw;
@@ -120,26 +120,7 @@ fn token(spring: &Spring<'_>, version: FmiVersion, table: &Table) -> String {
 /// Points that an FMU's binary has room for.
 const MOST_POINTS: usize = 4096;
 
-pub(crate) fn write_fmi2(curve: &ExportCurve, options: &Options) -> Result<Exported, Error> {
-    write(curve, options, FmiVersion::Fmi2, "fmi2")
-}
-
-pub(crate) fn write_fmi3(curve: &ExportCurve, options: &Options) -> Result<Exported, Error> {
-    write(curve, options, FmiVersion::Fmi3, "fmi3")
-}
-
-fn write(
-    curve: &ExportCurve,
-    options: &Options,
-    version: FmiVersion,
-    format: &'static str,
-) -> Result<Exported, Error> {
-    if options.units.is_some() {
-        return Err(error!(
-            Export,
-            "{format} is always in SI: remove --units, or take a format that has units (csv, lsdyna, radioss, calculix, adams)"
-        ));
-    }
+pub(crate) fn write(curve: &ExportCurve, version: FmiVersion) -> Result<Exported, Error> {
     let mut notes = Vec::new();
     let points = curve.deflection_m().len();
     let thin;
@@ -171,7 +152,7 @@ fn write(
         notes.push("there is no linux64 binary, because no C compiler for it was found when crumple was built: on Linux the FMU must be compiled from its sources".into());
     }
     Ok(Exported {
-        files: vec![(format!("{}-{format}.fmu", curve.file_stem()), bytes)],
+        files: vec![(format!("{}-fmi{}.fmu", curve.file_stem(), version as u8 + 2), bytes)],
         notes,
         ..Exported::default()
     })

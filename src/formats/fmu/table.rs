@@ -2,7 +2,7 @@
 //! file.
 
 use crate::error::{Error, error};
-use crate::multibody::{ForceLaw, LawTables};
+use crate::multibody::{ForceLaw, StoredBy};
 use std::fmt::Write;
 
 /// Begins the block. `c/blank.c` has the same, and a test compares the rest of the layout.
@@ -35,9 +35,9 @@ pub(super) struct Table {
 
 impl Table {
     pub(super) fn new(law: &ForceLaw, token: &str) -> Result<Self, Error> {
-        let LawTables { deflection_m, force_n, slope_n_per_m, work_j, memory, .. } = law.tables();
-        let LawTables { shape_length, shape_force, shape_rest, .. } = law.tables();
-        let (points, shape_points) = (deflection_m.len(), shape_length.len());
+        let (envelope, shape) = (&law.envelope, &law.shape);
+        let deflection_m = envelope.deflection_m();
+        let (points, shape_points) = (deflection_m.len(), shape.length.len());
         if points > POINTS {
             return Err(error!(
                 Export,
@@ -50,25 +50,26 @@ impl Table {
                 "an FMU holds at most {SHAPE} points of an unloading branch, found {shape_points}"
             ));
         }
-        let (flags, numbers, dissipated_j) = match memory {
+        let (flags, numbers, mut dissipated) = match &law.memory {
             // Never read, but no divisor should be 0.
             None => (0, [1.0, 1.0, 0.5], Vec::new()),
             Some(memory) => (
-                HAS_MEMORY | if memory.is_by_mean_force { BY_MEAN_FORCE } else { 0 },
+                HAS_MEMORY
+                    | if memory.stored_by == StoredBy::MeanForce { BY_MEAN_FORCE } else { 0 },
                 [memory.stiffness_n_per_m, memory.steepest_n_per_m, memory.largest_share],
-                memory.dissipated_j.to_vec(),
+                memory.dissipated_j.clone(),
             ),
         };
-        let mut dissipated = dissipated_j;
         dissipated.resize(points, 0.0);
-        let [force, slope, work] = [force_n, slope_n_per_m, work_j].map(<[f64]>::to_vec);
+        let [force, slope, work] =
+            [envelope.force_n(), &law.slope_n_per_m, envelope.work_j()].map(<[f64]>::to_vec);
         let checks = [
             ("stiffness", &numbers[..]),
             ("force", &force),
             ("slope", &slope),
             ("work", &work),
             ("dissipated energy", &dissipated),
-            ("unloading branch", shape_rest),
+            ("unloading branch", &shape.rest),
         ];
         for (what, values) in checks {
             if values.iter().any(|v| !v.is_finite()) {
@@ -88,7 +89,7 @@ impl Table {
             token: bytes,
             numbers,
             envelope: [deflection_m.to_vec(), force, slope, work, dissipated],
-            shape: [shape_length, shape_force, shape_rest].map(<[f64]>::to_vec),
+            shape: [&shape.length, &shape.force, &shape.rest].map(Vec::clone),
         })
     }
 

@@ -2,9 +2,9 @@
 //!
 //! Layouts and rules: LS-DYNA Keyword User's Manual, volumes I (`*DEFINE_CURVE`) and II (`*MAT_S06`, `*MAT_S08`, `*MAT_121`).
 
-use super::text::{Lines, nine_digits, title};
+use super::text::{line, nine_digits, title};
 use super::{ExportCurve, Exported, NUMBER_OF_STATES, Options, TargetUnloading, run_time_s};
-use crate::error::{Error, error};
+use crate::error::Error;
 use crate::unit::UnitSystem;
 
 const TITLE_WIDTH: usize = 80;
@@ -52,41 +52,29 @@ impl InUnits {
     }
 }
 
-/// Numbers of one curve's parts in the deck.
-#[derive(Clone, Copy)]
-struct Ids {
-    loading: u32,
-    unloading: u32,
-    material: u32,
-}
-
 pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {
-    if options.deck && curves.len() != 1 {
-        let needs = format!("one curve for a deck of one mass, found {}", curves.len());
-        return Err(error!(Export, "{format} takes {needs}", format = "lsdyna --deck"));
-    }
-    let mut lines = Lines::default();
+    let mut lines = String::new();
     let mut notes = Vec::new();
-    lines.add(format_args!("*KEYWORD"));
+    line!(lines, "*KEYWORD");
     for (k, curve) in curves.iter().enumerate() {
         let curve = &curve.begun_at_origin()?;
         let units = curve.predicted.provenance.study_units;
         let units = InUnits(options.units.or(units).unwrap_or(UnitSystem::SI));
-        let first = options.id + 2 * k as u32;
-        let ids = Ids { loading: first, unloading: first + 1, material: first };
+        // Of the loading branch and of the material; that of the unloading is one more.
+        let id = options.id + 2 * k as u32;
         describe(&mut lines, curve, units);
         match options.material {
-            Material::S08 => inelastic(&mut lines, curve, units, ids),
-            Material::Mat121 => discrete_beam(&mut lines, curve, units, ids),
-            Material::S06 => general(&mut lines, curve, units, ids),
+            Material::S08 => inelastic(&mut lines, curve, units, id),
+            Material::Mat121 => discrete_beam(&mut lines, curve, units, id),
+            Material::S06 => general(&mut lines, curve, units, id),
         }
         notes.extend(note(curve, options.material));
         notes.extend(resampling_note(curve));
         if options.deck {
-            write_deck(&mut lines, curve, units, options.material, ids.material);
+            write_deck(&mut lines, curve, units, options.material, id);
         }
     }
-    lines.add(format_args!("*END"));
+    line!(lines, "*END");
     let name = format!("{}.k", curves.first().map_or("curves".into(), ExportCurve::file_stem));
     Ok(Exported { files: vec![(name, lines.into_bytes())], notes, ..Exported::default() })
 }
@@ -116,78 +104,64 @@ fn resampling_note(curve: &ExportCurve) -> Option<String> {
     })
 }
 
-fn describe(lines: &mut Lines, curve: &ExportCurve, units: InUnits) {
-    lines.add(format_args!("$ {}", units.stated()));
-    lines.add(format_args!(
+fn describe(lines: &mut String, curve: &ExportCurve, units: InUnits) {
+    line!(lines, "$ {}", units.stated());
+    line!(
+        lines,
         "$ unloading stiffness in these units: {}",
         nine_digits(units.stiffness(curve.stiffness_n_per_m()))
-    ));
+    );
     for (key, value) in curve.facts() {
-        lines.add(format_args!("$ {key}: {value}"));
+        line!(lines, "$ {key}: {value}");
     }
 }
 
 /// S08 takes the first quadrant and works in compression only (CTF 1).
-fn inelastic(lines: &mut Lines, curve: &ExportCurve, units: InUnits, ids: Ids) {
+fn inelastic(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u32) {
     let points = points(curve);
     let text = curve.headline();
-    define_curve(lines, (ids.loading, &text), &points, units, resampling(&points));
-    lines.add(format_args!("*MAT_SPRING_INELASTIC_TITLE"));
-    lines.add(format_args!("{}", title(&text, TITLE_WIDTH)));
-    lines.add(format_args!("$#     mid      lcfd        ku       ctf"));
-    lines.add(format_args!(
-        "{:>10}{:>10}{:>10}{:>10}",
-        ids.material,
-        ids.loading,
-        ten_columns(units.stiffness(curve.stiffness_n_per_m())),
-        "1.0"
-    ));
+    define_curve(lines, (id, &text), &points, units, resampling(&points));
+    let ku = ten_columns(units.stiffness(curve.stiffness_n_per_m()));
+    let text = title(&text, TITLE_WIDTH);
+    line!(lines, "*MAT_SPRING_INELASTIC_TITLE\n{text}");
+    line!(lines, "$#     mid      lcfd        ku       ctf");
+    line!(lines, "{id:>10}{id:>10}{ku:>10}       1.0");
 }
 
 /// MAT_121 takes compression in the third quadrant, unloads with K until the unloading curve,
 /// which has no force, and continues without force.
-fn discrete_beam(lines: &mut Lines, curve: &ExportCurve, units: InUnits, ids: Ids) {
+fn discrete_beam(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u32) {
     let points = third_quadrant(&points(curve));
     let text = curve.headline();
-    define_curve(lines, (ids.loading, &text), &points, units, resampling(&points));
+    define_curve(lines, (id, &text), &points, units, resampling(&points));
     let reach = points[0].0;
     let nothing = [(reach, 0.0), (0.0, 0.0), (-0.1 * reach, 0.0)];
-    define_curve(lines, (ids.unloading, &format!("{text} unloaded")), &nothing, units, 0);
-    lines.add(format_args!("*MAT_GENERAL_NONLINEAR_1DOF_DISCRETE_BEAM_TITLE"));
-    lines.add(format_args!("{}", title(&text, TITLE_WIDTH)));
-    lines.add(format_args!("$#     mid        ro         k   unldopt    offset     dampf"));
-    lines.add(format_args!(
-        "{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
-        ids.material,
-        // A discrete beam needs its own mass: with VOL 1, a millionth of the body's.
-        ten_columns(1e-6 * curve.predicted.mass_kg / units.0.mass_kg),
-        ten_columns(units.stiffness(curve.stiffness_n_per_m())),
-        "2.0",
-        "0.0",
-        "0.0"
-    ));
-    lines.add(format_args!("$#   lcidt    lcidtu    lcidtd    lcidte"));
-    lines.add(format_args!("{:>10}{:>10}{:>10}{:>10}", ids.loading, ids.unloading, 0, 0));
-    lines.add(format_args!("$#  utfail    ucfail        iu"));
-    lines.add(format_args!("{:>10}{:>10}{:>10}", "0.0", "0.0", "0.0"));
+    define_curve(lines, (id + 1, &format!("{text} unloaded")), &nothing, units, 0);
+    // A discrete beam needs its own mass: with VOL 1, a millionth of the body's.
+    let density = ten_columns(1e-6 * curve.predicted.mass_kg / units.0.mass_kg);
+    let k = ten_columns(units.stiffness(curve.stiffness_n_per_m()));
+    let (text, unloading) = (title(&text, TITLE_WIDTH), id + 1);
+    line!(lines, "*MAT_GENERAL_NONLINEAR_1DOF_DISCRETE_BEAM_TITLE\n{text}");
+    line!(lines, "$#     mid        ro         k   unldopt    offset     dampf");
+    line!(lines, "{id:>10}{density:>10}{k:>10}       2.0       0.0       0.0");
+    line!(lines, "$#   lcidt    lcidtu    lcidtd    lcidte");
+    line!(lines, "{id:>10}{unloading:>10}         0         0");
+    line!(lines, "$#  utfail    ucfail        iu\n       0.0       0.0       0.0");
 }
 
 /// S06 takes compression in the third quadrant. BETA 0: falling forces are followed.
-fn general(lines: &mut Lines, curve: &ExportCurve, units: InUnits, ids: Ids) {
+fn general(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u32) {
     let points = third_quadrant(&points(curve));
     let text = curve.headline();
-    define_curve(lines, (ids.loading, &text), &points, units, resampling(&points));
+    define_curve(lines, (id, &text), &points, units, resampling(&points));
     let highest = curve.loading.peak_force_n();
     let length = highest / curve.stiffness_n_per_m();
     let unloading = [(-length, -highest), (0.0, 0.0), (length, 0.0)];
-    define_curve(lines, (ids.unloading, &format!("{text} unloading")), &unloading, units, 0);
-    lines.add(format_args!("*MAT_SPRING_GENERAL_NONLINEAR_TITLE"));
-    lines.add(format_args!("{}", title(&text, TITLE_WIDTH)));
-    lines.add(format_args!("$#     mid      lcdl      lcdu      beta       tyi       cyi"));
-    lines.add(format_args!(
-        "{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
-        ids.material, ids.loading, ids.unloading, "0.0", "0.0", "0.0"
-    ));
+    define_curve(lines, (id + 1, &format!("{text} unloading")), &unloading, units, 0);
+    let (text, unloading) = (title(&text, TITLE_WIDTH), id + 1);
+    line!(lines, "*MAT_SPRING_GENERAL_NONLINEAR_TITLE\n{text}");
+    line!(lines, "$#     mid      lcdl      lcdu      beta       tyi       cyi");
+    line!(lines, "{id:>10}{id:>10}{unloading:>10}       0.0       0.0       0.0");
 }
 
 /// Deflection in m and force in N of each point. They begin at the origin, otherwise LS-DYNA extrapolates the
@@ -205,24 +179,24 @@ fn third_quadrant(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 fn define_curve(
-    lines: &mut Lines,
+    lines: &mut String,
     (id, text): (u32, &str),
     points: &[(f64, f64)],
     units: InUnits,
     resampling: usize,
 ) {
-    lines.add(format_args!("*DEFINE_CURVE_TITLE"));
-    lines.add(format_args!("{}", title(text, TITLE_WIDTH)));
-    lines.add(format_args!(
+    line!(lines, "*DEFINE_CURVE_TITLE\n{}", title(text, TITLE_WIDTH));
+    line!(
+        lines,
         "$#    lcid      sidr       sfa       sfo      offa      offo    dattyp     lcint"
-    ));
-    lines.add(format_args!(
-        "{id:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}{resampling:>10}",
-        0, "1.0", "1.0", "0.0", "0.0", 0
-    ));
-    lines.add(format_args!("$#                a1                  o1"));
+    );
+    line!(
+        lines,
+        "{id:>10}         0       1.0       1.0       0.0       0.0         0{resampling:>10}"
+    );
+    line!(lines, "$#                a1                  o1");
     for &(d, f) in points {
-        lines.add(format_args!("{:>20}{:>20}", units.length(d), units.force(f)));
+        line!(lines, "{:>20}{:>20}", units.length(d), units.force(f));
     }
 }
 
@@ -243,7 +217,7 @@ fn ten_columns(value: f64) -> String {
 
 /// Everything besides curves and material. The moving body is node 2 at +x and moves towards −x.
 pub(crate) fn write_deck(
-    lines: &mut Lines,
+    lines: &mut String,
     curve: &ExportCurve,
     units: InUnits,
     material: Material,
@@ -253,89 +227,76 @@ pub(crate) fn write_deck(
     // Free length: more than any crush, so that the nodes never pass each other.
     let length = 1.2 * curve.loading.end_m() / system.length_m;
     let end = run_time_s(curve) / system.time_s;
-    let number = |value: f64| nine_digits(value);
-    lines.add(format_args!("*TITLE"));
-    lines.add(format_args!("{}", title(&format!("one mass on {}", curve.headline()), TITLE_WIDTH)));
-    lines.add(format_args!("*CONTROL_TERMINATION"));
-    lines.add(format_args!("$#  endtim"));
-    lines.add(format_args!("{:>10}", fixed(end)));
-    lines.add(format_args!("*CONTROL_TIMESTEP"));
-    lines.add(format_args!("$#  dtinit    tssfac"));
-    lines.add(format_args!("{:>10}{:>10}", "0.0", "0.1"));
+    let text = curve.headline();
+    line!(lines, "*TITLE\n{}", title(&format!("one mass on {text}"), TITLE_WIDTH));
+    line!(lines, "*CONTROL_TERMINATION\n$#  endtim\n{:>10}", fixed(end));
+    line!(lines, "*CONTROL_TIMESTEP\n$#  dtinit    tssfac\n       0.0       0.1");
     for file in ["NODOUT", "DEFORC", "GLSTAT"] {
-        lines.add(format_args!("*DATABASE_{file}"));
-        lines.add(format_args!("{:>10.3e}", end / NUMBER_OF_STATES));
+        line!(lines, "*DATABASE_{file}\n{:>10.3e}", end / NUMBER_OF_STATES);
     }
-    lines.add(format_args!("*DATABASE_HISTORY_NODE"));
-    lines.add(format_args!("{:>10}{:>10}", 1, 2));
-    lines.add(format_args!("*NODE"));
-    lines.add(format_args!("{:>8}{:>16}{:>16}{:>16}", 1, "0.0", "0.0", "0.0"));
-    lines.add(format_args!("{:>8}{:>16}{:>16}{:>16}", 2, number(length), "0.0", "0.0"));
-    lines.add(format_args!("*PART"));
-    lines.add(format_args!("{}", title(&curve.headline(), TITLE_WIDTH)));
-    lines.add(format_args!("$#     pid     secid       mid"));
-    lines.add(format_args!("{:>10}{:>10}{material_id:>10}", 1, 1));
+    line!(lines, "*DATABASE_HISTORY_NODE\n         1         2\n*NODE");
+    for (node, x) in [(1, "0.0".into()), (2, nine_digits(length))] {
+        line!(lines, "{node:>8}{x:>16}             0.0             0.0");
+    }
+    line!(lines, "*PART\n{}", title(&text, TITLE_WIDTH));
+    line!(lines, "$#     pid     secid       mid\n         1         1{material_id:>10}");
     match material {
-        Material::S08 | Material::S06 => discrete_element(lines),
-        Material::Mat121 => beam_element(lines),
+        Material::S08 | Material::S06 => *lines += DISCRETE_ELEMENT,
+        Material::Mat121 => *lines += BEAM_ELEMENT,
     }
     masses(lines, curve, units);
     supports(lines, curve, units);
 }
 
 /// Section and element of S06 and S08.
-fn discrete_element(lines: &mut Lines) {
-    lines.add(format_args!("*SECTION_DISCRETE"));
-    lines.add(format_args!("$#   secid       dro        kd        v0        cl        fd"));
-    lines.add(format_args!(
-        "{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
-        1, 0, "0.0", "0.0", "0.0", "0.0"
-    ));
-    lines.add(format_args!("$#     cdl       tdl"));
-    lines.add(format_args!("{:>10}{:>10}", "0.0", "0.0"));
-    lines.add(format_args!("*ELEMENT_DISCRETE"));
-    lines.add(format_args!("$#   eid     pid      n1      n2     vid               s"));
-    lines.add(format_args!("{:>8}{:>8}{:>8}{:>8}{:>8}{:>16}", 1, 1, 1, 2, 0, "1.0"));
-}
+const DISCRETE_ELEMENT: &str = "\
+*SECTION_DISCRETE
+$#   secid       dro        kd        v0        cl        fd
+         1         0       0.0       0.0       0.0       0.0
+$#     cdl       tdl
+       0.0       0.0
+*ELEMENT_DISCRETE
+$#   eid     pid      n1      n2     vid               s
+       1       1       1       2       0             1.0
+";
 
 /// Section and element of MAT_121: ELFORM 6 is a discrete beam, SCOOR 2 keeps its axis along the nodes.
-fn beam_element(lines: &mut Lines) {
-    lines.add(format_args!("*SECTION_BEAM"));
-    lines.add(format_args!("$#   secid    elform      shrf   qr/irid       cst     scoor"));
-    lines.add(format_args!("{:>10}{:>10}{:>10}{:>10}{:>10}{:>10}", 1, 6, "1.0", 2, 0, "2.0"));
-    lines.add(format_args!("$#     vol      iner       cid        ca    offset"));
-    lines.add(format_args!("{:>10}{:>10}{:>10}{:>10}{:>10}", "1.0", "1.0e-6", 0, "0.0", "0.0"));
-    lines.add(format_args!("*ELEMENT_BEAM"));
-    lines.add(format_args!("$#   eid     pid      n1      n2      n3"));
-    lines.add(format_args!("{:>8}{:>8}{:>8}{:>8}{:>8}", 1, 1, 1, 2, 0));
-}
+const BEAM_ELEMENT: &str = "\
+*SECTION_BEAM
+$#   secid    elform      shrf   qr/irid       cst     scoor
+         1         6       1.0         2         0       2.0
+$#     vol      iner       cid        ca    offset
+       1.0    1.0e-6         0       0.0       0.0
+*ELEMENT_BEAM
+$#   eid     pid      n1      n2      n3
+       1       1       1       2       0
+";
 
-fn masses(lines: &mut Lines, curve: &ExportCurve, units: InUnits) {
-    let mass = |kg: f64| nine_digits(kg / units.0.mass_kg);
-    lines.add(format_args!("*ELEMENT_MASS"));
-    lines.add(format_args!("$#   eid     nid            mass"));
-    lines.add(format_args!("{:>8}{:>8}{:>16}", 2, 2, mass(curve.predicted.mass_kg)));
-    if let Some(other) = curve.other_mass_kg() {
-        lines.add(format_args!("{:>8}{:>8}{:>16}", 3, 1, mass(other)));
+fn masses(lines: &mut String, curve: &ExportCurve, units: InUnits) {
+    line!(lines, "*ELEMENT_MASS\n$#   eid     nid            mass");
+    let masses = [(2, 2, Some(curve.predicted.mass_kg)), (3, 1, curve.other_mass_kg())];
+    for (element, node, mass) in masses {
+        let Some(mass) = mass else { continue };
+        line!(lines, "{element:>8}{node:>8}{:>16}", nine_digits(mass / units.0.mass_kg));
     }
 }
 
 /// Speed of the moving body, and the constraints that guide both.
-fn supports(lines: &mut Lines, curve: &ExportCurve, units: InUnits) {
-    let speed = curve.predicted.speed_m_per_s / units.0.speed();
-    lines.add(format_args!("*INITIAL_VELOCITY_NODE"));
-    lines.add(format_args!("$#     nid        vx        vy        vz"));
-    lines.add(format_args!("{:>10}{:>10}{:>10}{:>10}", 2, fixed(-speed), "0.0", "0.0"));
-    lines.add(format_args!("*BOUNDARY_SPC_NODE"));
-    lines.add(format_args!(
+fn supports(lines: &mut String, curve: &ExportCurve, units: InUnits) {
+    let speed = fixed(-curve.predicted.speed_m_per_s / units.0.speed());
+    line!(lines, "*INITIAL_VELOCITY_NODE\n$#     nid        vx        vy        vz");
+    line!(lines, "         2{speed:>10}       0.0       0.0");
+    line!(lines, "*BOUNDARY_SPC_NODE");
+    line!(
+        lines,
         "$#     nid       cid      dofx      dofy      dofz     dofrx     dofry     dofrz"
-    ));
+    );
     let free = usize::from(curve.other_mass_kg().is_none());
     for (node, along) in [(1, free), (2, 0)] {
-        lines.add(format_args!(
-            "{node:>10}{:>10}{along:>10}{:>10}{:>10}{:>10}{:>10}{:>10}",
-            0, 1, 1, 1, 1, 1
-        ));
+        line!(
+            lines,
+            "{node:>10}         0{along:>10}         1         1         1         1         1"
+        );
     }
 }
 

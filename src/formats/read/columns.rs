@@ -6,9 +6,8 @@ use crate::guess;
 use std::cmp::Ordering;
 
 use super::MIN_POINTS;
-use super::curve::{Metadata, Place, ReadCurve, ReadFile, shown};
+use super::curve::{Place, ReadCurve, shown};
 use crate::curve::{Envelope, ForceCurve};
-use crate::unit::UnitSystem;
 
 /// Maximum number of points of a curve: guards memory. Test records have some ten thousand.
 pub(super) const MAX_POINTS: usize = 1_000_000;
@@ -88,56 +87,7 @@ const STEP_WIDTH_SHARE: f64 = 1e-4;
 /// Jumps of the force that a note names.
 const STEPS: usize = 3;
 
-/// Columns in SI, in the order and with the signs of the file.
-#[derive(Clone, Debug)]
-pub(super) struct Columns {
-    pub deflection_m: Vec<f64>,
-    pub force_n: Vec<f64>,
-    pub time_s: Option<Vec<f64>>,
-    /// Place of each point, for messages.
-    pub places: Places,
-    pub facts: Metadata,
-    pub title: Option<String>,
-    pub units: Option<UnitSystem>,
-    pub notes: Vec<String>,
-    /// Files that were read besides the given one.
-    pub files: Vec<ReadFile>,
-}
-
-/// Places of the points of a curve.
-#[derive(Clone, Debug)]
-pub(super) enum Places {
-    Lines(Vec<u64>),
-    Rows,
-}
-
-impl Places {
-    fn of(&self, point: usize) -> Place {
-        match self {
-            Self::Lines(lines) => {
-                lines.get(point).map_or(Place::Row(point + 1), |l| Place::Line(*l))
-            }
-            Self::Rows => Place::Row(point + 1),
-        }
-    }
-}
-
-impl Columns {
-    /// No points yet.
-    pub(super) fn at(places: Places) -> Self {
-        Self {
-            deflection_m: Vec::new(),
-            force_n: Vec::new(),
-            time_s: None,
-            places,
-            facts: Metadata::default(),
-            title: None,
-            units: None,
-            notes: Vec::new(),
-            files: Vec::new(),
-        }
-    }
-
+impl ReadCurve {
     /// The curve that drives an interface, without any change: increasing deflections from 0, forces of 0 or above.
     pub(super) fn as_they_stand(&self) -> Result<ForceCurve, Error> {
         let envelope = Envelope::new(self.deflection_m.clone(), self.force_n.clone())?;
@@ -150,9 +100,12 @@ impl Columns {
         }
     }
 
-    /// The curve of these columns. A record over time keeps its signs, which follow from its motion.
-    pub(super) fn curve(mut self) -> Result<ReadCurve, Error> {
+    /// The curve of the columns as they are in the file. A record over time keeps its signs, which follow from its motion.
+    pub(super) fn sorted(mut self) -> Result<Self, Error> {
         let points = self.force_n.len();
+        if self.is_ready {
+            return Ok(self);
+        }
         if points < MIN_POINTS {
             return Err(too_few(points, ""));
         }
@@ -163,17 +116,11 @@ impl Columns {
             let table = points.loading_then_unloading(crush_m, &mut self.notes)?;
             (self.deflection_m, self.force_n) = table.iter().map(|p| (p.d, p.f)).unzip();
         }
-        Ok(ReadCurve {
-            deflection_m: self.deflection_m,
-            force_n: self.force_n,
-            time_s: self.time_s,
-            body_force_n: None,
-            facts: self.facts,
-            title: self.title,
-            units: self.units,
-            notes: self.notes,
-            files: self.files,
-        })
+        Ok(self)
+    }
+
+    fn place(&self, point: usize) -> Place {
+        self.lines.get(point).map_or(Place::Row(point + 1), |line| Place::Line(*line))
     }
 
     fn check_finite(&self) -> Result<(), Error> {
@@ -185,7 +132,7 @@ impl Columns {
         for (what, values) in columns {
             let Some(values) = values else { continue };
             if let Some(i) = values.iter().position(|v| !v.is_finite()) {
-                let place = self.places.of(i);
+                let place = self.place(i);
                 return Err(error!(
                     CurveFile,
                     "{place}: the {what} is {value}: expected a finite number",
@@ -221,11 +168,11 @@ fn largest(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl Points {
-    fn of(columns: &Columns) -> Self {
+    fn of(columns: &ReadCurve) -> Self {
         let most = |values: &[f64]| largest(values.iter().copied()).abs();
         let most = (most(&columns.deflection_m), most(&columns.force_n));
         let pairs = columns.deflection_m.iter().zip(&columns.force_n).enumerate();
-        let list = pairs.map(|(i, (&d, &f))| Point { d, f, place: columns.places.of(i) }).collect();
+        let list = pairs.map(|(i, (&d, &f))| Point { d, f, place: columns.place(i) }).collect();
         Self { list, most }
     }
 
@@ -479,9 +426,10 @@ mod tests {
 
     /// Points and notes of a table, or its error.
     fn sorted_loading(points: &[(f64, f64)]) -> Result<(Vec<(f64, f64)>, usize), String> {
-        let mut columns = Columns::at(Places::Lines((1..=points.len() as u64).collect()));
+        let mut columns =
+            ReadCurve { lines: (1..=points.len() as u64).collect(), ..ReadCurve::default() };
         (columns.deflection_m, columns.force_n) = points.iter().copied().unzip();
-        let curve = columns.curve().map_err(|e| e.to_string())?;
+        let curve = columns.sorted().map_err(|e| e.to_string())?;
         let points = curve.deflection_m.into_iter().zip(curve.force_n).collect();
         Ok((points, curve.notes.len()))
     }
@@ -514,10 +462,10 @@ mod tests {
     fn points_beyond_the_stated_crush_are_removed() {
         let points = [(0.0, 0.0), (1.0, 5.0), (2.0, 3.0), (3.0, 3.0), (4.0, 1.0), (6.0, 9.0)];
         for (crush_m, end) in [(3.0, (3.0, 3.0)), (3.5, (3.5, 2.0))] {
-            let mut columns = Columns::at(Places::Rows);
+            let mut columns = ReadCurve::default();
             (columns.deflection_m, columns.force_n) = points.iter().copied().unzip();
             columns.facts.max_deflection_m = Some(crush_m);
-            let curve = columns.curve().unwrap();
+            let curve = columns.sorted().unwrap();
             let last = (curve.deflection_m.last(), curve.force_n.last());
             assert_eq!(last, (Some(&end.0), Some(&end.1)));
             assert!(curve.notes[0].starts_with("points: 2 removed beyond the maximum crush"));
@@ -528,9 +476,10 @@ mod tests {
     #[test]
     fn points_of_one_deflection_are_set_apart() {
         fn t(points: &[(f64, f64)], expected: &[(f64, f64)], note: &str) {
-            let mut columns = Columns::at(Places::Lines((1..=points.len() as u64).collect()));
+            let mut columns =
+                ReadCurve { lines: (1..=points.len() as u64).collect(), ..ReadCurve::default() };
             (columns.deflection_m, columns.force_n) = points.iter().copied().unzip();
-            let curve = columns.curve().unwrap();
+            let curve = columns.sorted().unwrap();
             let found = curve.deflection_m.iter().zip(&curve.force_n);
             for ((d, f), (de, fe)) in found.zip(expected) {
                 assert!((d - de).abs() < 1e-12 && f == fe, "{points:?}: {curve:?}");

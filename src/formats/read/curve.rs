@@ -1,12 +1,15 @@
 //! A curve as in its file, in SI, with the metadata of the file.
 
 use crate::error::{Error, error};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::encoding::number;
 use crate::curve::contact::{THRESHOLD, onset, threshold_n};
 use crate::curve::loading::loading_branch;
-use crate::curve::{Curve, CurveUnloading, Envelope, ForceCurve, ForceKind, unloading_stiffness};
+use crate::curve::{
+    Curve, CurveUnloading, Envelope, ForceCurve, ForceKind, SourceFile, unloading_stiffness,
+};
+use crate::file::absolute;
 use crate::unit::{SpeedKind, UnitSystem};
 use std::fmt;
 
@@ -32,7 +35,11 @@ pub struct ReadCurve {
     /// How it was read.
     pub notes: Vec<String>,
     /// The files that were read.
-    pub files: Vec<ReadFile>,
+    pub files: Vec<SourceFile>,
+    /// Line of each point, for messages; empty for a file without lines.
+    pub(super) lines: Vec<u64>,
+    /// Whether signs and order are those of a curve: it is a predicted one.
+    pub(super) is_ready: bool,
 }
 
 impl ReadCurve {
@@ -84,23 +91,17 @@ impl ReadCurve {
 }
 
 /// A file as it was read.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ReadFile {
-    /// As it was given, or found from what was.
-    pub path: PathBuf,
-    /// Bytes that were read.
-    pub size_bytes: u64,
-    /// Their hash, in hexadecimal.
-    pub blake3: String,
-}
-
-impl ReadFile {
-    pub(super) fn of(path: &Path, bytes: &[u8]) -> Self {
-        Self {
-            path: path.into(),
-            size_bytes: bytes.len() as u64,
-            blake3: blake3::hash(bytes).to_hex().to_string(),
-        }
+pub(super) fn source_file(path: &Path, bytes: &[u8]) -> SourceFile {
+    SourceFile {
+        path: path.display().to_string(),
+        absolute_path: Some(absolute(path)),
+        size_bytes: bytes.len() as u64,
+        blake3: blake3::hash(bytes).to_hex().to_string(),
+        format: String::new(),
+        solver: None,
+        version: None,
+        title: None,
+        problems: 0,
     }
 }
 
@@ -236,15 +237,18 @@ pub(super) fn content(path: &Path) -> impl Fn(Error) -> Error {
 /// A place in a file, counted from 1; bytes from 0.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Place {
-    /// A whole line.
     Line(u64),
     /// A field of a line whose fields are separated.
-    Field { line: u64, field: usize },
-    /// Columns of a line.
-    Columns { line: u64, from: usize, to: usize },
-    /// A byte of a binary file.
+    Field {
+        line: u64,
+        field: usize,
+    },
+    Columns {
+        line: u64,
+        from: usize,
+        to: usize,
+    },
     Byte(usize),
-    /// A row of a table or matrix.
     Row(usize),
 }
 

@@ -1,7 +1,7 @@
 //! What curves in solver decks share: comments with metadata, points of two fields, fields of a line.
 
-use super::columns::{Columns, Places, check_points};
-use super::curve::{Metadata, Place, expected, stated_units, title, units, value};
+use super::columns::check_points;
+use super::curve::{Metadata, Place, ReadCurve, expected, stated_units, title, units, value};
 use crate::error::Error;
 use crate::unit::UnitSystem;
 
@@ -52,17 +52,18 @@ impl DeckCurve {
         mut self,
         given: Option<UnitSystem>,
         remedy: &'static str,
-    ) -> Result<Columns, Error> {
+    ) -> Result<ReadCurve, Error> {
         let system = units(self.said.units, given, remedy, &mut self.notes)?;
         let (length, force) = (system.length_m, system.force());
-        Ok(Columns {
+        Ok(ReadCurve {
             deflection_m: self.points.iter().map(|(x, _)| x * length).collect(),
             force_n: self.points.iter().map(|(_, y)| y * force).collect(),
             facts: self.said.facts,
             title: title(&self.title, &mut self.notes),
             units: Some(system),
             notes: self.notes,
-            ..Columns::at(Places::Lines(self.lines))
+            lines: self.lines,
+            ..ReadCurve::default()
         })
     }
 }

@@ -8,11 +8,14 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::columns::{Columns, LISTED, Places, check_points, no_curve, several_curves};
-use super::curve::{CUT, Metadata, Place, ReadFile, expected, miscounted, shown, title, value};
+use super::columns::{LISTED, check_points, no_curve, several_curves};
+use super::curve::{
+    CUT, Metadata, Place, ReadCurve, expected, miscounted, shown, source_file, title, value,
+};
 use super::encoding::{decoded, lines, number};
 use super::label::Quantity;
 use super::{Input, MAX_CURVE_BYTES};
+use crate::curve::SourceFile;
 use crate::error::{Error, error};
 use crate::file;
 use crate::signal::interpolate;
@@ -57,8 +60,8 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
         || lines(input.beginning()).any(|(_, line)| is_header(line))
 }
 
-pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
-    let mut columns = Columns::at(Places::Rows);
+pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
+    let mut columns = ReadCurve::default();
     test_facts(input, &mut columns)?;
     let (mut found, mut bytes_left) = (Vec::new(), MAX_CURVE_BYTES);
     for path in channel_files(input.path)? {
@@ -79,7 +82,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     for channel in [&deflection, &force] {
         let (code, what) = (&channel.code, channel.quantity.name());
         columns.notes.push(format!("{what}: channel {code} in {}", channel.unit));
-        if channel.file.path != input.path {
+        if channel.file.path != input.path.display().to_string() {
             columns.files.push(channel.file.clone());
         }
     }
@@ -90,7 +93,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
         columns.deflection_m = deflection.values;
         columns.force_n = force.values;
         columns.time_s = Some(at_s);
-        columns.places = Places::Lines(force.lines);
+        columns.lines = force.lines;
         return Ok(columns);
     }
     let (from_s, to_s) = (motion_s.first().copied(), motion_s.last().copied());
@@ -107,14 +110,14 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
         time_s.len()
     ));
     columns.force_n = common.iter().map(|&i| force.values[i]).collect();
-    columns.places = Places::Lines(common.iter().map(|&i| force.lines[i]).collect());
+    columns.lines = common.iter().map(|&i| force.lines[i]).collect();
     columns.deflection_m.truncate(time_s.len());
     columns.time_s = Some(time_s);
     Ok(columns)
 }
 
 /// Reads the `.mme` file of the test: that of the folder, or the given one.
-fn test_facts(input: &Input<'_>, columns: &mut Columns) -> Result<(), Error> {
+fn test_facts(input: &Input<'_>, columns: &mut ReadCurve) -> Result<(), Error> {
     if !input.path.is_dir() {
         described(input.text, &mut columns.facts);
         return comments(input.text, &mut columns.facts);
@@ -123,7 +126,7 @@ fn test_facts(input: &Input<'_>, columns: &mut Columns) -> Result<(), Error> {
         return Ok(());
     };
     let bytes = file::read(&path, MAX_CURVE_BYTES)?;
-    columns.files.push(ReadFile::of(&path, &bytes));
+    columns.files.push(source_file(&path, &bytes));
     let text = decoded(&bytes).text;
     described(&text, &mut columns.facts);
     comments(&text, &mut columns.facts)
@@ -222,7 +225,7 @@ struct Channel {
     values: Vec<f64>,
     lines: Vec<u64>,
     facts: Metadata,
-    file: ReadFile,
+    file: SourceFile,
 }
 
 /// The times of a channel's values.
@@ -249,7 +252,7 @@ impl Channel {
             (true, [only]) => Some(only),
             _ => channels.iter().find(is_wanted),
         };
-        let file = self.file.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let file = Path::new(&self.file.path).file_name().unwrap_or_default().to_string_lossy();
         let named = |source| error!(CurveFile, "{file}: {source}").caused_by(source);
         let Some(found) = found else {
             let known: Vec<&str> = channels.iter().map(|c| &*c.code).take(LISTED).collect();
@@ -287,7 +290,7 @@ impl Channel {
 
     /// The channel of a file; `None` if it is of another dimension.
     fn read(path: &Path, bytes: &[u8]) -> Result<Option<Self>, Error> {
-        let file = ReadFile::of(path, bytes);
+        let file = source_file(path, bytes);
         let bytes = &decoded(bytes).text;
         let header = Header::read(bytes);
         let code = header.text("channel code");

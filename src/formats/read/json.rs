@@ -15,18 +15,19 @@ use crate::unit::UnitSystem;
 
 /// Reads a predicted curve and checks its promises.
 pub(crate) fn predicted(path: &Path) -> Result<PredictedCurve, Error> {
-    let bytes = file::read(path, MAX_CURVE_BYTES).map_err(|source| {
-        error!(CurveFile, "{path}: {source}", path = path.display()).caused_by(source)
-    })?;
-    parse(path, &bytes)
+    let bytes = file::read(path, MAX_CURVE_BYTES).map_err(|e| curve::content(path)(e.into()))?;
+    parse(&bytes).map_err(curve::content(path))
 }
 
-fn parse(path: &Path, bytes: &[u8]) -> Result<PredictedCurve, Error> {
-    let curve: PredictedCurve = serde_json::from_slice(bytes)
-        .map_err(|source| error!(CurveFile, "{path}: this is not a predicted curve ({source}): give a JSON file made by crumple predict", path = path.display()).caused_by(source))?;
-    curve.envelope().map_err(|source| {
-        error!(CurveFile, "{path}: {source}", path = path.display()).caused_by(source)
+fn parse(bytes: &[u8]) -> Result<PredictedCurve, Error> {
+    let curve: PredictedCurve = serde_json::from_slice(bytes).map_err(|source| {
+        error!(
+            CurveFile,
+            "this is not a predicted curve ({source}): give a JSON file made by crumple predict"
+        )
+        .caused_by(source)
     })?;
+    curve.envelope()?;
     Ok(curve)
 }
 
@@ -38,18 +39,15 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
 /// The declared force, with the body force if the file has both; or the force that was
 /// asked for, alone.
 pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
-    let damaged = |source| {
-        error!(CurveFile, "{path}: {source}", path = input.path.display()).caused_by(source)
-    };
-    let mut curve = parse(input.path, input.text.as_bytes())?;
+    let mut curve = parse(input.text.as_bytes())?;
     let both = curve.body_force_n.is_some();
     let mut notes = vec!["units: SI, as all JSON files of crumple predict".into()];
     if let Some(asked) = input.options.force {
-        curve = curve.of_force(asked).map_err(damaged)?;
+        curve = curve.of_force(asked)?;
     }
     let points = curve.deflection_m.len();
     if points < MIN_POINTS {
-        return Err(curve::content(input.path)(too_few(points, "")));
+        return Err(too_few(points, ""));
     }
     if both {
         notes.push(match curve.body_force_n {
@@ -83,6 +81,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
         facts,
         units: Some(UnitSystem::SI),
         notes,
+        is_ready: true,
         ..ReadCurve::default()
     })
 }

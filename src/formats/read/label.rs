@@ -30,38 +30,39 @@ struct Terms {
     ending: Option<&'static str>,
 }
 
-const DEFLECTION: Terms = Terms {
-    name: "deflection",
-    example: "d_m or d_mm",
-    option: "--deflection-column",
-    dimension: &LENGTH,
-    stated: "length displacement",
-    names: "d x s u xdisplacement",
-    words: "deflection displacement disp crush stroke compression deformation intrusion travel extension weg verschiebung verformung stauchung",
-    ending: Some("weg"),
-};
-
-const LOAD: Terms = Terms {
-    name: "force",
-    example: "force_N or force_kN",
-    option: "--force-column",
-    dimension: &FORCE,
-    stated: "force",
-    names: "f fx fy fz contactforce bodyforce normalforce xforce",
-    words: "force load kraft",
-    ending: Some("kraft"),
-};
-
-const TIMES: Terms = Terms {
-    name: "time",
-    example: "t_s or t_ms",
-    option: "--time-column",
-    dimension: &TIME,
-    stated: "time",
-    names: "t",
-    words: "time zeit",
-    ending: None,
-};
+/// By quantity.
+static TERMS: [Terms; 3] = [
+    Terms {
+        name: "deflection",
+        example: "d_m or d_mm",
+        option: "--deflection-column",
+        dimension: &LENGTH,
+        stated: "length displacement",
+        names: "d x s u xdisplacement",
+        words: "deflection displacement disp crush stroke compression deformation intrusion travel extension weg verschiebung verformung stauchung",
+        ending: Some("weg"),
+    },
+    Terms {
+        name: "force",
+        example: "force_N or force_kN",
+        option: "--force-column",
+        dimension: &FORCE,
+        stated: "force",
+        names: "f fx fy fz contactforce bodyforce normalforce xforce",
+        words: "force load kraft",
+        ending: Some("kraft"),
+    },
+    Terms {
+        name: "time",
+        example: "t_s or t_ms",
+        option: "--time-column",
+        dimension: &TIME,
+        stated: "time",
+        names: "t",
+        words: "time zeit",
+        ending: None,
+    },
+];
 
 /// With one of these words a name is that of another quantity: an edge, a bound, a rate.
 const OTHERS: &str = "low lo lower high hi upper min max std deviation error tolerance rate target setpoint command nominal soll";
@@ -76,11 +77,7 @@ impl Quantity {
     pub(super) const ALL: [Self; 3] = [Self::Deflection, Self::Force, Self::Time];
 
     fn terms(self) -> &'static Terms {
-        match self {
-            Self::Deflection => &DEFLECTION,
-            Self::Force => &LOAD,
-            Self::Time => &TIMES,
-        }
+        &TERMS[self as usize]
     }
 
     /// Its name in messages.

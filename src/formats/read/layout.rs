@@ -1,7 +1,7 @@
 //! The meaning of the columns of a table: by their headers, by a row of units below, by the title, or as named by
 //! the user.
 
-use super::ColumnNames;
+use super::ReadOptions;
 use super::columns::LISTED;
 use super::curve::{Place, expected, shown};
 use super::label::{Label, Quantity, no_unit};
@@ -64,7 +64,7 @@ impl Named {
 pub(super) fn layout(
     table: &Table<'_>,
     units: Option<UnitSystem>,
-    asked: &ColumnNames,
+    asked: &ReadOptions,
     notes: &mut Vec<String>,
 ) -> Result<(Vec<Column>, bool), Error> {
     let is_bare = table.names.is_empty();
@@ -93,7 +93,7 @@ pub(super) fn layout(
     let is_header = table.names.windows(2).all(|two| two[0].0 == two[1].0)
         && names_all(&texts, Purpose::Curve, &[]);
     for (field, (quantity, which)) in wanted.into_iter().zip(["first", "second"]).enumerate() {
-        let is_asked = wanted.iter().any(|quantity| asked.of(*quantity).is_some());
+        let is_asked = wanted.iter().any(|quantity| asked.column(*quantity).is_some());
         let Some((line, name)) =
             table.names.get(field).filter(|_| table.has_axes() && !is_header && !is_asked)
         else {
@@ -110,7 +110,7 @@ pub(super) fn layout(
         }
     }
     let (mut taken, mut others): (Vec<Named>, Vec<Named>) = (Vec::new(), Vec::new());
-    let asked_for = Quantity::ALL.map(|quantity| match asked.of(quantity) {
+    let asked_for = Quantity::ALL.map(|quantity| match asked.column(quantity) {
         Some(asked) => named(&names, quantity, asked).map(Some),
         None => Ok(None),
     });

@@ -6,8 +6,8 @@
 //! of 0 means 1. Lines that begin with `$` are comments, also in place of a title.
 
 use super::Input;
-use super::columns::{Columns, check_curves, choose};
-use super::curve::expected;
+use super::columns::{check_curves, choose};
+use super::curve::{ReadCurve, expected};
 use super::deck::{DeckCurve, Fields, Said, WIDTH};
 use super::encoding::lines;
 use crate::error::{Error, error};
@@ -21,7 +21,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     })
 }
 
-pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
+pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     let mut deck = Deck::read(input.text)?;
     if deck.curves.is_empty() {
         return Err(error!(CurveFile, "expected a *DEFINE_CURVE, found none in this deck"));

@@ -7,8 +7,8 @@
 //! `k_u`, one number, is the unloading stiffness.
 
 use super::Input;
-use super::columns::{Columns, LISTED, Places, check_curves, check_points, choose};
-use super::curve::{CUT, Place, expected, miscounted, shown, units};
+use super::columns::{LISTED, check_curves, check_points, choose};
+use super::curve::{CUT, Place, ReadCurve, expected, miscounted, shown, units};
 use super::modelica::{OURS, ours_of};
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
@@ -22,7 +22,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     is_later(input.bytes) || head(input.bytes, 0).is_some()
 }
 
-pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
+pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     if is_later(input.bytes) {
         return Err(error!(
             CurveFile,
@@ -40,7 +40,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
         }
         (_, given) => units(None, given, "", &mut notes)?,
     };
-    let mut columns = Columns::at(Places::Rows);
+    let mut columns = ReadCurve::default();
     let rows = table.head.rows;
     columns.deflection_m = table.values(0, rows).map(|v| v * system.length_m).collect();
     columns.force_n = table.values(rows, rows).map(|v| v * system.force()).collect();

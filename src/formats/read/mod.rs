@@ -29,104 +29,91 @@ use crate::guess;
 use std::path::Path;
 
 use super::{MAX_CURVE_BYTES, MIN_POINTS};
-use crate::curve::{ForceCurve, ForceKind};
+use crate::curve::{ForceCurve, ForceKind, SourceFile};
 use crate::surrogate::PredictedCurve;
 use crate::unit::UnitSystem;
-use columns::Columns;
+pub(crate) use curve::Metadata;
 pub use curve::ReadCurve;
-pub(crate) use curve::{Metadata, ReadFile};
 use label::Quantity;
 pub(crate) use tables::history;
 
 /// One format of curves.
 #[derive(Debug)]
 pub(crate) struct Reader {
-    /// Its name.
     pub name: &'static str,
     /// Without the dot; the first is the usual one.
     pub extensions: &'static [&'static str],
-    /// What it is.
     pub description: &'static str,
     /// Whether a file's content is of this format.
     recognise: fn(&Input<'_>) -> bool,
-    read: Read,
-}
-
-/// Result of a reader.
-#[derive(Debug)]
-enum Read {
-    /// Columns of a binary file, of which the curve is made.
-    Binary(fn(&Input<'_>) -> Result<Columns, Error>),
-    /// Columns of a text, of which the curve is made.
-    Columns(fn(&Input<'_>) -> Result<Columns, Error>),
-    Curve(fn(&Input<'_>) -> Result<ReadCurve, Error>),
+    read: fn(&Input<'_>) -> Result<ReadCurve, Error>,
 }
 
 /// Every format we read, in the order in which content is tried. To add one: write its module, add
 /// its line here.
 pub(crate) const READERS: &[Reader] = &[
     Reader {
-        name: "mat",
+        name: MAT,
         extensions: &["mat"],
         description: "MAT file of version 4: fd_load, or the only matrix of two columns",
         recognise: mat::recognise,
-        read: Read::Binary(mat::read),
+        read: mat::read,
     },
     Reader {
         name: JSON,
         extensions: &["json"],
         description: "predicted curve (of crumple predict)",
         recognise: json::recognise,
-        read: Read::Curve(json::read),
+        read: json::read,
     },
     Reader {
         name: "lsdyna",
         extensions: &["k", "key", "dyn"],
         description: "LS-DYNA *DEFINE_CURVE and *DEFINE_CURVE_TITLE",
         recognise: lsdyna::recognise,
-        read: Read::Columns(lsdyna::read),
+        read: lsdyna::read,
     },
     Reader {
         name: "radioss",
         extensions: &["rad"],
         description: "Radioss /FUNCT of a starter or include file",
         recognise: radioss::recognise,
-        read: Read::Columns(radioss::read),
+        read: radioss::read,
     },
     Reader {
         name: "mo",
         extensions: &["mo"],
         description: "Modelica package that crumple export wrote",
         recognise: modelica::recognise_package,
-        read: Read::Columns(modelica::read_package),
+        read: modelica::read_package,
     },
     Reader {
         name: "modelica",
         extensions: &["txt"],
         description: "Modelica CombiTable text (#1, double name(n,2))",
         recognise: modelica::recognise,
-        read: Read::Columns(modelica::read),
+        read: modelica::read,
     },
     Reader {
         name: "iso-mme",
         extensions: &["mme", "001", "002"],
         description: "ISO-MME: a test's folder or .mme file, or one of its channel files",
         recognise: iso_mme::recognise,
-        read: Read::Columns(iso_mme::read),
+        read: iso_mme::read,
     },
     Reader {
         name: TABLES,
         extensions: &["csv", "tsv"],
         description: "columns below a header and titles, with commas, semicolons, tabs or blanks between",
         recognise: tables::recognise,
-        read: Read::Columns(tables::read),
+        read: tables::read,
     },
     Reader {
         name: CURVES,
         extensions: &["cur", "crv", "dat", "xy"],
         description: "two columns below titles and labels, as in T/HIS .cur and LS-PrePost .crv files",
         recognise: tables::recognise_pairs,
-        read: Read::Columns(tables::read_pairs),
+        read: tables::read_pairs,
     },
 ];
 
@@ -141,21 +128,16 @@ pub struct ReadOptions {
     pub curve: Option<String>,
     /// The force, where the file has both.
     pub force: Option<ForceKind>,
-    /// The columns of a table whose header does not name them.
-    pub columns: ColumnNames,
+    /// The deflection's column of a table whose header does not name it: its header, or its number counted from 1.
+    pub deflection_column: Option<String>,
+    /// The same of the force.
+    pub force_column: Option<String>,
+    /// The same of the time; `none` for force over deflection without times, whatever the file has.
+    pub time_column: Option<String>,
 }
 
-/// Columns of a table as the user names them: by their headers, or by numbers counted from 1.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct ColumnNames {
-    /// Of the deflection.
-    pub deflection: Option<String>,
-    /// Of the force.
-    pub force: Option<String>,
-    /// Of the time; `none` for force over deflection without times, whatever the file has.
-    pub time: Option<String>,
-}
-
+/// The reader of binary files.
+const MAT: &str = "mat";
 /// The reader of predicted curves.
 const JSON: &str = "json";
 /// The readers that have columns to choose.
@@ -164,28 +146,28 @@ const CURVES: &str = "two-columns";
 /// The table's times are not read.
 const NO_TIMES: &str = "none";
 
-impl ColumnNames {
-    fn of(&self, quantity: Quantity) -> Option<&str> {
+impl ReadOptions {
+    fn column(&self, quantity: Quantity) -> Option<&str> {
         let asked = match quantity {
-            Quantity::Deflection => &self.deflection,
-            Quantity::Force => &self.force,
-            Quantity::Time => &self.time,
+            Quantity::Deflection => &self.deflection_column,
+            Quantity::Force => &self.force_column,
+            Quantity::Time => &self.time_column,
         };
         asked.as_deref().filter(|asked| quantity != Quantity::Time || *asked != NO_TIMES)
     }
 
     fn is_without_times(&self) -> bool {
-        self.time.as_deref() == Some(NO_TIMES)
+        self.time_column.as_deref() == Some(NO_TIMES)
     }
 
     /// The first option that is given.
-    fn option(&self) -> Option<&'static str> {
-        let is_given = |q: &Quantity| self.of(*q).is_some();
+    fn column_option(&self) -> Option<&'static str> {
+        let is_given = |q: &Quantity| self.column(*q).is_some();
         Quantity::ALL.into_iter().find(is_given).map(Quantity::option)
     }
 
-    fn all(&self) -> Vec<&str> {
-        Quantity::ALL.into_iter().filter_map(|quantity| self.of(quantity)).collect()
+    fn columns(&self) -> Vec<&str> {
+        Quantity::ALL.into_iter().filter_map(|quantity| self.column(quantity)).collect()
     }
 }
 
@@ -228,26 +210,12 @@ pub fn readers() -> impl Iterator<Item = &'static str> {
 /// # Errors
 /// It names the file, the place in it, what was expected there and what to do.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static str), Error> {
-    let (found, reader) = parse(path, options)?;
-    Ok((found.curve(path)?, reader.name))
+    let (found, format) = parse(path, options)?;
+    Ok((found.sorted().map_err(curve::content(path))?, format))
 }
 
-/// What a file holds before it becomes one curve.
-enum Parsed {
-    Columns(Columns),
-    Curve(ReadCurve),
-}
-
-impl Parsed {
-    fn curve(self, path: &Path) -> Result<ReadCurve, Error> {
-        match self {
-            Self::Columns(columns) => columns.curve().map_err(curve::content(path)),
-            Self::Curve(curve) => Ok(curve),
-        }
-    }
-}
-
-fn parse(path: &Path, options: &ReadOptions) -> Result<(Parsed, &'static Reader), Error> {
+/// A curve as it is in its file, and the name of the format.
+fn parse(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static str), Error> {
     let tests = if path.is_dir() { iso_mme::tests(path) } else { Vec::new() };
     let (bytes, own) = if !tests.is_empty() {
         iso_mme::check_one(path, &tests).map_err(curve::content(path))?;
@@ -271,7 +239,7 @@ fn parse(path: &Path, options: &ReadOptions) -> Result<(Parsed, &'static Reader)
     }
     let reader = reader(&input)?;
     if let (Some(option), true) =
-        (options.columns.option(), ![TABLES, CURVES].contains(&reader.name))
+        (options.column_option(), ![TABLES, CURVES].contains(&reader.name))
     {
         let format = reader.name;
         return Err(error!(
@@ -280,25 +248,13 @@ fn parse(path: &Path, options: &ReadOptions) -> Result<(Parsed, &'static Reader)
             path = path.display()
         ));
     }
-    let is_text = !matches!(reader.read, Read::Binary(_));
-    let text_note = text.note.filter(|_| is_text).map(String::from);
-    let mut found = match reader.read {
-        Read::Binary(read) | Read::Columns(read) => {
-            let mut columns = read(&input).map_err(curve::content(path))?;
-            if options.columns.is_without_times() {
-                columns.time_s = None;
-            }
-            Parsed::Columns(columns)
-        }
-        Read::Curve(read) => Parsed::Curve(read(&input)?),
-    };
-    let (notes, files) = match &mut found {
-        Parsed::Columns(columns) => (&mut columns.notes, &mut columns.files),
-        Parsed::Curve(curve) => (&mut curve.notes, &mut curve.files),
-    };
-    notes.extend(text_note);
-    files.splice(0..0, own);
-    Ok((found, reader))
+    let mut found = (reader.read)(&input).map_err(curve::content(path))?;
+    if options.is_without_times() {
+        found.time_s = None;
+    }
+    found.notes.extend(text.note.filter(|_| reader.name != MAT).map(String::from));
+    found.files.splice(0..0, own);
+    Ok((found, reader.name))
 }
 
 /// A curve that can drive an interface, as in its file.
@@ -314,29 +270,23 @@ pub(crate) enum DrivingFile {
 /// # Errors
 /// As for [`read`], and if the curve cannot drive an interface.
 pub(crate) fn driving(path: &Path, options: &ReadOptions) -> Result<DrivingFile, Error> {
-    let (mut found, reader) = parse(path, options)?;
-    if reader.name == JSON {
+    let (mut found, format) = parse(path, options)?;
+    if format == JSON {
         return json::predicted(path).map(|curve| DrivingFile::Predicted(Box::new(curve)));
     }
     let has = |e: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(e));
-    let plain = match &found {
-        Parsed::Columns(columns) if (has("csv") || has("tsv")) && options.units.is_none() => {
-            Some(columns.as_they_stand())
+    let mut error = None;
+    if (has("csv") || has("tsv")) && options.units.is_none() {
+        match found.as_they_stand() {
+            Ok(curve) => return Ok(DrivingFile::Curve(Box::new(curve), Vec::new())),
+            Err(plain) => error = Some(curve::content(path)(plain).at_key("points")),
         }
-        _ => None,
-    };
-    let plain = match plain {
-        Some(Ok(curve)) => return Ok(DrivingFile::Curve(Box::new(curve), Vec::new())),
-        Some(Err(error)) => Some(curve::content(path)(error).at_key("points")),
-        None => None,
-    };
+    }
     // What lies beyond the maximum crush is of no use to a database; here it drives.
-    let crush_m = match &mut found {
-        Parsed::Columns(columns) => columns.facts.max_deflection_m.take(),
-        Parsed::Curve(_) => None,
-    };
-    let mut curve = found.curve(path).map_err(|error| plain.unwrap_or(error))?;
-    curve.facts.max_deflection_m = curve.facts.max_deflection_m.or(crush_m);
+    let crush_m = found.facts.max_deflection_m.take();
+    let found = found.sorted().map_err(curve::content(path));
+    let mut curve = found.map_err(|sorted| error.unwrap_or(sorted))?;
+    curve.facts.max_deflection_m = crush_m;
     let (curve, changes) = curve.driving().map_err(curve::content(path))?;
     Ok(DrivingFile::Curve(Box::new(curve), changes))
 }
@@ -365,10 +315,8 @@ fn reader(input: &Input<'_>) -> Result<&'static Reader, Error> {
 }
 
 /// The bytes of a file, up to the bound, and what identifies them.
-fn open(path: &Path) -> Result<(Vec<u8>, ReadFile), Error> {
-    let bytes = file::read(path, MAX_CURVE_BYTES).map_err(|source| {
-        error!(CurveFile, "{path}: {source}", path = path.display()).caused_by(source)
-    })?;
-    let own = ReadFile::of(path, &bytes);
+fn open(path: &Path) -> Result<(Vec<u8>, SourceFile), Error> {
+    let bytes = file::read(path, MAX_CURVE_BYTES).map_err(|e| curve::content(path)(e.into()))?;
+    let own = curve::source_file(path, &bytes);
     Ok((bytes, own))
 }

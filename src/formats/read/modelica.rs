@@ -10,9 +10,9 @@
 //! 200 points of a curve.
 
 use super::Input;
-use super::columns::{Columns, Places, check_curves, check_points, choose};
+use super::columns::{check_curves, check_points, choose};
 use super::curve::{
-    CUT, Metadata, Place, expected, miscounted, shown, stated_units, title, units, value,
+    CUT, Metadata, Place, ReadCurve, expected, miscounted, shown, stated_units, title, units, value,
 };
 use super::encoding::lines;
 use super::label::{Label, Quantity};
@@ -28,7 +28,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     input.text.strip_prefix("#1").is_some_and(|rest| rest.starts_with(['\n', '\r', ' ']))
 }
 
-pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
+pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     let file = File::read(input.text)?;
     let table = file.choose(input.options.curve.as_deref())?;
     let mut notes = vec![format!("curve: table {} of the file", table.name)];
@@ -54,14 +54,15 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
     let column = |k: usize, size: f64| {
         table.values.iter().skip(k).step_by(table.columns).map(|v| v * size).collect()
     };
-    Ok(Columns {
+    Ok(ReadCurve {
         deflection_m: column(0, length),
         force_n: column(1, force),
         facts: table.facts,
         title: Some(table.name.clone()),
         units: system,
         notes,
-        ..Columns::at(Places::Lines(table.lines.clone()))
+        lines: table.lines.clone(),
+        ..ReadCurve::default()
     })
 }
 
@@ -230,7 +231,7 @@ pub(super) fn recognise_package(input: &Input<'_>) -> bool {
         || lines(input.beginning()).any(|(_, line)| line.trim().starts_with("constant Real d["))
 }
 
-pub(super) fn read_package(input: &Input<'_>) -> Result<Columns, Error> {
+pub(super) fn read_package(input: &Input<'_>) -> Result<ReadCurve, Error> {
     let packages = packages(input.text)?;
     if packages.is_empty() {
         return Err(error!(
@@ -256,14 +257,14 @@ pub(super) fn read_package(input: &Input<'_>) -> Result<Columns, Error> {
         format!("curve: constants d and f of package {}, SI", shown(&package.name)),
         "points: a package keeps at most 200 of a curve".into(),
     ];
-    Ok(Columns {
+    Ok(ReadCurve {
         deflection_m: package.d.values.clone(),
         force_n: package.f.values.clone(),
         facts: package.facts,
         title: title(&package.name, &mut notes),
         units: Some(UnitSystem::SI),
         notes,
-        ..Columns::at(Places::Rows)
+        ..ReadCurve::default()
     })
 }
 

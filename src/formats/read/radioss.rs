@@ -6,8 +6,8 @@
 //! the fourth line has mass, length and time, by name or by their size in SI.
 
 use super::Input;
-use super::columns::{Columns, check_curves, choose};
-use super::curve::Place;
+use super::columns::{check_curves, choose};
+use super::curve::{Place, ReadCurve};
 use super::deck::{DeckCurve, Fields, Said, WIDTH};
 use super::encoding::{lines, number};
 use crate::error::{Error, error};
@@ -21,7 +21,7 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     first.is_some_and(|(_, line)| is_keyword(line))
 }
 
-pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
+pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     let mut deck = Deck::read(input.text)?;
     if deck.functions.is_empty() {
         let found = "none in this file (in a run, the starter, _0000.rad, has them)";

@@ -437,10 +437,12 @@ fn fit(
     }
     let units = behind.first().is_some_and(|(_, line)| separator.is_units(line));
     let row = behind.get(usize::from(units)).filter(|(_, line)| separator.is_row(line));
+    // Whether a text names a quantity of a curve, or a unit of one.
+    let is_name = |n: &String| Label::of_axis(n).or_else(|| Label::of_column(n)).is_some();
     match row.and_then(|(_, row)| separator.names(first, row)) {
         Some(names) if is_header(&names) => Some((Fit::Header, names)),
         // A title of two words is above two columns as well as a header does.
-        Some(names) if separator == Separator::Blanks && !names.iter().any(|n| is_name(n)) => None,
+        Some(names) if separator == Separator::Blanks && !names.iter().any(is_name) => None,
         Some(names) => Some((Fit::Above, names)),
         None => {
             let names: Vec<String> = fields.into_iter().map(String::from).collect();
@@ -469,11 +471,6 @@ pub(super) fn names_all(names: &[String], purpose: Purpose, asked: &[&str]) -> b
                 Purpose::Curve => has(Quantity::Deflection) && has(Quantity::Force),
                 Purpose::History => has(Quantity::Time),
             })
-}
-
-/// Whether a text names a quantity of a curve, or a unit of one.
-fn is_name(text: &str) -> bool {
-    Label::of_axis(text).or_else(|| Label::of_column(text)).is_some()
 }
 
 /// The unit that a field of a row of units holds.

@@ -1,12 +1,12 @@
 //! Curves and histories of text tables, whatever program or instrument wrote them.
 
 use super::Input;
-use super::columns::{Columns, Places, check_points, choose};
-use super::curve::{Metadata, Place, expected, shown, stated_units, title};
+use super::columns::{check_points, choose};
+use super::curve::{Metadata, Place, ReadCurve, expected, shown, stated_units, title};
 use super::encoding::{decoded, lines};
 use super::label::{Label, Quantity};
 use super::layout::layout;
-use super::table::{Fit, Purpose, Row, Table, check_last, is_pair};
+use super::table::{Fit, Purpose, Table, check_last, is_pair};
 use crate::error::{Error, error};
 use crate::guess;
 
@@ -38,12 +38,12 @@ pub(super) fn recognise_pairs(input: &Input<'_>) -> bool {
 }
 
 /// The curve of a table with a header, or of one without.
-pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
-    let mut table = Table::of(input.text, Purpose::Curve, &input.options.columns.all());
-    if let (Fit::Numbers, Some((line, comment))) = (table.fit, last_comment(input, &table)) {
-        table.named_by(line, comment);
-    }
+pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
+    let mut table = Table::of(input.text, Purpose::Curve, &input.options.columns());
     if table.fit == Fit::Numbers {
+        if let Some((line, _, comment)) = comments(input.text, table.begin()).last() {
+            table.named_by(line, comment);
+        }
         check_last(&table.titles)?;
     }
     let name = table.titles.first().map_or(String::new(), |(_, title)| title.clone());
@@ -52,7 +52,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<Columns, Error> {
 }
 
 /// The curve of two columns below its labels, or one of several.
-pub(super) fn read_pairs(input: &Input<'_>) -> Result<Columns, Error> {
+pub(super) fn read_pairs(input: &Input<'_>) -> Result<ReadCurve, Error> {
     let tables = Table::pairs(input.text)?;
     if tables.is_empty() {
         return Err(error!(
@@ -73,11 +73,6 @@ fn chosen(tables: &[Table<'_>], asked: Option<&str>) -> Result<usize, Error> {
     choose((1..).zip(tables).map(|(k, t)| (k.to_string(), t.name.clone())), asked)
 }
 
-/// The last comment before a table.
-fn last_comment<'a>(input: &Input<'a>, table: &Table<'_>) -> Option<(u64, &'a str)> {
-    comments(input.text, table.begin()).last().map(|(line, _, comment)| (line, comment))
-}
-
 /// The comments before a line: their lines, marks and texts.
 fn comments(text: &str, before: u64) -> impl Iterator<Item = (u64, &str, &str)> {
     lines(text).take_while(move |(line, _)| *line < before).filter_map(|(at, line)| {
@@ -93,27 +88,28 @@ fn columns(
     table: &Table<'_>,
     name: &str,
     mut notes: Vec<String>,
-) -> Result<Columns, Error> {
+) -> Result<ReadCurve, Error> {
     let (mut facts, mut stated) = (Metadata::default(), None);
     for (line, mark, comment) in comments(input.text, table.begin()) {
         facts.take(mark, comment, Place::Line(line))?;
         stated = stated.or(stated_units(comment));
     }
     let units = input.options.units.or(stated);
-    let (taken, units_used) = layout(table, units, &input.options.columns, &mut notes)?;
+    let (taken, units_used) = layout(table, units, input.options, &mut notes)?;
     let mut lines = Vec::new();
     let mut values: [Vec<f64>; 3] = Default::default();
     table.each_row(|row| {
         for column in &taken {
+            let place = Place::Field { line: row.line, field: column.field + 1 };
             let value =
-                row.number(column.field).map_err(|found| not_a_number(row, column.field, found))?;
+                row.number(column.field).map_err(|found| expected(place, "a number", found))?;
             values[column.quantity as usize].push(value * column.size);
         }
         lines.push(row.line);
         check_points(lines.len())
     })?;
     let [deflection_m, force_n, time_s] = values;
-    Ok(Columns {
+    Ok(ReadCurve {
         deflection_m,
         force_n,
         time_s: taken.iter().any(|c| c.quantity == Quantity::Time).then_some(time_s),
@@ -121,12 +117,9 @@ fn columns(
         title: title(name, &mut notes),
         notes,
         units: units.filter(|_| units_used),
-        ..Columns::at(Places::Lines(lines))
+        lines,
+        ..ReadCurve::default()
     })
-}
-
-fn not_a_number(row: &Row<'_>, field: usize, found: &str) -> Error {
-    expected(Place::Field { line: row.line, field: field + 1 }, "a number", found)
 }
 
 /// Values over time, as a table or a curve's file has them.
@@ -134,7 +127,6 @@ fn not_a_number(row: &Row<'_>, field: usize, found: &str) -> Error {
 pub(crate) struct History {
     /// Name of the time's column, and its line.
     pub time_name: (u64, String),
-    /// Name of the values.
     pub name: String,
     /// First title above them.
     pub title: String,
@@ -266,14 +258,10 @@ fn column(
 mod tests {
     use super::*;
 
-    fn read_text(text: &str, wanted: Option<&str>) -> Result<History, String> {
-        history(text.as_bytes(), wanted).map_err(|e| e.to_string())
-    }
-
     #[test]
     fn reads_the_named_column() {
         fn t(text: &str, wanted: Option<&str>, expected: (&[f64], &[f64])) {
-            let read = read_text(text, wanted).unwrap();
+            let read = history(text.as_bytes(), wanted).unwrap();
             assert_eq!((&read.time[..], &read.values[..]), expected, "{text}");
         }
         let expected: (&[f64], &[f64]) = (&[0.0, 1.0], &[1.0, 2.0]);
@@ -288,27 +276,5 @@ mod tests {
         let axes = "T\nTime (s)\nForce\nnode 1\n0, 1\n1, 2\nCONTINUE\n";
         t(axes, None, expected);
         t(&(axes.to_string() + &axes.replace("node 1", "b")), Some("b"), expected);
-    }
-
-    #[test]
-    fn errors_say_where_and_what_to_do() {
-        fn t(text: &str, wanted: Option<&str>, message: &str) {
-            assert_eq!(read_text(text, wanted).unwrap_err(), message, "{text}");
-        }
-        #[rustfmt::skip]
-        let cases = [
-            ("t,a,b\n", Some("c"), "there is no column \"c\": name one of \"a\", \"b\""),
-            ("t,a,b\n", None, "there are several columns: name one of \"a\", \"b\""),
-            ("t,a,a\n", Some("a"), "2 columns are called \"a\": rename all but one"),
-            ("t,a\n0,1\n1,x\n", None, "line 3, column 2 (\"a\"): expected a number, found \"x\""),
-            ("t,a\n0,1\n1\n", None, "line 3, column 2 (\"a\"): expected a number, found \"\""),
-            ("t,a\n0,NaN\n", None, "line 2, column 2 (\"a\"): expected a finite number, found \"NaN\": remove the lines without a value"),
-            ("#\nt,a\n0,1\n2,1\n1,1\n", None, "line 5, column 1 (\"t\"): time 1 does not come after 2: times must increase strictly, so cut or sort the file first"),
-            ("t,a\n0,1\n0,5,2\n", None, "line 3: expected 2 fields, one for each column of the table, found 3: write decimal points, or semicolons between columns, and name every column in the header"),
-            ("", None, "the table is empty: expected a header line, then a time and values in every line"),
-            ("0,1\n1,2\n", None, "line 1: expected a header with the names of the columns, found numbers: write for example \"time_s,a_m_per_s2\" above them"),
-            ("time\n0\n", None, "line 1: expected at least two columns separated by commas, semicolons, tabs or blanks, the first of them the time, found \"time\""),
-        ];
-        cases.into_iter().for_each(|(text, wanted, message)| t(text, wanted, message));
     }
 }

@@ -101,7 +101,7 @@ impl Contact {
 
 /// A point of the current piece of a row of interfaces and the work done up to it; the maximum
 /// deflection and what is dissipated once the deflection has fallen from there.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Totals {
     known_m: Row,
     known_n: Row,
@@ -113,18 +113,6 @@ pub(super) struct Totals {
 }
 
 impl Totals {
-    pub(crate) fn none() -> Self {
-        let zero = [0.0; LANES];
-        Self {
-            known_m: zero,
-            known_n: zero,
-            known_j: zero,
-            known_jm: zero,
-            largest_m: zero,
-            dissipated_j: zero,
-        }
-    }
-
     #[inline(always)]
     pub(crate) fn set(&mut self, lane: usize, contact: &Contact, piece: &Piece) {
         self.known_m[lane] = piece.known.deflection_m;

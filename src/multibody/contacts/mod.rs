@@ -122,7 +122,7 @@ impl<'a> Contacts<'a> {
         let mut contacts = Self {
             fixed,
             lanes: vec![Lanes::none(); layout.rows()],
-            totals: vec![Totals::none(); layout.rows()],
+            totals: vec![Totals::default(); layout.rows()],
             contacts: vec![Contact::open(); laws.len()],
             deflection_m: std::array::from_fn(|_| Rows::zeros(layout)),
             force_n: std::array::from_fn(|_| Rows::zeros(layout)),

@@ -5,7 +5,7 @@ use crate::curve::{CurveUnloading, ForceCurve};
 
 /// What the stored energy of a structure follows from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum StoredBy {
+pub(crate) enum StoredBy {
     /// The force at the maximum deflection.
     Force,
     /// The mean force up to there: a recorded force oscillates, the stored energy does not.
@@ -14,17 +14,17 @@ pub(super) enum StoredBy {
 
 /// Energy of the unloading branches of an envelope; see [`super::ForceLaw`] for the rule.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Memory {
+pub(crate) struct Memory {
     /// Unloading stiffness `k`.
-    pub(super) stiffness_n_per_m: f64,
+    pub(crate) stiffness_n_per_m: f64,
     /// `k_s`: steepest rise of the envelope, or the unloading stiffness if that is more.
-    pub(super) steepest_n_per_m: f64,
+    pub(crate) steepest_n_per_m: f64,
     /// `c`: a branch stores at most this share of force times deflection, since it would reach
     /// zero deflection with a force left otherwise.
-    pub(super) largest_share: f64,
-    pub(super) stored_by: StoredBy,
+    pub(crate) largest_share: f64,
+    pub(crate) stored_by: StoredBy,
     /// Energy that is lost once the deflection has been at each point of the envelope.
-    pub(super) dissipated_j: Vec<f64>,
+    pub(crate) dissipated_j: Vec<f64>,
 }
 
 impl Memory {
@@ -50,10 +50,6 @@ impl Memory {
             memory.dissipated_j.push(dissipated_j);
         }
         memory
-    }
-
-    pub(super) fn steepest_n_per_m(&self) -> f64 {
-        self.steepest_n_per_m
     }
 
     /// Energy that is returned from a maximum deflection.
@@ -96,11 +92,11 @@ impl Memory {
 /// at 1 and end at 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UnloadingShape {
-    pub(super) length: Vec<f64>,
-    pub(super) force: Vec<f64>,
+    pub(crate) length: Vec<f64>,
+    pub(crate) force: Vec<f64>,
     /// `∫` of the force from each point to the end; the first is the share of force × length that
     /// is returned.
-    pub(super) rest: Vec<f64>,
+    pub(crate) rest: Vec<f64>,
     /// `∫` of `rest` from the first point to each.
     pub(super) rest_so_far: Vec<f64>,
 }
@@ -187,27 +183,19 @@ impl UnloadingShape {
     }
 }
 
-/// How a curve unloads in a run.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum UnloadingChoice {
-    /// As the curve knows it; with the steepest rise of its loading branch if it does not, and
-    /// along the loading branch if that never rises.
-    Own,
-    /// Along the loading branch, whatever the curve knows.
-    Elastic,
-    /// On straight lines of this stiffness in N/m.
-    Stiffness(f64),
-}
-
 impl ForceLaw {
-    /// The law that follows a curve.
-    pub fn of_curve(curve: &ForceCurve, unloading: UnloadingChoice, end: EnvelopeEnd) -> Self {
+    /// The law that follows a curve; on straight lines of a stiffness that is given. Without a
+    /// choice it unloads as the curve knows it; with the steepest rise of its loading branch if it
+    /// does not, and along the loading branch if that never rises.
+    pub fn of_curve(curve: &ForceCurve, unloading: Option<Unloading>, end: EnvelopeEnd) -> Self {
         Self::along(curve, unloading, end).with_data_to(curve.data_end_m)
     }
 
-    fn along(curve: &ForceCurve, unloading: UnloadingChoice, end: EnvelopeEnd) -> Self {
+    fn along(curve: &ForceCurve, unloading: Option<Unloading>, end: EnvelopeEnd) -> Self {
         let loading = curve.loading.clone();
-        let memory = |stiffness_n_per_m: f64| {
+        let own = || {
+            let known = curve.unloading.stiffness_n_per_m();
+            let stiffness_n_per_m = known.unwrap_or_else(|| loading.max_slope());
             if stiffness_n_per_m > 0.0 {
                 Unloading::Memory { stiffness_n_per_m }
             } else {
@@ -215,14 +203,9 @@ impl ForceLaw {
             }
         };
         let law = match unloading {
-            UnloadingChoice::Own => {
-                let known = curve.unloading.stiffness_n_per_m();
-                memory(known.unwrap_or_else(|| loading.max_slope()))
-            }
-            UnloadingChoice::Elastic => Unloading::Elastic,
-            UnloadingChoice::Stiffness(asked) => {
-                return Self::new(loading, Unloading::Memory { stiffness_n_per_m: asked }, end);
-            }
+            Some(line @ Unloading::Memory { .. }) => return Self::new(loading, line, end),
+            Some(Unloading::Elastic) => Unloading::Elastic,
+            None => own(),
         };
         match &curve.unloading {
             CurveUnloading::Recorded { deflection_m, force_n, .. } => {
