@@ -244,6 +244,100 @@ fn other_widths_and_the_other_byte_order() {
     assert_eq!(of("nip"), [-3.0, -3.0]);
 }
 
+/// A large section is written state by state; what needs a look at the whole is found, and said.
+#[test]
+fn states_are_written_one_by_one_or_from_the_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("binout");
+    let (nodes, states) = (300, 600);
+    // y of some nodes is always zero, and that of others until a wave reaches them.
+    let value = |state: usize, node: usize, component: usize| match (component, node) {
+        (1, 10..20) => 0.0,
+        (1, 50..90) if state < node => 0.0,
+        _ => (state + node * 17 + component * 6000) as f64 / 7.0 + 0.25,
+    };
+    let written = |change: &dyn Fn(usize, usize, &mut Vec<f64>)| {
+        let mut out = Written::new();
+        out.ids("nodout", &(1..=nodes).map(|id| id as i64).collect::<Vec<_>>());
+        for state in 0..states {
+            out.cd(&format!("/nodout/d{:06}", state + 1));
+            out.reals("time", &[state as f64 * 0.5]);
+            for (k, name) in ["x_displacement", "y_displacement", "x_velocity"].iter().enumerate() {
+                let mut values = (0..nodes).map(|node| value(state, node, k)).collect();
+                change(state, k, &mut values);
+                out.reals(name, &values);
+            }
+        }
+        out.bytes
+    };
+    let cases: [(&str, &dyn Fn(usize, usize, &mut Vec<f64>)); 5] = [
+        ("", &|_, _, _| {}),
+        ("are zero, but not in the states around it", &|state, k, values| {
+            if (state, k) == (300, 2) {
+                values[100..140].fill(0.0);
+            }
+        }),
+        // Around those that are always zero.
+        ("are zero, but not in the states around it", &|state, k, values| {
+            if (state, k) == (599, 1) {
+                values[5..27].fill(0.0);
+            }
+        }),
+        ("not finite", &|state, k, values| {
+            if (state, k) == (7, 0) {
+                values[299] = f64::NAN;
+            }
+        }),
+        ("has another number of values", &|state, k, values| {
+            if (state, k) == (7, 0) {
+                values.truncate(299);
+            }
+        }),
+    ];
+    for (said, change) in cases {
+        fs::write(&path, written(change)).unwrap();
+        let whole = section(&path, "nodout");
+        assert_eq!(whole.problems.is_empty(), said.is_empty(), "{:?}", whole.problems);
+        for storage in ["", " --f32", " --chunk", " --f32 --chunk"] {
+            let line = format!("histories binout -o a.h5{storage}");
+            let output = crumple_in(folder.path(), &line.split(' ').collect::<Vec<_>>());
+            says(&String::from_utf8(output.stderr).unwrap(), said);
+            let file = hdf5_pure::File::open(folder.path().join("a.h5")).unwrap();
+            for (k, name) in ["x_displacement", "y_displacement", "x_velocity"].iter().enumerate() {
+                let values = file.dataset(name).unwrap().read_f64().unwrap();
+                assert_eq!(values.len(), nodes * states, "{said} {k}");
+                for (at, &value) in values.iter().enumerate() {
+                    let id = EntityId::new((at % nodes) as i64 + 1);
+                    let expected = whole.history(Some(id), name).unwrap().values[at / nodes];
+                    let expected = if !storage.contains("f32") {
+                        expected
+                    } else {
+                        f64::from(expected as f32)
+                    };
+                    assert_eq!(value.to_bits(), expected.to_bits(), "{said} {name} {at}");
+                }
+            }
+        }
+        let columns = whole.histories.iter().map(|h| (h.label(), &h.values));
+        let columns: Vec<(String, &Vec<f64>)> = columns.collect();
+        let mut csv =
+            format!("time,{}\n", columns.iter().map(|c| &*c.0).collect::<Vec<_>>().join(","));
+        for state in 0..states {
+            let values = columns.iter().map(|(_, values)| values[state]);
+            let row: Vec<String> = [whole.time[state]]
+                .into_iter()
+                .chain(values)
+                .map(|v| zmij::Buffer::new().format(v).to_string())
+                .collect();
+            csv += &(row.join(",") + "\n");
+        }
+        let printed = crumple_in(folder.path(), &["histories", "binout"]).stdout;
+        assert!(String::from_utf8(printed).unwrap() == csv, "{said}");
+        crumple_ok(folder.path(), "histories binout -o a.csv");
+        assert!(fs::read_to_string(folder.path().join("a.csv")).unwrap() == csv, "{said}");
+    }
+}
+
 /// Ids that are all the same, by damage or malice: what is there more than once is named, and
 /// the work grows with the file and not with its square.
 #[test]

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use crate::error::Error;
 use crate::file::{write_at, write_whole};
-use crate::history_hdf5::{Precision, Trouble, can_stream, convert, encode_in};
+use crate::history_hdf5::{Storage, Trouble, can_stream, convert, encode_in};
 use crate::solver::{self, Access, Blocks, Selection, SolverFile, WantedId, decks};
 use crate::unit::UnitSystem;
 
@@ -50,6 +50,10 @@ pub(super) struct Args {
     /// Write the values in HDF5 in single precision: half the size, and all six digits that solvers print
     #[arg(long)]
     f32: bool,
+    /// Store the values in HDF5 entity by entity, in chunks of all states, for programs that read few of many
+    /// entities [default: state by state]
+    #[arg(long)]
+    chunk: bool,
     /// Replace an HDF5 file that is not a file of histories, such as a curve database
     #[arg(long)]
     force: bool,
@@ -64,7 +68,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let is_hdf5 = is_hdf5(args, output)?;
     let deck = is_hdf5.then(|| decks::deck_next_to(&args.file)).flatten().map(|(_, deck)| deck);
     let (units, deck) = (args.units, deck.as_ref());
-    let precision = if args.f32 { Precision::Single } else { Precision::Double };
+    let storage = Storage { single: args.f32, by_entity: args.chunk };
     // JSON on standard output next to a file needs the values themselves.
     let straight = output.filter(|_| is_hdf5 && !options.json);
     let format = args.format.as_deref();
@@ -76,9 +80,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let is_streamed = streamed.is_some();
     let file = match (streamed, straight) {
         (Some(file), _) => file,
-        (None, Some(path)) => {
-            convert(&args.file, format, &selection, units, deck, precision, path)?
-        }
+        (None, Some(path)) => convert(&args.file, format, &selection, units, deck, storage, path)?,
         (None, None) => solver::read(&args.file, format, &selection)?,
     };
     drop(bar);
@@ -91,7 +93,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         Some(path) => {
             let _bar = Bar::new(options, "writing");
             if is_hdf5 {
-                write_whole(path, &encode_in(precision, &file, units, deck, Some(&args.file))?)?;
+                write_whole(path, &encode_in(storage, &file, units, deck, Some(&args.file))?)?;
             } else {
                 let mut csv = Vec::new();
                 write_csv(&mut csv, &file)?;
@@ -166,8 +168,10 @@ fn is_hdf5(args: &Args, output: Option<&Path>) -> Result<bool, Failure> {
             "--units is for HDF5 (-o FILE.h5): CSV holds the values as they are in the file",
         );
     }
-    if args.f32 && !is_hdf5 {
-        return usage("--f32 is for HDF5 (-o FILE.h5)");
+    for (name, is_set) in [("--f32", args.f32), ("--chunk", args.chunk)] {
+        if is_set && !is_hdf5 {
+            return usage(&format!("{name} is for HDF5 (-o FILE.h5)"));
+        }
     }
     Ok(is_hdf5)
 }
@@ -230,11 +234,11 @@ fn write_rows(blocks: &Blocks, out: &mut dyn Write) -> Result<bool, Trouble> {
             .collect::<Vec<_>>()
             .into_par_iter()
             .map_init(
-                || (blocks.window(), vec![0.0; width], zmij::Buffer::new()),
-                |(window, values, digits), (first, times)| {
+                || (blocks.reader(), vec![0.0; width], zmij::Buffer::new()),
+                |(reader, values, digits), (first, times)| {
                     let mut text = Vec::new();
                     for (state, time) in (first..).zip(*times) {
-                        if !blocks.read(window, state, values).map_err(Trouble::Reading)? {
+                        if !reader(state, values).map_err(Trouble::Reading)? {
                             return Ok(None);
                         }
                         text.extend_from_slice(digits.format(*time).as_bytes());
@@ -253,7 +257,7 @@ fn write_rows(blocks: &Blocks, out: &mut dyn Write) -> Result<bool, Trouble> {
             out.write_all(&text).map_err(Trouble::Writing)?;
         }
     }
-    Ok(true)
+    Ok(blocks.are_plausible())
 }
 
 /// A `time` column and one column per history, with enough digits to read back the same numbers.

@@ -23,7 +23,7 @@ use units::unit_of;
 
 /// Converts the selected histories of the file at `input` to HDF5, in the solver's units.
 ///
-/// An undamaged text file is written state by state while it is read, on all threads, and
+/// An undamaged LS-DYNA file is written state by state while it is read, on all threads, and
 /// never held as a whole; any other file is read first. Gives back what the file says of
 /// itself, with its problems; the histories are left out where they went straight on.
 pub(crate) fn convert(
@@ -32,17 +32,18 @@ pub(crate) fn convert(
     selection: &Selection,
     units: Option<UnitSystem>,
     deck: Option<&Deck>,
-    precision: Precision,
+    storage: Storage,
     output: &Path,
 ) -> Result<SolverFile, Error> {
-    if can_stream(input, Some(output))
+    if !storage.by_entity
+        && can_stream(input, Some(output))
         && let Some(blocks) = solver::blocks(input, format, selection)?
-        && let Some(file) = stream(input, blocks, units, deck, precision, output)?
+        && let Some(file) = stream(input, blocks, units, deck, storage, output)?
     {
         return Ok(file);
     }
     let file = solver::read(input, format, selection)?;
-    write_whole(output, &encode_in(precision, &file, units, deck, Some(input))?)?;
+    write_whole(output, &encode_in(storage, &file, units, deck, Some(input))?)?;
     Ok(file)
 }
 
@@ -87,45 +88,51 @@ pub fn encode(
     deck: Option<&Deck>,
     source: Option<&Path>,
 ) -> Result<Vec<u8>, Error> {
-    encode_in(Precision::Double, file, units, deck, source)
+    encode_in(Storage::default(), file, units, deck, source)
 }
 
-/// In which precision values are written; times are always written in double precision.
-#[derive(Clone, Copy, PartialEq)]
-pub(crate) enum Precision {
-    Double,
-    Single,
+/// How values are stored; times are always doubles.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Storage {
+    /// In single precision.
+    pub single: bool,
+    /// In chunks of all states of some entities instead of state by state.
+    pub by_entity: bool,
 }
 
-impl Precision {
+/// Bytes of a chunk, if one entity does not have more.
+const CHUNK: usize = 1 << 16;
+
+impl Storage {
     fn size(self) -> usize {
-        match self {
-            Self::Double => size_of::<f64>(),
-            Self::Single => size_of::<f32>(),
-        }
+        if self.single { size_of::<f32>() } else { size_of::<f64>() }
     }
 
     /// Appends the bytes of values.
     fn append(self, values: &[f64], bytes: &mut Vec<u8>) {
-        match self {
-            Self::Double => bytes.extend(values.iter().flat_map(|value| value.to_le_bytes())),
-            Self::Single => bytes.extend(values.iter().flat_map(|v| (*v as f32).to_le_bytes())),
+        match self.single {
+            false => bytes.extend(values.iter().flat_map(|value| value.to_le_bytes())),
+            true => bytes.extend(values.iter().flat_map(|v| (*v as f32).to_le_bytes())),
         }
     }
 
-    fn fill<'a>(self, dataset: &'a mut DatasetBuilder, values: &[f64]) -> &'a mut DatasetBuilder {
-        match self {
-            Self::Double => dataset.with_f64_data(values),
-            Self::Single => {
-                dataset.with_f32_data(&values.iter().map(|v| *v as f32).collect::<Vec<_>>())
-            }
+    /// Gives a dataset its values, state by state.
+    fn fill(self, dataset: &mut DatasetBuilder, values: &[f64], shape: &[u64]) {
+        match self.single {
+            false => dataset.with_f64_data(values),
+            true => dataset.with_f32_data(&values.iter().map(|v| *v as f32).collect::<Vec<_>>()),
+        };
+        dataset.with_shape(shape);
+        if let (true, &[states, entities]) = (self.by_entity && !values.is_empty(), shape) {
+            let together = (CHUNK / self.size()) as u64 / states;
+            dataset.with_chunks(&[states, together.clamp(1, entities)]);
         }
     }
 }
 
-/// The same in a precision.
+/// The same with another storage.
 pub(crate) fn encode_in(
-    precision: Precision,
+    storage: Storage,
     file: &SolverFile,
     units: Option<UnitSystem>,
     deck: Option<&Deck>,
@@ -144,15 +151,16 @@ pub(crate) fn encode_in(
     for (component, channels) in components {
         let entities: Vec<EntityId> = channels.iter().filter_map(|h| h.entity).collect();
         let dataset = layout.component(component, &entities);
+        let states = file.time.len() as u64;
         if entities.is_empty() {
-            precision.fill(dataset, &channels[0].values);
+            storage.fill(dataset, &channels[0].values, &[states]);
             continue;
         }
         let mut rows = Vec::with_capacity(file.time.len() * channels.len());
         for state in 0..file.time.len() {
             rows.extend(channels.iter().map(|h| h.values[state]));
         }
-        precision.fill(dataset, &rows).with_shape(&[file.time.len() as u64, channels.len() as u64]);
+        storage.fill(dataset, &rows, &[states, channels.len() as u64]);
     }
     layout.finish()?.finish().map_err(not_encoded)
 }
@@ -356,13 +364,13 @@ impl Names {
 const TOGETHER: usize = 1 << 17;
 const MANY_VALUES: usize = 1 << 18;
 
-/// Writes a text file state by state. `None` if it turns out to be damaged.
+/// Writes a file state by state. `None` if it turns out to be damaged.
 fn stream(
     input: &Path,
     blocks: Blocks,
     units: Option<UnitSystem>,
     deck: Option<&Deck>,
-    precision: Precision,
+    storage: Storage,
     output: &Path,
 ) -> Result<Option<SolverFile>, Error> {
     let states = blocks.file.time.len();
@@ -372,16 +380,16 @@ fn stream(
         let dataset = layout.component(&column.component, &column.entities);
         let shape = [states as u64, column.entities.len() as u64];
         let shape = if column.entities.is_empty() { &shape[..1] } else { &shape };
-        match precision {
-            Precision::Double => skeleton.reserve(dataset, shape),
-            Precision::Single => skeleton.reserve_single(dataset, shape),
+        match storage.single {
+            false => skeleton.reserve(dataset, shape),
+            true => skeleton.reserve_single(dataset, shape),
         }
     }
     let out = layout.finish()?;
     let mut read_error = None;
     let written = write_at(output, |file| {
         let Some(offsets) = skeleton.write(out, file)? else { return Ok(None) };
-        match fill(&blocks, precision, &offsets, file) {
+        match fill(&blocks, storage, &offsets, file) {
             Ok(whole) => Ok(whole.then_some(())),
             Err(Trouble::Writing(error)) => Err(error),
             Err(Trouble::Reading(error)) => {
@@ -404,27 +412,22 @@ pub(crate) enum Trouble {
 
 /// Reads all states and writes their values to `offsets`, one per column; false if a state
 /// is damaged.
-fn fill(
-    blocks: &Blocks,
-    precision: Precision,
-    offsets: &[u64],
-    file: &File,
-) -> Result<bool, Trouble> {
+fn fill(blocks: &Blocks, storage: Storage, offsets: &[u64], file: &File) -> Result<bool, Trouble> {
     let states = blocks.file.time.len();
     let values = blocks.values();
     let least = if values > MANY_VALUES { 1 } else { 2 };
     let together = (TOGETHER / values).clamp(least, states.max(least));
     let damaged = AtomicBool::new(false);
     (0..states.div_ceil(together)).into_par_iter().try_for_each_init(
-        || (blocks.window(), vec![0.0; values * together], Vec::new()),
-        |(window, read, bytes), group| {
+        || (blocks.reader(), vec![0.0; values * together], Vec::new()),
+        |(reader, read, bytes), group| {
             let first = group * together;
             let count = together.min(states - first);
             for (k, state) in read.chunks_exact_mut(values).take(count).enumerate() {
                 if damaged.load(Ordering::Relaxed) {
                     return Ok(());
                 }
-                if !blocks.read(window, first + k, state).map_err(Trouble::Reading)? {
+                if !reader(first + k, state).map_err(Trouble::Reading)? {
                     damaged.store(true, Ordering::Relaxed);
                 }
             }
@@ -433,14 +436,14 @@ fn fill(
                 let width = column.width();
                 bytes.clear();
                 for state in read.chunks_exact(values).take(count) {
-                    precision.append(&state[start..start + width], bytes);
+                    storage.append(&state[start..start + width], bytes);
                 }
-                let at = offset + (first * width * precision.size()) as u64;
+                let at = offset + (first * width * storage.size()) as u64;
                 write_all_at(file, bytes, at).map_err(Trouble::Writing)?;
                 start += width;
             }
             Ok(())
         },
     )?;
-    Ok(!damaged.into_inner())
+    Ok(!damaged.into_inner() && blocks.are_plausible())
 }

@@ -3,8 +3,9 @@
 use std::io::{self, Read};
 use std::path::Path;
 
+use super::blocks::Blocks;
 use super::lsdyna::ascii::{self, Body};
-use super::lsdyna::blocks::Blocks;
+use super::lsdyna::blocks;
 use super::runs::restart_number;
 use super::source::{self, Source, Stream};
 use super::{Selection, SolverFile, lsdyna, openradioss, problem, unknown_format};
@@ -20,16 +21,18 @@ pub(crate) struct Format {
     /// Whether a line below the header of a text file, or the first bytes of a binary one, show the kind.
     signature: fn(&[u8]) -> bool,
     reader: Reader,
+    blocks: OpenBlocks,
 }
 
 /// Reads a family of files; one result per section.
 type ReadSections = fn(&[Box<dyn Source>], &Selection) -> io::Result<Vec<SolverFile>>;
 type ReadText = fn(&'static Format, &dyn Source, &Selection) -> io::Result<SolverFile>;
-type OpenBlocks = fn(&'static Format, Box<dyn Source>, &Selection) -> io::Result<Option<Blocks>>;
+type OpenBlocks =
+    fn(&'static Format, Vec<Box<dyn Source>>, &Selection) -> io::Result<Option<Blocks>>;
 
 enum Reader {
     /// Lines of text.
-    Text(ReadText, OpenBlocks),
+    Text(ReadText),
     /// Bytes, recognised by the first of them; over one or several files; sections inside.
     Binary(ReadSections),
 }
@@ -40,15 +43,17 @@ impl Format {
         entity: &'static str,
         signature: fn(&[u8]) -> bool,
     ) -> Self {
-        Self { name, entity, signature, reader: Reader::Text(ascii::read::<B>, Blocks::open::<B>) }
+        let (reader, blocks) = (Reader::Text(ascii::read::<B>), blocks::open::<B> as OpenBlocks);
+        Self { name, entity, signature, reader, blocks }
     }
 
     pub(super) const fn binary(
         name: &'static str,
         signature: fn(&[u8]) -> bool,
         read: ReadSections,
+        blocks: OpenBlocks,
     ) -> Self {
-        Self { name, entity: "entity", signature, reader: Reader::Binary(read) }
+        Self { name, entity: "entity", signature, reader: Reader::Binary(read), blocks }
     }
 
     pub(super) fn is_signature(&self, line: &[u8]) -> bool {
@@ -66,13 +71,10 @@ impl Format {
     /// The states of a file one by one, if they are laid out evenly.
     pub(super) fn blocks(
         &'static self,
-        source: Box<dyn Source>,
+        parts: Vec<Box<dyn Source>>,
         selection: &Selection,
     ) -> io::Result<Option<Blocks>> {
-        match &self.reader {
-            Reader::Text(_, open) => open(self, source, selection),
-            Reader::Binary(_) => Ok(None),
-        }
+        (self.blocks)(self, parts, selection)
     }
 
     /// One result per section; a text file is one section.
@@ -82,8 +84,8 @@ impl Format {
         selection: &Selection,
     ) -> io::Result<Vec<SolverFile>> {
         let mut sections = match (&self.reader, parts) {
-            (Reader::Text(read, _), [first, ..]) => vec![read(self, &**first, selection)?],
-            (Reader::Text(..), []) => Vec::new(),
+            (Reader::Text(read), [first, ..]) => vec![read(self, &**first, selection)?],
+            (Reader::Text(_), []) => Vec::new(),
             (Reader::Binary(read), parts) => read(parts, selection)?,
         };
         for section in &mut sections {

@@ -22,6 +22,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod blocks;
 pub(crate) mod decks;
 mod detect;
 pub(crate) mod lsdyna;
@@ -37,11 +38,11 @@ use std::path::Path;
 
 use crate::error::{Error, error};
 use crate::guess;
+pub use blocks::{Blocks, Column};
 pub use decks::read_deck;
 pub use detect::formats;
 pub(crate) use detect::{Format, entity_word, format_names, is_named_like_binary, without_job_id};
 use detect::{check_format, detect, files_in, named};
-pub use lsdyna::blocks::{Blocks, Column};
 pub use lsdyna::deck::context::Value;
 pub use lsdyna::deck::{Deck, DeckEntity, DeckPlace, Include, Output, StatedUnits, parse_deck};
 pub use problem::{Problem, ProblemCode};
@@ -50,7 +51,7 @@ use runs::missing_continuation;
 use selection::check_selection;
 pub(crate) use selection::no_component;
 pub use selection::{Entity, NoDataReason, Selection, SolverFile, WantedId, WithoutData};
-pub use source::{Access, Source, Window};
+pub use source::{Access, Source};
 
 /// Reads the selected histories of the file at `path`, of one section.
 ///
@@ -182,7 +183,7 @@ pub(crate) fn is_output(path: &Path) -> bool {
     source.is_ok_and(|source| detect(path, &*source).is_ok())
 }
 
-/// Opens the file at `path` for reading state by state, if it is a text file without damage
+/// Opens the file at `path` for reading state by state, if it is an LS-DYNA file without damage
 /// that is laid out evenly; [`read`] takes any other.
 ///
 /// # Errors
@@ -192,10 +193,12 @@ pub fn blocks(
     format: Option<&str>,
     selection: &Selection,
 ) -> Result<Option<Blocks>, Error> {
-    let (format, mut parts) = open(path, format, selection)?;
-    let Some(source) = parts.pop() else { return Ok(None) };
+    let (format, parts) = open(path, format, selection)?;
+    if format.is_binary() && missing_continuation(path)?.is_some() {
+        return Ok(None);
+    }
     let io = |source| Error::io(path, source);
-    let blocks = format.blocks(source, selection).map_err(io)?;
+    let blocks = format.blocks(parts, selection).map_err(io)?;
     if let Some(blocks) = &blocks {
         check_selection(path, &blocks.file, selection)?;
     }

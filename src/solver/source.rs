@@ -222,7 +222,7 @@ impl BufRead for Stream<'_> {
 }
 
 /// Reads ranges that lie close together with few calls, in a buffer that is used again.
-pub struct Window<'a> {
+pub(crate) struct Window<'a> {
     source: &'a dyn Source,
     buffer: Vec<u8>,
     /// Range of the source that the buffer holds.

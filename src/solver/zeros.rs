@@ -4,6 +4,7 @@
 //! a wall, a contact is lost. So only several values next to each other are named.
 
 use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 use super::problem::{Problem, ProblemCode};
@@ -130,6 +131,55 @@ impl Run {
 
 /// Runs listed; more are damage that needs no list.
 const MAX_RUNS: usize = 100;
+
+/// Where zeros next to each other begin and end among the values of a state.
+pub(crate) type Zeros = Vec<Range<usize>>;
+
+/// Where at least as many values of a component next to each other are zero as make a suspicion; `widths`: how many
+/// values each component has.
+pub(crate) fn zeros_of_state(widths: impl Iterator<Item = usize>, values: &[f64]) -> Zeros {
+    let mut runs = Vec::new();
+    let mut from = 0;
+    for width in widths {
+        let to = from + width;
+        while from < to {
+            let zeros = values[from..to].iter().take_while(|v| **v == 0.0).count();
+            if zeros >= ENTITIES {
+                runs.push(from..from + zeros);
+            }
+            from += zeros;
+            from += values[from..to].iter().take_while(|v| **v != 0.0).count();
+        }
+    }
+    runs
+}
+
+/// Whether [`suspect`] could name any of the zeros of all states: several next to each other that are not zero in
+/// the states around.
+pub(crate) fn may_be_suspect(states: &[Zeros]) -> bool {
+    let none = Vec::new();
+    (1..states.len()).any(|state| {
+        let around = [&states[state - 1], states.get(state + 1).unwrap_or(&none)];
+        states[state].iter().any(|run| longest_outside(run, around) >= ENTITIES)
+    })
+}
+
+/// The longest part of a range that none of the others covers.
+fn longest_outside(run: &Range<usize>, around: [&Zeros; 2]) -> usize {
+    let overlapping = |all: &&Zeros| {
+        let from = all.partition_point(|other| other.end <= run.start);
+        let to = all.partition_point(|other| other.start < run.end);
+        all[from..to].to_vec()
+    };
+    let mut others: Zeros = around.iter().flat_map(overlapping).collect();
+    others.sort_by_key(|other| other.start);
+    let (mut from, mut longest) = (run.start, 0);
+    for other in others {
+        longest = longest.max(other.start.saturating_sub(from));
+        from = from.max(other.end);
+    }
+    longest.max(run.end.saturating_sub(from))
+}
 
 /// States whose value is zero between two that are not.
 fn vanishing(values: &[f64]) -> impl Iterator<Item = usize> {

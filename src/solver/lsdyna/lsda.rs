@@ -143,7 +143,7 @@ pub(crate) fn walk(
     let size = source.size()?;
     let mut window = Window::new(source);
     let mut at = u64::from(header.length);
-    let mut ahead = MANY;
+    let mut ahead = NEAR;
     while at < size {
         match record(&mut window, header, at, size, ahead)? {
             Ok(Record { length, event }) => {
@@ -151,7 +151,8 @@ pub(crate) fn walk(
                     each(event);
                 }
                 at += length;
-                ahead = if length < MANY as u64 / 4 { MANY } else { NEAR };
+                // Twice as far as long as records are small: one that is not ends what is near.
+                ahead = if length < MANY as u64 / 4 { (2 * ahead).min(MANY) } else { NEAR };
             }
             Err(None) if is_cut_table(source, header, at)? => {
                 each(Event::Cut { at });

@@ -17,6 +17,7 @@
 //! to the states written after them, until others are written. The file has no checksums: flipped bits within a
 //! value cannot be detected.
 
+mod blocks;
 mod owners;
 mod records;
 mod states;
@@ -39,7 +40,7 @@ use records::{Bytes, Section, Tree};
 use states::StateReader;
 use values::Series;
 
-pub(crate) const FORMAT: Format = Format::binary("binout", recognises, read);
+pub(crate) const FORMAT: Format = Format::binary("binout", recognises, read, blocks::open);
 
 /// Whether a file begins with the header of an LSDA container.
 pub(crate) fn recognises(head: &[u8]) -> bool {
@@ -119,11 +120,17 @@ impl<'a> SectionReader<'a> {
     }
 
     pub(crate) fn read(mut self) -> io::Result<(SolverFile, Diagnostics)> {
-        self.problems.extend(self.beyond_bound());
-        self.problems.extend(self.states.absent(self.section));
-        self.problems.extend(self.lost_ids());
         let Contents { entities, components, wanted } = self.contents()?;
         let histories = self.histories(wanted, &entities)?;
+        Ok(self.file(entities, components, histories))
+    }
+
+    fn file(
+        self,
+        entities: Vec<EntityId>,
+        components: Vec<Arc<str>>,
+        histories: Vec<History>,
+    ) -> (SolverFile, Diagnostics) {
         let version = match (&self.metadata.version, &self.metadata.revision) {
             (Some(version), Some(revision)) => Some(format!("{version} {revision}")),
             (version, _) => version.clone(),
@@ -143,7 +150,7 @@ impl<'a> SectionReader<'a> {
             histories,
             ..SolverFile::default()
         };
-        Ok((file, self.problems))
+        (file, self.problems)
     }
 
     fn beyond_bound(&self) -> Option<Problem> {
@@ -167,6 +174,9 @@ impl<'a> SectionReader<'a> {
 
     fn contents(&mut self) -> io::Result<Contents<'a>> {
         let section = self.section;
+        self.problems.extend(self.beyond_bound());
+        self.problems.extend(self.states.absent(section));
+        self.problems.extend(self.lost_ids());
         let mut contents = Contents::default();
         let mut known: HashSet<EntityId> = HashSet::new();
         let mut lists: Vec<EntityList> = Vec::new();
@@ -245,9 +255,7 @@ impl<'a> SectionReader<'a> {
             self.problems.extend(zeros::suspect(name, &histories));
             keep_selected(&mut histories, selection);
         }
-        let rank: HashMap<EntityId, usize> =
-            entities.iter().enumerate().map(|(k, &id)| (id, k)).collect();
-        histories.sort_by_cached_key(|h: &History| h.entity.and_then(|e| rank.get(&e).copied()));
+        sort(&mut histories, entities);
         Ok(histories)
     }
 
@@ -262,6 +270,13 @@ impl<'a> SectionReader<'a> {
         let listed = legend.into_iter();
         listed.map(|(&id, title)| WithoutData { id, title: Some(title.clone()), reason }).collect()
     }
+}
+
+/// Sorts histories by their entities, as these are sorted.
+fn sort(histories: &mut [History], entities: &[EntityId]) {
+    let rank: HashMap<EntityId, usize> =
+        entities.iter().enumerate().map(|(k, &id)| (id, k)).collect();
+    histories.sort_by_cached_key(|h: &History| h.entity.and_then(|e| rank.get(&e).copied()));
 }
 
 /// Drops what was read for an audit only.

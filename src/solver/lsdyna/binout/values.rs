@@ -25,7 +25,7 @@ pub(super) struct Series<'a> {
 }
 
 /// Index of an entity among the owners, and the entity itself.
-type Kept = (usize, Option<EntityId>);
+pub(super) type Kept = (usize, Option<EntityId>);
 
 #[derive(Default)]
 struct Lacks {
@@ -60,7 +60,7 @@ impl Series<'_> {
         Ok((kept.into_iter().zip(columns.finish()).map(history).collect(), problems))
     }
 
-    fn kept(&self, ordinals: &[usize], selection: &Selection) -> Vec<Kept> {
+    pub(super) fn kept(&self, ordinals: &[usize], selection: &Selection) -> Vec<Kept> {
         if matches!(self.owners, Entities::Global) {
             return vec![(0, None)];
         }
@@ -158,7 +158,7 @@ impl Series<'_> {
 }
 
 /// Where the kept entities' values are in a state's record.
-struct Pick {
+pub(super) struct Pick {
     /// `None` for an entity that the state lacks.
     positions: Vec<Option<usize>>,
     /// From the first to after the last of them.
@@ -168,7 +168,7 @@ struct Pick {
 }
 
 impl Pick {
-    fn new(positions: Vec<Option<usize>>) -> Self {
+    pub(super) fn new(positions: Vec<Option<usize>>) -> Self {
         let known = || positions.iter().flatten().copied();
         let span = match known().min().zip(known().max()) {
             Some((first, last)) => first..last + 1,
@@ -180,13 +180,19 @@ impl Pick {
 
     /// The values of a record that hold those of the kept entities at one of the points that
     /// each entity has. The span must not be empty.
-    fn range(&self, per_entity: usize, point: usize) -> Range<usize> {
+    pub(super) fn range(&self, per_entity: usize, point: usize) -> Range<usize> {
         self.span.start * per_entity..(self.span.end - 1) * per_entity + point + 1
     }
 
     /// Takes a state's values from the record's `row`, which begins with the span's first
     /// entity; returns how many of them are not finite.
-    fn fill(&self, values: &mut [f64], row: &[f64], per_entity: usize, point: usize) -> usize {
+    pub(super) fn fill(
+        &self,
+        values: &mut [f64],
+        row: &[f64],
+        per_entity: usize,
+        point: usize,
+    ) -> usize {
         if self.is_run && per_entity == 1 && row.len() == values.len() {
             values.copy_from_slice(row);
             return row.iter().filter(|v| !v.is_finite()).count();
