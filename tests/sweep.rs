@@ -33,6 +33,9 @@ const DRAWN: &str = "[sweep]\nseed = 7\nsamples = 40\n\
     { what = \"force\", curve = \"inner\", values = [1.0, 1.5] },\n\
     { what = \"gap\", curve = \"inner\", distribution = \"triangular\", from = \"0mm\", mode = \"1mm\", to = \"5mm\" } ]\n";
 
+const SPEEDS: &str = "[sweep]\nseed = 7\nsamples = 40\n\
+    vary = [ { what = \"speed\", train = \"A\", distribution = \"uniform\", from = \"20km/h\", to = \"60km/h\" } ]\n";
+
 struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -319,8 +322,12 @@ fn factors_and_each() {
 
 #[test]
 fn the_same_bytes_for_any_threads_pieces_and_shards() {
-    for plan in [GRID, DRAWN] {
+    for (plan, of_one_impact) in [(GRID, false), (DRAWN, false), (SPEEDS, true)] {
         let folder = Folder::new(plan);
+        if of_one_impact {
+            let head = "# force_kind: body\n# speed_m_per_s: 10\n# speed_kind: closing\n";
+            folder.put("nose.csv", &format!("{head}{}", folder.text("nose.csv")));
+        }
         let run = |threads: &str, name: &str| {
             let status = Command::new(env!("CARGO_BIN_EXE_crumple"))
                 .args(["sweep", "s.toml", "-q", "-o", name])
@@ -332,6 +339,21 @@ fn the_same_bytes_for_any_threads_pieces_and_shards() {
             folder.read(name)
         };
         let whole = run("1", "one.csv");
+        if of_one_impact {
+            // What is said of the curve is said of the speed of the row itself.
+            let (names, rows) = rows(std::str::from_utf8(&whole).unwrap());
+            for row in rows {
+                let speed: f64 = row[1].parse::<f64>().unwrap() * 3.6;
+                let message = &row[names.len() - 1];
+                match message.split_once("closes at ") {
+                    Some((_, rest)) => {
+                        let shown: f64 = rest.split_once(" km/h").unwrap().0.parse().unwrap();
+                        assert!((shown - speed).abs() < 0.01, "{row:?}");
+                    }
+                    None => assert!((speed / 36.0 - 1.0).abs() <= 0.05, "{row:?}"),
+                }
+            }
+        }
         assert!(whole == run("2", "two.csv"));
         assert!(whole == run("5", "five.csv"));
         let whole_h5 = run("2", "two.h5");

@@ -102,7 +102,23 @@ impl Envelope {
 
     /// Force at `deflection_m` by linear interpolation; the first and last force beyond the ends.
     pub fn force_at(&self, deflection_m: f64) -> f64 {
-        let i = self.segment(deflection_m);
+        self.force_in(self.segment(deflection_m), deflection_m)
+    }
+
+    /// The same, looked for near a segment, which becomes the one that holds `deflection_m`.
+    pub(crate) fn force_near(&self, near: &mut usize, deflection_m: f64) -> f64 {
+        let last = self.deflection_m.len() - 2;
+        let holds = |i: usize| {
+            i <= last && (self.deflection_m[i]..self.deflection_m[i + 1]).contains(&deflection_m)
+        };
+        if !holds(*near) {
+            let next = *near + 1;
+            *near = if holds(next) { next } else { self.segment(deflection_m) };
+        }
+        self.force_in(*near, deflection_m)
+    }
+
+    fn force_in(&self, i: usize, deflection_m: f64) -> f64 {
         let (d0, d1) = (self.deflection_m[i], self.deflection_m[i + 1]);
         let (f0, f1) = (self.force_n[i], self.force_n[i + 1]);
         let share = ((deflection_m - d0) / (d1 - d0)).clamp(0.0, 1.0);

@@ -444,6 +444,11 @@ impl Stopping {
         self.stopped_kg.force_at(largest_m.max(0.0)).max(least_kg)
     }
 
+    /// The same, looked for near a segment of the stopped mass, which it becomes.
+    pub(super) fn zone_near_kg(&self, near: &mut usize, largest_m: f64, least_kg: f64) -> f64 {
+        self.stopped_kg.force_near(near, largest_m.max(0.0)).max(least_kg)
+    }
+
     /// Mass that is stopped per deflection, in kg/m.
     pub(super) fn rate_kg_per_m(&self, deflection_m: f64, least_kg: f64) -> f64 {
         let (d, m) = (self.stopped_kg.deflection_m(), self.stopped_kg.force_n());

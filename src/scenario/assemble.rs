@@ -23,7 +23,8 @@ pub(super) fn assemble_at(
 ) -> Result<Prepared, Error> {
     let layout = layout(scenario);
     let (slots, bodies) = (&layout.slots, &layout.bodies);
-    let mut builder = Builder { path, scenario, sources, made: Vec::new(), warnings: Vec::new() };
+    let (made, of_one, warnings) = (Vec::new(), Vec::new(), Vec::new());
+    let mut builder = Builder { path, scenario, sources, made, of_one, warnings };
     let (mut interfaces, mut used) = (Vec::new(), Vec::new());
     for (k, (slot, &speed)) in slots.iter().zip(speeds_m_per_s).enumerate() {
         let (interface, of_curve) = match &slot.joint {
@@ -40,6 +41,9 @@ pub(super) fn assemble_at(
     }
     let chain = Chain::new(bodies.clone(), interfaces)
         .map_err(|error| no_chain(path, scenario, &layout, error))?;
+    let meeting = scenario.meeting_m_per_s();
+    let of_one = builder.of_one;
+    let of_impact: Vec<String> = of_one.iter().flat_map(|o| o.warnings(slots, meeting)).collect();
     let Layout { order, vehicles, .. } = layout;
     let settings = RunSettings::new(scenario.run.duration.0, scenario.run.output_interval.0)
         .with_method(scenario.run.method);
@@ -64,7 +68,10 @@ pub(super) fn assemble_at(
         None => Vec::new(),
     };
     let origin = Origin::new(path, scenario);
-    Ok(Prepared { chain, settings, order, used, limits, limited, warnings, origin })
+    let lasting = warnings.len();
+    warnings.extend(of_impact);
+    let of_one = (of_one, lasting);
+    Ok(Prepared { chain, settings, order, used, limits, limited, warnings, of_one, origin })
 }
 
 /// The bodies of the vehicles that limits hold for; `vehicles` lists those of all trains.
@@ -96,6 +103,10 @@ pub(crate) fn adjust(
         .map(|slot| scenario.curves.get(slot.joint.curve()?).and_then(|c| c.tension.as_ref()))
         .map(|tension| tension.map_or(0.0, |curve| own(curve)))
         .collect();
+    let (of_one, lasting) = &prepared.of_one;
+    let meeting = scenario.meeting_m_per_s();
+    prepared.warnings.truncate(*lasting);
+    prepared.warnings.extend(of_one.iter().flat_map(|of_one| of_one.warnings(slots, meeting)));
     let adjusted = prepared.chain.adjust(&motions, &gaps, &slacks);
     adjusted.map_err(|error| no_chain(path, scenario, &layout, error))
 }
@@ -114,43 +125,54 @@ fn no_chain(
 /// of neighbouring runs differ by some per cent.
 const SAME_RUN: f64 = 0.05;
 
-/// Warns of a curve that is of another speed or mass than the impact it drives, as a model does that is
-/// used outside its range.
-fn of_another_run(
-    curve: &str,
-    slot: &Connection<'_>,
-    spring: &Spring,
-    source: &CurveSource,
-    meeting_m_per_s: f64,
-) -> Vec<String> {
-    let differs = |a: f64, b: f64| (a / b - 1.0).abs() > SAME_RUN;
-    let mut warnings = Vec::new();
-    if let Some(own) = spring.curve.speed_m_per_s.filter(|own| differs(*own, meeting_m_per_s)) {
-        warnings.push(format!(
-            "curve \"{curve}\": it is for {}, but {} closes at {}: forces depend on the impact speed; give the curve of this speed, or a model (crumple train)",
-            km_per_h(own),
-            slot.name,
-            km_per_h(meeting_m_per_s)
-        ));
+#[derive(Clone, Debug)]
+/// A curve that is of one impact, and the interface where it drives the first of the train.
+pub(super) struct OfOneImpact {
+    curve: String,
+    interface: String,
+    speed_m_per_s: Option<f64>,
+    mass_kg: Option<f64>,
+}
+
+impl OfOneImpact {
+    fn new(curve: &str, interface: &str, spring: &Spring, source: &CurveSource) -> Self {
+        let mass_kg = match source {
+            CurveSource::Case(case) => Some(case.conditions.masses.equal_kg()),
+            CurveSource::Predicted(curve) => {
+                let other_kg = curve.other_mass_kg();
+                Some(Masses { body_kg: curve.mass_kg, other_kg }.equal_kg())
+            }
+            _ => None,
+        };
+        let speed_m_per_s = spring.curve.speed_m_per_s;
+        Self { curve: curve.into(), interface: interface.into(), speed_m_per_s, mass_kg }
     }
-    let own_kg = match source {
-        CurveSource::Case(case) => Some(case.conditions.masses.equal_kg()),
-        CurveSource::Predicted(curve) => {
-            let other_kg = curve.other_mass_kg();
-            Some(Masses { body_kg: curve.mass_kg, other_kg }.equal_kg())
+
+    /// Warns if it is of another speed or mass than the impact it drives, as a model does that is used
+    /// outside its range.
+    fn warnings(&self, slots: &[Connection<'_>], meeting_m_per_s: f64) -> Vec<String> {
+        let differs = |a: f64, b: f64| (a / b - 1.0).abs() > SAME_RUN;
+        let Self { curve, interface, .. } = self;
+        let mut warnings = Vec::new();
+        if let Some(own) = self.speed_m_per_s.filter(|own| differs(*own, meeting_m_per_s)) {
+            warnings.push(format!(
+                "curve \"{curve}\": it is for {}, but {interface} closes at {}: forces depend on the impact speed; give the curve of this speed, or a model (crumple train)",
+                km_per_h(own),
+                km_per_h(meeting_m_per_s)
+            ));
         }
-        _ => None,
-    };
-    if let Some(own_kg) = own_kg.filter(|own_kg| differs(*own_kg, slot.mass_kg)) {
-        let shown = Shown::mass(own_kg.max(slot.mass_kg));
-        warnings.push(format!(
-            "curve \"{curve}\": it is for {}, but {} moves {}: give the curve of this mass, or a model (crumple train)",
-            shown.text(own_kg),
-            slot.name,
-            shown.text(slot.mass_kg)
-        ));
+        let now_kg = slots.iter().find(|slot| slot.name == *interface).map(|slot| slot.mass_kg);
+        let masses = self.mass_kg.zip(now_kg).filter(|(own_kg, now_kg)| differs(*own_kg, *now_kg));
+        if let Some((own_kg, now_kg)) = masses {
+            let shown = Shown::mass(own_kg.max(now_kg));
+            warnings.push(format!(
+                "curve \"{curve}\": it is for {}, but {interface} moves {}: give the curve of this mass, or a model (crumple train)",
+                shown.text(own_kg),
+                shown.text(now_kg)
+            ));
+        }
+        warnings
     }
-    warnings
 }
 
 /// What results name as the curve where plates meet.
@@ -171,6 +193,7 @@ struct Builder<'a> {
     scenario: &'a CheckedScenario<'a>,
     sources: &'a Sources,
     made: Vec<CachedLaw>,
+    of_one: Vec<OfOneImpact>,
     warnings: Vec<String>,
 }
 
@@ -342,8 +365,7 @@ impl<'a> Builder<'a> {
         self.check_kind(slot, curve, spring.curve.speed_kind)?;
         let speed_m_per_s = spring.curve.speed_m_per_s;
         if !is_model && matches!(slot.role, Role::Wall | Role::Noses) {
-            let meeting = self.scenario.meeting_m_per_s();
-            self.warnings.extend(of_another_run(curve, slot, &spring, source, meeting));
+            self.of_one.push(OfOneImpact::new(curve, &slot.name, &spring, source));
         }
         let force = spring.curve.kind.map(super::super::curve::ForceKind::name);
         let (law, said) =

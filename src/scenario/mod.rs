@@ -46,6 +46,7 @@ use crate::manifest;
 use crate::multibody::{
     Chain, InterfaceHistory, Run, RunSettings, STANDARD_GRAVITY_M_PER_S2, simulate,
 };
+use assemble::OfOneImpact;
 pub(crate) use assemble::{PLATES, adjust};
 pub use check::CheckedScenario;
 pub(crate) use local::assemble;
@@ -71,6 +72,8 @@ pub struct Prepared {
     pub limited: Vec<usize>,
     /// Warnings of the curves used.
     pub warnings: Vec<String>,
+    /// Curves that are of one impact, and the number of warnings before those on them, which follow speeds and masses.
+    of_one: (Vec<OfOneImpact>, usize),
     origin: Origin,
 }
 

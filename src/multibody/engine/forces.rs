@@ -53,8 +53,18 @@ impl Engine<'_> {
             }
         }
         self.add_rates(&mut net, at, lag_s);
-        self.add_dampers(&mut net, at, lag_s);
-        self.accelerate_against_resistance(&net, lag_s);
+        if self.fixed.has_dampers {
+            self.add_dampers(&mut net, at, lag_s);
+        }
+        if self.by_contacts.is_some() {
+            self.accelerate_against_resistance(&net, lag_s);
+        } else {
+            let (net, per_kg) = (net.values(n), self.per_kg.values(n));
+            for (c, a) in self.a.values_mut(n).iter_mut().enumerate() {
+                let behind = behind(net, c);
+                *a = each(|j| (behind[j] - net[c][j]) * per_kg[c][j]);
+            }
+        }
         self.net_n = Some(net);
     }
 
@@ -84,14 +94,20 @@ impl Engine<'_> {
     /// Crush zones take the mass that has been stopped in the step; their speed and that of what
     /// they take become one, which loses energy and no momentum.
     pub(super) fn stop_mass(&mut self) {
-        for (k, interface) in self.fixed.chain.interfaces().iter().enumerate() {
-            let Some(stopping) = &interface.stopping else { continue };
-            let largest_m = self.push.largest_m(StepPoint::End, k);
+        for taken in &mut self.taken {
+            let k = taken.interface;
+            let Some(stopping) = &self.fixed.chain.interfaces()[k].stopping else { continue };
+            // Only a zone that is crushed further takes mass.
+            let largest_m = self.push.largest_m(StepPoint::End, k).max(0.0);
+            if largest_m == taken.largest_m {
+                continue;
+            }
+            taken.largest_m = largest_m;
             let least_kg = self.fixed.chain.bodies()[stopping.zone].mass_kg;
             let body = self.fixed.layout.of(stopping.body);
             let zone = self.fixed.layout.of(stopping.zone);
             let before_kg = self.mass_kg[zone];
-            let now_kg = stopping.zone_kg(largest_m, least_kg);
+            let now_kg = stopping.zone_near_kg(&mut taken.segment, largest_m, least_kg);
             let taken_kg = now_kg - before_kg;
             if taken_kg <= 0.0 {
                 continue;

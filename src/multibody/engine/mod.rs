@@ -42,7 +42,7 @@ use crate::error::Error;
 use events::Speeds;
 use outputs::OutputRecorder;
 pub(super) use state::Scheme;
-use state::{Engine, Fixed, Losses};
+use state::{Engine, Fixed, Losses, Taken};
 
 /// Runs the chain and fills in `run`.
 pub(super) fn run(
@@ -80,7 +80,7 @@ fn all_outputs<'a, const N: usize>(
     let scheme = engine.fixed.scheme;
     let ahead_s = engine.fixed.ahead_s();
     let steps_per_look = (LOOK_S / h).max(1.0) as usize;
-    let stops = engine.fixed.chain.interfaces().iter().any(|i| i.stopping.is_some());
+    let stops = !engine.taken.is_empty();
     let (mut done, mut until_look) = (0, steps_per_look);
     for output in 1..=grid.outputs {
         engine.kick::<N>(ahead_s);
@@ -185,11 +185,16 @@ impl<'a> Engine<'a> {
         });
         let of = |value: &dyn Fn(usize) -> f64| Rows::of(&layout, bodies.len(), value);
         let has_net = couples || chain.has_rates();
+        let zones = (0..interfaces.len())
+            .filter(|&k| interfaces[k].stopping.is_some())
+            .map(|k| Taken { interface: k, largest_m: f64::NAN, segment: 0 });
+        let has_dampers = interfaces.iter().any(|i| i.damping.is_some());
         let rates = if interfaces.iter().any(|i| i.rate.is_some()) { interfaces.len() } else { 0 };
         let mut engine = Self {
             mass_kg: of(&|i| bodies[i].mass_kg),
             per_kg: of(&|i| 1.0 / bodies[i].mass_kg),
             rate_factors: vec![1.0; rates],
+            taken: zones.collect(),
             x_m: of(&|_| 0.0),
             v: of(&|i| bodies[i].speed_m_per_s),
             a: of(&|_| 0.0),
@@ -204,7 +209,7 @@ impl<'a> Engine<'a> {
             losses: Losses::default(),
             wall_impulse: 0.0,
             events: EventRecorder::new(chain, &layout),
-            fixed: Fixed { chain, scheme, step_s, layout },
+            fixed: Fixed { chain, scheme, step_s, layout, has_dampers },
         };
         engine.move_to_first_contact();
         engine.accelerate_and_kick::<0>(StepPoint::End, 0.0, 0.0);

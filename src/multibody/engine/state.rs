@@ -20,6 +20,15 @@ pub(super) struct Fixed<'a> {
     pub layout: Layout,
     pub scheme: Scheme,
     pub step_s: f64,
+    pub has_dampers: bool,
+}
+
+/// What a crush zone was when it last took mass.
+pub(super) struct Taken {
+    pub interface: usize,
+    /// Its maximum deflection, and the segment of the stopped mass that holds it.
+    pub largest_m: f64,
+    pub segment: usize,
 }
 
 impl Fixed<'_> {
@@ -54,6 +63,8 @@ pub(super) struct Engine<'a> {
     pub net_n: Option<Rows>,
     /// What the speeds multiply the force of each interface by; empty if none has a rate.
     pub rate_factors: Vec<f64>,
+    /// Of every interface with a crush zone.
+    pub taken: Vec<Taken>,
     /// What has happened in the step.
     pub crossings: Vec<Crossing>,
     /// Interfaces that have left their pieces, pulling ones after pushing ones.
