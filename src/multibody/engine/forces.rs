@@ -1,9 +1,9 @@
 //! Forces and accelerations at the present positions and speeds.
 
 use super::super::contacts::{Contacts, StepPoint};
-use super::super::rows::{Rows, behind, each};
+use super::super::rows::{LaneIndex, Rows, behind, each};
 use super::events::Speeds;
-use super::state::Engine;
+use super::state::{Engine, Rated};
 
 impl Engine<'_> {
     /// Forces at the present positions; interfaces that have left their piece are settled.
@@ -53,9 +53,7 @@ impl Engine<'_> {
             }
         }
         self.add_rates(&mut net, at, lag_s);
-        if self.fixed.has_dampers {
-            self.add_dampers(&mut net, at, lag_s);
-        }
+        self.add_dampers(&mut net, at, lag_s);
         if self.by_contacts.is_some() {
             self.accelerate_against_resistance(&net, lag_s);
         } else {
@@ -71,19 +69,13 @@ impl Engine<'_> {
     /// Multiplies the forces of crush zones by what the speeds of their vehicles make of them.
     fn add_rates(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
         self.losses.power.damper_w = 0.0;
-        if self.rate_factors.is_empty() {
-            return;
-        }
-        for (k, interface) in self.fixed.chain.interfaces().iter().enumerate() {
-            let Some(rate) = &interface.rate else { continue };
-            let speed = |i: usize| {
-                let slot = self.fixed.layout.of(i);
-                self.v[slot] + lag_s * self.a_start[slot]
-            };
-            let factor = rate.at(rate.closing_m_per_s(speed));
-            let extra_n = (factor - 1.0) * self.push.force_n(at, k);
-            let slot = self.fixed.layout.of(k);
-            let closing = self.closing(k) + lag_s * self.between(&self.a_start, k);
+        let (v, a, forces) = (&self.v, &self.a_start, self.push.forces_n(at));
+        for rated in &self.fixed.rated {
+            let Rated { interface: k, sides: [slot, next], behind, ahead, .. } = *rated;
+            let speed = |slot: LaneIndex| v[slot] + lag_s * a[slot];
+            let factor = rated.rate.at(speed(behind) - ahead.map_or(0.0, speed));
+            let extra_n = (factor - 1.0) * forces[slot];
+            let closing = v[slot] - v[next] + lag_s * (a[slot] - a[next]);
             net_n[slot] += extra_n;
             self.rate_factors[k] = factor;
             self.losses.power.damper_w += extra_n * closing;
@@ -125,7 +117,8 @@ impl Engine<'_> {
     }
 
     fn add_dampers(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
-        for (k, interface) in self.fixed.chain.interfaces().iter().enumerate() {
+        for &k in &self.fixed.damped {
+            let interface = &self.fixed.chain.interfaces()[k];
             let Some(damping) = &interface.damping else { continue };
             // At 0 only where bodies meet at the start.
             let touches = |contacts: &Contacts<'_>| {

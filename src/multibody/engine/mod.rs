@@ -33,7 +33,7 @@ mod state;
 
 use multiversion::multiversion;
 
-use super::chain::{Chain, Tension};
+use super::chain::{Chain, Interface, Tension};
 use super::contacts::{Contacts, Direction, StepPoint};
 use super::recorder::{EventRecorder, LOOK_S, Moment};
 use super::rows::{Layout, Rows};
@@ -42,7 +42,7 @@ use crate::error::Error;
 use events::Speeds;
 use outputs::OutputRecorder;
 pub(super) use state::Scheme;
-use state::{Engine, Fixed, Losses, Taken};
+use state::{Engine, Fixed, Losses, Rated, Taken};
 
 /// Runs the chain and fills in `run`.
 pub(super) fn run(
@@ -188,8 +188,16 @@ impl<'a> Engine<'a> {
         let zones = (0..interfaces.len())
             .filter(|&k| interfaces[k].stopping.is_some())
             .map(|k| Taken { interface: k, largest_m: f64::NAN, segment: 0 });
-        let has_dampers = interfaces.iter().any(|i| i.damping.is_some());
-        let rates = if interfaces.iter().any(|i| i.rate.is_some()) { interfaces.len() } else { 0 };
+        let rated = |(k, interface): (usize, &Interface)| {
+            let rate = interface.rate.clone()?;
+            let (sides, behind) = ([layout.of(k), layout.of(k + 1)], layout.of(rate.behind));
+            let ahead = rate.ahead.map(|body| layout.of(body));
+            Some(Rated { interface: k, sides, behind, ahead, rate })
+        };
+        let rated: Vec<Rated> = interfaces.iter().enumerate().filter_map(rated).collect();
+        let has_damper = |k: &usize| interfaces[*k].damping.is_some();
+        let damped = (0..interfaces.len()).filter(has_damper).collect();
+        let rates = if rated.is_empty() { 0 } else { interfaces.len() };
         let mut engine = Self {
             mass_kg: of(&|i| bodies[i].mass_kg),
             per_kg: of(&|i| 1.0 / bodies[i].mass_kg),
@@ -209,7 +217,7 @@ impl<'a> Engine<'a> {
             losses: Losses::default(),
             wall_impulse: 0.0,
             events: EventRecorder::new(chain, &layout),
-            fixed: Fixed { chain, scheme, step_s, layout, has_dampers },
+            fixed: Fixed { chain, scheme, step_s, layout, rated, damped },
         };
         engine.move_to_first_contact();
         engine.accelerate_and_kick::<0>(StepPoint::End, 0.0, 0.0);

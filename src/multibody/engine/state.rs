@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::super::chain::Chain;
+use super::super::chain::{Chain, RateFactor};
 use super::super::contacts::{Contacts, Direction, Move, StepPoint};
 use super::super::recorder::EventRecorder;
 use super::super::rows::{LaneIndex, Layout, Rows, each};
@@ -20,7 +20,20 @@ pub(super) struct Fixed<'a> {
     pub layout: Layout,
     pub scheme: Scheme,
     pub step_s: f64,
-    pub has_dampers: bool,
+    /// Interfaces whose force follows a speed, and those with dampers.
+    pub rated: Vec<Rated>,
+    pub damped: Vec<usize>,
+}
+
+/// An interface whose force follows the closing speed of two bodies.
+pub(super) struct Rated {
+    pub interface: usize,
+    /// The bodies at the interface.
+    pub sides: [LaneIndex; 2],
+    /// The bodies whose speed counts.
+    pub behind: LaneIndex,
+    pub ahead: Option<LaneIndex>,
+    pub rate: RateFactor,
 }
 
 /// What a crush zone was when it last took mass.
