@@ -5,6 +5,8 @@
 //! They run where CRUMPLE_PYTHON names a Python with tests/python/requirements.txt, and
 //! CRUMPLE_PYTHON_ISOMME one with requirements-isomme.txt, as tests/run sets them.
 
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -281,18 +283,21 @@ fn forest_is_as_accurate_as_scikit_learn_on_a_smooth_function() {
 /// Records that fall on thresholds or just below them, and others between, as raw doubles.
 fn records_at_thresholds(model: &Value) -> Array2<f64> {
     let trees = model["fitted"]["forest"]["forest"]["trees"].as_array().unwrap();
-    let column = |tree: &Value, name: &str| -> Vec<f64> {
-        tree[name].as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+    let features = |tree: &Value| -> Vec<i64> {
+        tree["feature"].as_array().unwrap().iter().map(|v| v.as_i64().unwrap()).collect()
+    };
+    let numbers = |tree: &Value| -> Vec<f64> {
+        let bytes = BASE64_STANDARD.decode(tree["number"].as_str().unwrap()).unwrap();
+        bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect()
     };
     let mut records = Vec::new();
     for tree in trees.iter().take(5) {
-        let nodes = column(tree, "feature").into_iter().zip(column(tree, "threshold"));
-        for (node, (feature, threshold)) in nodes.filter(|(feature, _)| *feature >= 0.0).enumerate()
-        {
+        let nodes = features(tree).into_iter().zip(numbers(tree));
+        for (node, (feature, threshold)) in nodes.filter(|(feature, _)| *feature >= 0).enumerate() {
             let other = |range: f64| (0.5 + 0.754_877_666 * node as f64).fract() * range;
             for value in [threshold, threshold.next_down()] {
                 records.extend(match feature {
-                    0.0 => [value, other(0.8)],
+                    0 => [value, other(0.8)],
                     _ => [other(25.0), value],
                 });
             }

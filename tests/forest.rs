@@ -351,18 +351,29 @@ fn stored_forests() {
     assert!(old.check().is_ok());
     assert_eq!(old.feature_importance(), None);
     assert_eq!(predicted(&old), predicted(&forest));
+    // The first node's left child, 1, becomes the node itself.
+    let left = stored["trees"][2]["left"].as_str().unwrap().replacen("AQAA", "AAAA", 1);
     #[rustfmt::skip]
     let cases = [
         ("/members/trees/0/first/1", 9.into(), "the samples of the leaves do not fit the trees"),
         ("/members/trees/1/members/0", 300.into(), "the samples of the leaves do not fit the trees"),
         ("/importance", vec![1.0].into(), "the shares of the features do not fit their number"),
-        ("/trees/2/right/0", 3.into(), "node 0 has children that do not stand side by side after it"),
+        ("/trees/2/left", left.into(), "node 0 has children that do not stand side by side after it"),
     ];
     for (part, wrong, expected) in cases {
         let mut damaged = stored.clone();
         let wrong: serde_json::Value = wrong;
         *damaged.pointer_mut(part).unwrap() = wrong;
         assert_eq!(read(damaged).check().unwrap_err().to_string(), expected, "{part}");
+    }
+    for (text, expected) in [
+        ("AAAA", "the node arrays of a tree differ in length"),
+        ("*", "number of a tree: Invalid symbol 42, offset 0."),
+    ] {
+        let mut damaged = stored.clone();
+        damaged["trees"][0]["number"] = text.into();
+        let error = serde_json::from_value::<RegressionForest<f64>>(damaged).unwrap_err();
+        assert_eq!(error.to_string(), expected);
     }
 }
 

@@ -465,7 +465,7 @@ fn model_files_of_another_version_or_with_a_damaged_band_are_refused() {
     let model =
         train("made", &family(&[7.0, 10.0, 13.0]), Choice::Kind(ModelKind::rate())).unwrap();
     let mut json: Value = serde_json::from_slice(&model.to_json().unwrap()).unwrap();
-    assert_eq!(json["version"], 4);
+    assert_eq!(json["version"], 5);
     // As files of earlier programs, whose text nothing guards.
     assert!(json.as_object_mut().unwrap().remove("fingerprint").is_some());
     let path = std::path::Path::new("other.model");
@@ -478,7 +478,7 @@ fn model_files_of_another_version_or_with_a_damaged_band_are_refused() {
     json["version"] = 2.into();
     assert_eq!(
         read(&json).unwrap_err().to_string(),
-        "other.model: the model file has version 2, this program reads version 4: train the model again with crumple train"
+        "other.model: the model file has version 2, this program reads version 5: train the model again with crumple train"
     );
     json["version"] = 4.into();
     for damaged in [serde_json::json!(0.0), serde_json::json!(-1.0)] {

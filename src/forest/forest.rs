@@ -20,6 +20,7 @@ use crate::stream::Stream;
 
 /// A fitted regression forest.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound(serialize = "F: Float + Serialize", deserialize = "F: Float + Deserialize<'de>"))]
 pub struct RegressionForest<F> {
     features: usize,
     params: ForestValidParams<F>,

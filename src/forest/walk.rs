@@ -4,6 +4,8 @@
 //! because neighbours take nearly the same paths in every tree: 32 of them go as one while their ranges lie on one side of the
 //! thresholds, then eight in step. Sums are taken in the order of the trees, so the bits are those of one row by itself.
 
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD as BASE64;
 use linfa::Float;
 use ndarray::ArrayView1;
 use rayon::prelude::*;
@@ -208,6 +210,7 @@ pub(crate) const LEAF: i32 = -1;
 ///
 /// Invariant: children stand side by side after their parent, so every walk ends.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound = "F: Float", into = "StoredTree", try_from = "StoredTree")]
 pub struct Tree<F> {
     /// Feature that the node splits on, or −1 for a leaf.
     pub(super) feature: Vec<i32>,
@@ -215,8 +218,58 @@ pub struct Tree<F> {
     pub(super) threshold: Vec<F>,
     pub(super) left: Vec<u32>,
     pub(super) right: Vec<u32>,
-    /// Mean target of the node's training samples.
+    /// Mean target of a leaf's training samples; 0 for a split.
     pub(super) value: Vec<F>,
+}
+
+/// A tree in files: numbers as the Base64 of their bytes, a quarter of what their digits take to read.
+#[derive(Serialize, Deserialize)]
+struct StoredTree {
+    feature: Vec<i32>,
+    /// Left children as unsigned integers of 32 bits, little endian; the right one is the next node.
+    left: String,
+    /// Threshold of a split or value of a leaf as doubles, little endian.
+    number: String,
+}
+
+impl<F: Float> From<Tree<F>> for StoredTree {
+    fn from(tree: Tree<F>) -> Self {
+        let left: Vec<u8> = tree.left.iter().flat_map(|left| left.to_le_bytes()).collect();
+        let number = |node: usize| {
+            let of = if tree.is_leaf(node) { tree.value[node] } else { tree.threshold[node] };
+            of.to_f64().unwrap_or(f64::NAN).to_le_bytes()
+        };
+        let number: Vec<u8> = (0..tree.nodes()).flat_map(number).collect();
+        Self { left: BASE64.encode(left), number: BASE64.encode(number), feature: tree.feature }
+    }
+}
+
+impl<F: Float> TryFrom<StoredTree> for Tree<F> {
+    type Error = String;
+
+    fn try_from(stored: StoredTree) -> Result<Self, String> {
+        let bytes = |name: &str, text: &str| {
+            BASE64.decode(text).map_err(|error| format!("{name} of a tree: {error}"))
+        };
+        let (left, number) = (bytes("left", &stored.left)?, bytes("number", &stored.number)?);
+        let (left, number) = (left.as_chunks().0, number.as_chunks().0);
+        let nodes = stored.feature.len();
+        if left.len() != nodes || number.len() != nodes {
+            return Err("the node arrays of a tree differ in length".into());
+        }
+        let mut tree = Self::empty();
+        for ((&feature, left), number) in stored.feature.iter().zip(left).zip(number) {
+            let number = F::cast(f64::from_le_bytes(*number));
+            let node = tree.push_leaf(number);
+            if feature != LEAF {
+                let left = u32::from_le_bytes(*left);
+                tree.feature[node] = feature;
+                (tree.threshold[node], tree.value[node]) = (number, F::zero());
+                (tree.left[node], tree.right[node]) = (left, left.saturating_add(1));
+            }
+        }
+        Ok(tree)
+    }
 }
 
 impl<F: Float> Tree<F> {
@@ -247,6 +300,7 @@ impl<F: Float> Tree<F> {
         self.threshold[node] = threshold;
         self.left[node] = left as u32;
         self.right[node] = left as u32 + 1;
+        self.value[node] = F::zero();
     }
 
     /// The mean of the leaf that `record` falls into.
@@ -296,7 +350,7 @@ impl<F: Float> Tree<F> {
                 return Err(error!(Other, "node {node} splits on feature {feature} of {features}"));
             }
             let (left, right) = (self.left[node] as usize, self.right[node] as usize);
-            if left <= node || right != left + 1 || right >= nodes {
+            if left <= node || right != left.saturating_add(1) || right >= nodes {
                 return Err(error!(
                     Other,
                     "node {node} has children that do not stand side by side after it"

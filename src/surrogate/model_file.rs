@@ -24,7 +24,7 @@ use crate::unit::{Speed, SpeedKind, UnitSystem};
 /// Value of a model file's `format`.
 const FORMAT: &str = "crumple model";
 /// Version of the model files that this program writes and reads.
-pub(super) const VERSION: u32 = 4;
+pub(super) const VERSION: u32 = 5;
 /// Maximum number of bytes of a model file: a forest of 50 trees has some millions, one of 200 runs a hundred.
 const MAX_BYTES: u64 = 1 << 30;
 
@@ -111,20 +111,27 @@ impl Model {
             )
         };
         let at_its_place = |e: serde_json::Error| no_model(e.line(), e.column(), e.to_string());
-        let head: Head = serde_json::from_slice(text).map_err(at_its_place)?;
-        if head.format != FORMAT {
-            return Err(no_model(1, 1, format!("its format is \"{}\"", head.format)));
-        }
-        if head.version != VERSION {
-            return Err(error!(
-                Model,
-                "{path}: the model file has version {found}, this program reads version {known}: train the model again with crumple train",
-                known = VERSION,
-                found = head.version,
-                path = path.display()
-            ));
-        }
-        let file: ModelFile<'_> = serde_json::from_slice(text).map_err(at_its_place)?;
+        let file: Result<ModelFile<'_>, _> = serde_json::from_slice(text);
+        let file = match file {
+            Ok(file) if file.format == FORMAT && file.version == VERSION => file,
+            // What another file or version is shows in its head.
+            other => {
+                let head: Head = serde_json::from_slice(text).map_err(at_its_place)?;
+                if head.format != FORMAT {
+                    return Err(no_model(1, 1, format!("its format is \"{}\"", head.format)));
+                }
+                if head.version != VERSION {
+                    return Err(error!(
+                        Model,
+                        "{path}: the model file has version {found}, this program reads version {known}: train the model again with crumple train",
+                        known = VERSION,
+                        found = head.version,
+                        path = path.display()
+                    ));
+                }
+                other.map_err(at_its_place)?
+            }
+        };
         let fitted = |raw: &RawValue| {
             fitted_of(&file.options, raw).map_err(|e| {
                 // The place of the value in the file; what is wrong in it is counted from there.
