@@ -223,8 +223,8 @@ pub(crate) fn root_attributes() -> [(&'static str, AttrValue); 3] {
     ]
 }
 
-/// Encodes a database as the bytes of an HDF5 file.
-pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, Error> {
+/// A database as the HDF5 file that it will be.
+pub(crate) fn encode(database: &Database) -> Result<FileBuilder, Error> {
     let mut file = FileBuilder::new();
     for (name, value) in root_attributes() {
         file.set_attr(name, value);
@@ -253,7 +253,7 @@ pub(crate) fn encode(database: &Database) -> Result<Vec<u8>, Error> {
         }
         file.add_group(group.finish());
     }
-    file.finish().map_err(not_encoded)
+    Ok(file)
 }
 
 pub(crate) struct Opened<'a> {
@@ -271,7 +271,7 @@ pub(crate) struct Opened<'a> {
 const DECLARED_BYTES: u64 = 64 << 20;
 const DECLARED_PER_BYTE: u64 = 32;
 
-fn not_encoded(detail: impl Display) -> Error {
+pub(crate) fn not_encoded(detail: impl Display) -> Error {
     error!(Database, "cannot encode the database: {detail}")
 }
 
@@ -700,7 +700,7 @@ mod tests {
     fn bytes_read(cases: usize) -> (u64, u64) {
         let mut database = Database::default();
         database.put_all((0..cases).map(|k| case(format!("case {k:05}")))).unwrap();
-        let bytes = encode(&database).unwrap();
+        let bytes = encode(&database).unwrap().finish().unwrap();
         let count = |work: &dyn Fn(&Opened<'_>)| {
             let read = Arc::new(AtomicU64::new(0));
             let source = Counting { bytes: bytes.clone(), read: read.clone() };

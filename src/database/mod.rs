@@ -28,13 +28,13 @@ mod group;
 mod layout;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
-use std::fmt;
 use std::path::Path;
+use std::{fmt, io};
 
 use crate::curve::from_table::IMPORTED;
 use crate::curve::{Case, CaseId, Origin, StoppedMass};
 use crate::error::{Error, error};
-use crate::file::{accepts_changed, is_file, write_whole};
+use crate::file::{accepts_changed, is_file, write_at, write_whole};
 use layout::{Content, FoundCase};
 
 /// The cases of one database file.
@@ -117,13 +117,22 @@ impl Database {
     /// If the target cannot be written, and if
     /// something of others would be lost; the old file is unchanged.
     pub fn write(&self, path: &Path) -> Result<(), Error> {
-        if is_file(path)? {
+        let is_there = is_file(path)?;
+        if is_there {
             let foreign = edit::found(&layout::open(path)?)?;
             if !foreign.is_empty() {
                 return edit::write_keeping(self, path, &foreign);
             }
         }
-        write_whole(path, &layout::encode(self)?)
+        let file = layout::encode(self)?;
+        if path.exists() && !is_there {
+            return write_whole(path, &file.finish().map_err(layout::not_encoded)?);
+        }
+        write_at(path, |draft| {
+            file.finish_to(draft).map_err(io::Error::other)?;
+            draft.sync_all().map(Some)
+        })?;
+        Ok(())
     }
 
     /// Whether a case is not what it was when it was written: its hashes are of something else.
