@@ -480,7 +480,7 @@ fn model_files_of_another_version_or_with_a_damaged_band_are_refused() {
         read(&json).unwrap_err().to_string(),
         "other.model: the model file has version 2, this program reads version 5: train the model again with crumple train"
     );
-    json["version"] = 4.into();
+    json["version"] = 5.into();
     for damaged in [serde_json::json!(0.0), serde_json::json!(-1.0)] {
         json["leave_one_out"]["band"]["span_m_per_s"] = damaged;
         let error = read(&json).unwrap_err().to_string();

@@ -368,6 +368,126 @@ fn mean_decelerations_are_those_of_the_histories() {
     assert!((g - 10.65).abs() < 0.01, "{g} g from 50 km/h");
 }
 
+/// What interfaces have taken is all that the ledger has besides motion and resistance; and what occupants meet, found
+/// again step by step from the histories.
+#[test]
+fn energies_of_interfaces_and_loads_of_occupants() {
+    let demo = demo_folder();
+    let demo = demo.path();
+    let mut met = 0;
+    for name in ["scenario.toml", "train-set.toml", "split-ends.toml", "en15227-wagon.toml"] {
+        let result = json(&crumple_ok(demo, &["simulate", name, "--json", "-q"]));
+        let ledger = |key: &str| result["ledger"][key].as_f64().unwrap();
+        let sum = |key: &str| -> f64 {
+            let of = result["summary"]["interfaces"].as_array().unwrap().iter();
+            of.map(|interface| interface[key].as_f64().unwrap()).sum()
+        };
+        let all = ledger("initial_kinetic_J");
+        for (part, whole) in [
+            ("stored_at_end_J", ledger("stored_J")),
+            ("dissipated_at_end_J", ledger("dissipated_J")),
+            ("damped_J", ledger("damped_J")),
+            ("energy_J", all - ledger("kinetic_J") - ledger("resisted_J")),
+        ] {
+            assert!((sum(part) - whole).abs() < 1e-5 * all, "{name} {part}: {} {whole}", sum(part));
+        }
+        assert!((sum("energy_share") - 1.0).abs() < 1e-9, "{name}");
+        let dt = column(&result, "time_s")[1];
+        for body in result["summary"]["bodies"].as_array().unwrap() {
+            let vehicle = body["name"].as_str().unwrap();
+            if body["is_crush_zone"] == true {
+                assert!(body["secondary_impact_m_per_s"].is_null(), "{name} {vehicle}");
+                continue;
+            }
+            // An occupant in small steps, in free flight for 65 mm and then braked by what stops it within 235 mm.
+            let v = column(&result, &format!("v_m_per_s[{vehicle}]"));
+            const PARTS: usize = 200;
+            let speeds: Vec<f64> = (0..(v.len() - 1) * PARTS)
+                .map(|k| {
+                    let (k, share) = (k / PARTS, (k % PARTS) as f64 / PARTS as f64);
+                    v[0] - v[k] - share * (v[k + 1] - v[k])
+                })
+                .collect();
+            let step = dt / PARTS as f64;
+            let path = |speeds: &[f64]| {
+                let mut path = 0.0;
+                speeds.iter().map(|v| (path += v * step, path).1).collect::<Vec<f64>>()
+            };
+            let free = path(&speeds);
+            let impact = free.iter().position(|d| d.abs() >= 0.6).map(|k| speeds[k]);
+            let found = body["secondary_impact_m_per_s"].as_f64();
+            assert_eq!(found.is_some(), impact.is_some(), "{name} {vehicle}");
+            for (found, impact) in found.into_iter().zip(impact) {
+                assert!((found - impact).abs() < 0.01, "{name} {vehicle}: {found} for {impact}");
+            }
+            let Some(load) = body["occupant_load_g"].as_f64().map(|g| g * 9.80665) else {
+                continue;
+            };
+            met += 1;
+            let begin = free.iter().position(|d| d.abs() >= 0.065).unwrap();
+            let restrained: Vec<f64> = speeds[begin..]
+                .iter()
+                .enumerate()
+                .map(|(k, v)| v - load * k as f64 * step)
+                .collect();
+            let end = restrained.iter().position(|v| v * load <= 0.0).unwrap();
+            let stopped = path(&restrained[..end]).last().unwrap().abs();
+            assert!(
+                (stopped - 0.235).abs() < 0.003,
+                "{name} {vehicle}: stopped within {stopped} m"
+            );
+        }
+    }
+    assert!(met > 5, "{met} occupants were restrained");
+}
+
+/// Limits on what occupants meet name the vehicles that are over them, and those that are not known.
+#[test]
+fn limits_on_occupants_are_judged() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let judged = |limits: &str, duration: &str| {
+        let text = std::fs::read_to_string(here.join("train-set.toml")).unwrap();
+        let head = "\n[limits]\nstandard = \"own\"\nedition = \"1\"\nmean_deceleration_g = 50.0\n";
+        let text = text.replace("\"150ms\"", &format!("\"{duration}\""));
+        std::fs::write(here.join("limits.toml"), format!("{text}{head}{limits}\n")).unwrap();
+        let result = json(&crumple_ok(here, "simulate limits.toml --json -q"));
+        (crumple_ok(here, "simulate limits.toml"), result["summary"].clone())
+    };
+    let (_, summary) = judged("", "450ms");
+    assert_eq!(summary["limits"]["occupants"], serde_json::json!([]));
+    let met: Vec<f64> = (0..3)
+        .map(|k| summary["bodies"][k]["occupant_load_g"].as_f64().unwrap_or(f64::NAN).abs())
+        .collect();
+    let most = met.iter().copied().fold(0.0, f64::max);
+    let limit = 0.99 * most;
+    let limits = format!("occupant_load_g = {limit}\nsecondary_impact = \"0.1m/s\"");
+    let (text, summary) = judged(&limits, "450ms");
+    let of = &summary["limits"]["occupants"];
+    assert_eq!(
+        (&of[0]["what"], &of[1]["what"]),
+        (&"secondary_impact_m_per_s".into(), &"occupant_load_g".into())
+    );
+    let over: Vec<&str> =
+        (0..3).filter(|&k| met[k] > limit).map(|k| ["A1", "A2", "A3"][k]).collect();
+    assert_eq!(of[1]["over"], serde_json::json!(over));
+    says(&text, &format!("occupant load over {limit} g: {}", over.join(", ")));
+    let (text, _) = judged(&limits, "15ms");
+    says(
+        &text,
+        "secondary impact over 0.1 m/s: no vehicle; not known, because the run ended before: A1, A2, A3",
+    );
+    for (limits, expected) in [
+        ("occupant_load_g = 0.0", "[limits] occupant_load_g = 0: expected more than 0"),
+        ("secondary_impact = \"8\"", "secondary_impact"),
+    ] {
+        let text = std::fs::read_to_string(here.join("limits.toml")).unwrap();
+        let text = text.split("occupant_load_g").next().unwrap().to_string() + limits + "\n";
+        std::fs::write(here.join("wrong.toml"), text).unwrap();
+        says(&crumple_fails(here, 1, "simulate wrong.toml"), expected);
+    }
+}
+
 /// A run that is too short for its mean deceleration says so, by every method.
 #[test]
 fn a_run_that_ends_while_loading_is_said() {

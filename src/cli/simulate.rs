@@ -120,11 +120,14 @@ fn write_csv(out: &mut dyn Write, columns: &[(String, &[f64])]) -> io::Result<()
 fn print(out: &mut dyn Write, summary: &Summary<'_>, ledger: &Ledger) -> io::Result<()> {
     let largest_n = summary.interfaces.iter().map(|i| i.history.peak_force_n).fold(0.0, f64::max);
     let force = Shown::force(largest_n);
+    let energy = Shown::energy(ledger.initial_kinetic_j);
     let interfaces = Table::of(&summary.interfaces)
         .column("interface", |i| i.name)
         .column("peak force", |i| force.text(i.history.peak_force_n))
         .column("max crush", |i| format!("{:.4} m", i.history.max_deflection_m))
         .column("at", |i| format!("{:.1} ms", i.history.max_deflection_time_s * 1e3))
+        .column("energy", |i| i.energy_j.map_or("-".into(), |j| energy.text(j)))
+        .column("share", |i| i.energy_share.map_or("-".into(), |s| format!("{:.0} %", 1e2 * s)))
         .column("restitution", |i| i.history.restitution.map_or("-".into(), |e| format!("{e:.3}")))
         .column("force", |i| i.used.force.unwrap_or("unknown"))
         .column("curve for", |i| i.used.speed_m_per_s.map_or("-".into(), km_per_h));
@@ -139,7 +142,11 @@ fn print(out: &mut dyn Write, summary: &Summary<'_>, ledger: &Ledger) -> io::Res
         })
         .column("over 120 ms", |b| {
             b.moving_mean_deceleration_g.map_or("-".into(), |a| format!("{a:.2} g"))
-        });
+        })
+        .column("secondary impact", |b| {
+            b.secondary_impact_m_per_s.map_or("-".into(), |v| format!("{v:.1} m/s"))
+        })
+        .column("occupant load", |b| b.occupant_load_g.map_or("-".into(), |a| format!("{a:.1} g")));
     output::table(out, bodies)?;
     if let Some(limits) = &summary.limits {
         print_limits(out, limits)?;
@@ -177,9 +184,10 @@ fn print_limits(out: &mut dyn Write, limits: &Limits<'_>) -> io::Result<()> {
         Some(trains) => format!(", of train {}", trains.join(", ")),
         None => String::new(),
     };
+    let occupants: String = limits.occupants.iter().map(|of| format!("{}\n", of.text())).collect();
     writeln!(
         out,
-        "over {} g ({}:{}{of}): {over}\n{}",
+        "over {} g ({}:{}{of}): {over}\n{occupants}{}",
         limits.mean_deceleration_limit_g, limits.standard, limits.edition, limits.statement
     )
 }

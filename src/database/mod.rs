@@ -35,6 +35,7 @@ use crate::curve::from_table::IMPORTED;
 use crate::curve::{Case, CaseId, Origin, StoppedMass};
 use crate::error::{Error, error};
 use crate::file::{accepts_changed, is_file, write_at, write_whole};
+use crate::hdf5;
 use layout::{Content, FoundCase};
 
 /// The cases of one database file.
@@ -129,7 +130,10 @@ impl Database {
             return write_whole(path, &file.finish().map_err(layout::not_encoded)?);
         }
         write_at(path, |draft| {
-            file.finish_to(draft).map_err(io::Error::other)?;
+            file.finish_to(draft).map_err(|error| match error {
+                hdf5::Error::Io(source) => source,
+                other => io::Error::other(other),
+            })?;
             draft.sync_all().map(Some)
         })?;
         Ok(())

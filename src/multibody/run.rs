@@ -120,6 +120,13 @@ pub struct BodyHistory {
     /// Mean of `−a` over the 120 ms in which its magnitude is largest, with windows that end at
     /// the outputs; `None` in a shorter run and for outputs more than 5 ms apart.
     pub moving_mean_deceleration_m_per_s2: Option<f64>,
+    /// Speed in m/s at which an unrestrained occupant, who goes on at the body's first speed, meets the interior after
+    /// a free flight of 0.6 m relative to the body; below 0 if it meets what is behind it. `None` if the run ends
+    /// before, and for outputs more than 5 ms apart.
+    pub secondary_impact_m_per_s: Option<f64>,
+    /// Occupant load criterion in m/s²: the constant deceleration that stops an occupant relative to the body within
+    /// 235 mm after a free flight of 65 mm; below 0 if it is accelerated. `None` as above.
+    pub occupant_load_m_per_s2: Option<f64>,
 }
 
 /// Histories of one interface, one value per output, and its extremes over all steps.
@@ -140,6 +147,16 @@ pub struct InterfaceHistory {
     /// Energy that is lost, in J.
     #[serde(skip)]
     pub dissipated_j: Vec<f64>,
+    /// Energy that is stored at the end, in J.
+    #[serde(rename = "stored_at_end_J")]
+    pub stored_at_end_j: f64,
+    /// Energy that the curve has dissipated by the end, in J.
+    #[serde(rename = "dissipated_at_end_J")]
+    pub dissipated_at_end_j: f64,
+    /// Energy taken by dampers, by the share of the force that follows speeds, and where mass is stopped, in J;
+    /// `None` by the reference method, which knows the sum only.
+    #[serde(rename = "damped_J")]
+    pub damped_j: Option<f64>,
     /// Largest pushing force in N.
     #[serde(rename = "peak_force_N")]
     pub peak_force_n: f64,
@@ -159,6 +176,13 @@ pub struct InterfaceHistory {
     /// Separation speed over speed of approach at the interface, once it has opened again.
     /// `None` below 0.1 m/s of approach, and above 1: where contacts repeat or neighbours push.
     pub restitution: Option<f64>,
+}
+
+impl InterfaceHistory {
+    /// All energy that it has taken by the end, in J, what it stores among it; `None` if a part is not known.
+    pub fn energy_at_end_j(&self) -> Option<f64> {
+        Some(self.stored_at_end_j + self.dissipated_at_end_j + self.damped_j?)
+    }
 }
 
 /// What a run gives.

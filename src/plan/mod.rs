@@ -79,10 +79,21 @@ pub(crate) enum ResultName {
     EnergyError,
     /// Of the run.
     MomentumError,
+    /// Of each body: over 120 ms.
+    MovingMeanDeceleration,
+    /// Of each body: speed of an unrestrained occupant after 0.6 m.
+    SecondaryImpact,
+    /// Of each body: occupant load criterion.
+    OccupantLoad,
+    /// Of each interface: energy that it has taken.
+    Energy,
 }
 
+/// Results that are written if none are named, the first of [`RESULTS`].
+pub(crate) const USUAL_RESULTS: usize = 8;
+
 /// All results, in the order of their columns.
-pub(crate) const RESULTS: [ResultName; 8] = [
+pub(crate) const RESULTS: [ResultName; 12] = [
     ResultName::PeakForce,
     ResultName::MaxDeflection,
     ResultName::MaxDeflectionTime,
@@ -91,6 +102,10 @@ pub(crate) const RESULTS: [ResultName; 8] = [
     ResultName::MeanDeceleration,
     ResultName::EnergyError,
     ResultName::MomentumError,
+    ResultName::MovingMeanDeceleration,
+    ResultName::SecondaryImpact,
+    ResultName::OccupantLoad,
+    ResultName::Energy,
 ];
 
 /// One thing that is varied.

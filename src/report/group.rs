@@ -419,18 +419,26 @@ fn vehicles(summary: &Summary<'_>) -> impl Into<Table> {
         .column("largest over 120 ms", |body| {
             body.moving_mean_deceleration_g.map_or("–".into(), |a| format!("{a:.2} g"))
         })
+        .column("secondary impact after 0.6 m", |body| {
+            body.secondary_impact_m_per_s.map_or("–".into(), |v| format!("{v:.1} m/s"))
+        })
+        .column("occupant load", |body| {
+            body.occupant_load_g.map_or("–".into(), |a| format!("{a:.1} g"))
+        })
 }
 
 /// Crush and energy of each interface.
 fn interfaces(summary: &Summary<'_>) -> impl Into<Table> {
-    let last = |values: &[f64]| energy(values.last().copied().unwrap_or_default());
     Table::of(&summary.interfaces)
         .column("interface", |of| of.name)
         .column("peak force", |of| force(of.history.peak_force_n))
         .column("maximum crush", |of| metres(of.history.max_deflection_m))
         .column("at", |of| format!("{:.1} ms", 1e3 * of.history.max_deflection_time_s))
-        .column("energy lost", move |of| last(&of.history.dissipated_j))
-        .column("energy stored", move |of| last(&of.history.stored_j))
+        .column("energy lost", |of| {
+            energy(of.history.dissipated_at_end_j + of.history.damped_j.unwrap_or(0.0))
+        })
+        .column("energy stored", |of| energy(of.history.stored_at_end_j))
+        .column("share of energy", |of| of.energy_share.map_or("–".into(), percent))
         .column("curve", |of| &of.used.curve)
         .column("force", |of| of.used.force.unwrap_or("unknown"))
         .column("curve for", |of| of.used.speed_m_per_s.map_or("–".into(), km_per_h))
@@ -446,8 +454,10 @@ fn limits(limits: &Limits<'_>) -> String {
     } else {
         limits.over.join(", ")
     };
+    let occupants: String =
+        limits.occupants.iter().map(|of| format!(" Occupants, {}.", of.text())).collect();
     format!(
-        "Mean deceleration over {} g ({}:{}): {over}. They come from a one-dimensional model, say nothing about survival space, and are not evidence of conformity.",
+        "Mean deceleration over {} g ({}:{}): {over}.{occupants} They come from a one-dimensional model, say nothing about survival space, and are not evidence of conformity.",
         limits.mean_deceleration_limit_g, limits.standard, limits.edition
     )
 }

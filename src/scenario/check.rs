@@ -121,12 +121,14 @@ fn check_shape(scenario: &Scenario) -> Result<(), Error> {
 }
 
 fn check_limits(limits: &LimitsTable, trains: &[TrainTable]) -> Result<(), Error> {
-    let found = limits.mean_deceleration_g;
-    if !(found > 0.0 && found.is_finite()) {
-        return Err(error!(
-            Scenario at "limits.mean_deceleration_g",
-            "[limits] mean_deceleration_g = {found}: expected more than 0"
-        ));
+    for (key, found) in [
+        ("mean_deceleration_g", Some(limits.mean_deceleration_g)),
+        ("occupant_load_g", limits.occupant_load_g),
+    ] {
+        if let Some(found) = found.filter(|found| !(*found > 0.0 && found.is_finite())) {
+            let error = error!(Scenario, "[limits] {key} = {found}: expected more than 0");
+            return Err(error.at(KeyPath::of("limits").key(key)));
+        }
     }
     if limits.trains.as_ref().is_some_and(Vec::is_empty) {
         return Err(error!(

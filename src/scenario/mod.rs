@@ -44,7 +44,7 @@ use serde::Serialize;
 use crate::error::{Document, Error, Place};
 use crate::manifest;
 use crate::multibody::{
-    Chain, InterfaceHistory, Run, RunSettings, STANDARD_GRAVITY_M_PER_S2, simulate,
+    Chain, Interface, InterfaceHistory, Run, RunSettings, STANDARD_GRAVITY_M_PER_S2, simulate,
 };
 use assemble::OfOneImpact;
 pub(crate) use assemble::{PLATES, adjust};
@@ -169,6 +169,11 @@ pub(crate) struct BodySummary<'a> {
     pub(crate) still_loaded_at_end: bool,
     /// Over the 120 ms in which it is largest in magnitude; null in a shorter run.
     pub(crate) moving_mean_deceleration_g: Option<f64>,
+    /// Speed at which an unrestrained occupant meets the interior after 0.6 m; null for a crush zone, and if the run
+    /// ends before.
+    pub(crate) secondary_impact_m_per_s: Option<f64>,
+    /// Occupant load criterion: 65 mm of slack, then stopped within 235 mm; null as above.
+    pub(crate) occupant_load_g: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -176,6 +181,11 @@ pub(crate) struct InterfaceSummary<'a> {
     pub(crate) name: &'a str,
     #[serde(flatten)]
     pub(crate) history: &'a InterfaceHistory,
+    /// Stored, dissipated and damped until the end; null if the last is not known.
+    #[serde(rename = "energy_J")]
+    pub(crate) energy_j: Option<f64>,
+    /// Its share of what all interfaces have taken.
+    pub(crate) energy_share: Option<f64>,
     #[serde(flatten)]
     pub(crate) used: &'a CurveInUse,
 }
@@ -190,9 +200,39 @@ pub(crate) struct Limits<'a> {
     pub(crate) trains: &'a Option<Vec<String>>,
     /// Bodies whose mean deceleration is over it.
     pub(crate) over: Vec<&'a str>,
-    /// Interfaces that were crushed beyond the data of their curves: then `over` is not a verdict.
+    /// Limits on what occupants meet.
+    pub(crate) occupants: Vec<OccupantLimit<'a>>,
+    /// Interfaces that were crushed beyond the data of their curves: then nothing here is a verdict.
     pub(crate) beyond_data: Vec<&'a str>,
     pub(crate) statement: String,
+}
+
+/// What occupants meet against a limit.
+#[derive(Serialize)]
+pub(crate) struct OccupantLimit<'a> {
+    /// `secondary_impact_m_per_s` or `occupant_load_g`.
+    pub(crate) what: &'static str,
+    pub(crate) limit: f64,
+    pub(crate) over: Vec<&'a str>,
+    /// Bodies whose run ended before it was known.
+    pub(crate) unknown: Vec<&'a str>,
+}
+
+impl OccupantLimit<'_> {
+    /// In words.
+    pub(crate) fn text(&self) -> String {
+        let name =
+            |names: &[&str]| if names.is_empty() { "no vehicle".into() } else { names.join(", ") };
+        let (what, unit) = match self.what {
+            "occupant_load_g" => ("occupant load", "g"),
+            _ => ("secondary impact", "m/s"),
+        };
+        let unknown = match &*self.unknown {
+            [] => String::new(),
+            names => format!("; not known, because the run ended before: {}", names.join(", ")),
+        };
+        format!("{what} over {} {unit}: {}{unknown}", self.limit, name(&self.over))
+    }
 }
 
 impl Prepared {
@@ -214,30 +254,67 @@ impl Prepared {
                 is_crush_zone: is_crush_zone(i),
                 still_loaded_at_end: history.is_loaded_at_end,
                 moving_mean_deceleration_g: history.moving_mean_deceleration_m_per_s2.map(in_g),
+                secondary_impact_m_per_s: history
+                    .secondary_impact_m_per_s
+                    .filter(|_| !is_crush_zone(i)),
+                occupant_load_g: history
+                    .occupant_load_m_per_s2
+                    .filter(|_| !is_crush_zone(i))
+                    .map(in_g),
             }
         };
         let bodies: Vec<BodySummary<'a>> = self.order.iter().map(of_body).collect();
+        let judged = || {
+            let all = self.order.iter().zip(&bodies).filter(|(i, _)| self.limited.contains(i));
+            all.map(|(_, body)| body)
+        };
+        let occupants = |limits: &LimitsTable| {
+            type Met<'a> = fn(&BodySummary<'a>) -> Option<f64>;
+            let speed = limits.secondary_impact.as_ref().map(|speed| speed.0);
+            let of: [(_, _, Met<'a>); 2] = [
+                ("secondary_impact_m_per_s", speed, |body| body.secondary_impact_m_per_s),
+                ("occupant_load_g", limits.occupant_load_g, |body| body.occupant_load_g),
+            ];
+            let asked = of.into_iter().filter_map(|(what, limit, met)| Some((what, limit?, met)));
+            let judged = |(what, limit, met): (_, f64, Met<'a>)| OccupantLimit {
+                what,
+                limit,
+                over: judged()
+                    .filter(|body| met(body).is_some_and(|met| met.abs() > limit))
+                    .map(|body| body.name)
+                    .collect(),
+                unknown: judged().filter(|b| met(b).is_none()).map(|body| body.name).collect(),
+            };
+            asked.map(judged).collect()
+        };
         let limits = self.limits.as_ref().map(|limits| Limits {
             standard: &limits.standard,
             edition: &limits.edition,
             mean_deceleration_limit_g: limits.mean_deceleration_g,
             trains: &limits.trains,
-            over: (self.order.iter().zip(&bodies))
-                .filter(|(i, _)| self.limited.contains(i))
-                .filter(|(_, body)| body.mean_deceleration_g.abs() > limits.mean_deceleration_g)
-                .map(|(_, body)| body.name)
+            over: judged()
+                .filter(|body| body.mean_deceleration_g.abs() > limits.mean_deceleration_g)
+                .map(|body| body.name)
                 .collect(),
+            occupants: occupants(limits),
             beyond_data: run.beyond_data().map(|k| &*interfaces[k].name).collect(),
             statement: format!(
                 "mean decelerations come from a one-dimensional model and say nothing about survival space; they are not evidence of conformity with {}:{}",
                 limits.standard, limits.edition
             ),
         });
+        let energy_j = InterfaceHistory::energy_at_end_j;
+        let all_j: Option<f64> = run.interfaces.iter().map(energy_j).sum();
+        let of_interface = |((of, history), used): ((&'a Interface, &'a InterfaceHistory), _)| {
+            let energy_j = energy_j(history);
+            let share = |(energy_j, all_j): (f64, f64)| energy_j / all_j;
+            let energy_share = energy_j.zip(all_j.filter(|all_j| *all_j > 0.0)).map(share);
+            InterfaceSummary { name: &of.name, history, energy_j, energy_share, used }
+        };
+        let interfaces = interfaces.iter().zip(&run.interfaces).zip(&self.used);
         Summary {
             bodies,
-            interfaces: (interfaces.iter().zip(&run.interfaces).zip(&self.used))
-                .map(|((of, history), used)| InterfaceSummary { name: &of.name, history, used })
-                .collect(),
+            interfaces: interfaces.map(of_interface).collect(),
             step_s: run.step_s,
             end_s: run.time_s.last().copied().unwrap_or_default(),
             limits,

@@ -34,7 +34,7 @@ use crate::error::{Document, Error, KeyPath, error};
 use crate::file;
 use crate::manifest;
 use crate::multibody::Chain;
-use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName, Spread};
+use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName, Spread, USUAL_RESULTS};
 use crate::scenario::{self, CheckedScenario, Prepared, Scenario, Sources};
 pub use journal::{WriteOptions, merge, write, write_rows};
 pub use run::Chunk;
@@ -213,7 +213,7 @@ impl Sweep {
 }
 
 fn results(plan: &Plan) -> Result<Vec<ResultName>, Error> {
-    let Some(asked) = &plan.results else { return Ok(RESULTS.to_vec()) };
+    let Some(asked) = &plan.results else { return Ok(RESULTS[..USUAL_RESULTS].to_vec()) };
     let kept: Vec<ResultName> = RESULTS.into_iter().filter(|r| asked.contains(r)).collect();
     if kept.len() == asked.len() && !kept.is_empty() {
         Ok(kept)
@@ -239,6 +239,10 @@ fn result_columns(results: &[ResultName], chain: &Chain, order: &[usize]) -> Vec
         ResultName::MeanDeceleration => of_bodies("mean_deceleration_m_per_s2"),
         ResultName::EnergyError => vec!["energy_error".into()],
         ResultName::MomentumError => vec!["momentum_error".into()],
+        ResultName::MovingMeanDeceleration => of_bodies("moving_mean_deceleration_m_per_s2"),
+        ResultName::SecondaryImpact => of_bodies("secondary_impact_m_per_s"),
+        ResultName::OccupantLoad => of_bodies("occupant_load_m_per_s2"),
+        ResultName::Energy => of_interfaces("energy_J"),
     });
     columns.collect()
 }

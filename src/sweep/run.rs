@@ -191,6 +191,7 @@ fn without_numbers(text: &str) -> impl Iterator<Item = char> {
 
 fn push_results(results: &[ResultName], prepared: &Prepared, run: &Run, values: &mut Vec<f64>) {
     let bodies = || prepared.order.iter().map(|&i| &run.bodies[i]);
+    let known = |value: Option<f64>| value.unwrap_or(f64::NAN);
     for result in results {
         let interfaces = run.interfaces.iter();
         match result {
@@ -200,7 +201,7 @@ fn push_results(results: &[ResultName], prepared: &Prepared, run: &Run, values: 
                 values.extend(interfaces.map(|i| i.max_deflection_time_s));
             }
             ResultName::Restitution => {
-                values.extend(interfaces.map(|i| i.restitution.unwrap_or(f64::NAN)));
+                values.extend(interfaces.map(|i| known(i.restitution)));
             }
             ResultName::FinalSpeed => {
                 values.extend(bodies().map(|b| b.final_v_m_per_s));
@@ -210,6 +211,16 @@ fn push_results(results: &[ResultName], prepared: &Prepared, run: &Run, values: 
             }
             ResultName::EnergyError => values.push(run.ledger.max_energy_error),
             ResultName::MomentumError => values.push(run.ledger.max_momentum_error),
+            ResultName::MovingMeanDeceleration => {
+                values.extend(bodies().map(|b| known(b.moving_mean_deceleration_m_per_s2)));
+            }
+            ResultName::SecondaryImpact => {
+                values.extend(bodies().map(|b| known(b.secondary_impact_m_per_s)));
+            }
+            ResultName::OccupantLoad => {
+                values.extend(bodies().map(|b| known(b.occupant_load_m_per_s2)));
+            }
+            ResultName::Energy => values.extend(interfaces.map(|i| known(i.energy_at_end_j()))),
         }
     }
 }

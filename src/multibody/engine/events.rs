@@ -115,7 +115,9 @@ impl Engine<'_> {
             let sign = direction.sign();
             let factor = self.rate_factors.get(k).copied().unwrap_or(1.0);
             if factor != 1.0 {
-                self.losses.damped_j += (factor - 1.0) * impulse * self.closing(k);
+                let lost_j = (factor - 1.0) * impulse * self.closing(k);
+                self.losses.damped_j += lost_j;
+                self.losses.of[k].damped_j += lost_j;
             }
             self.push_apart(k, factor * sign * impulse, factor * sign * moment);
             if what != Move::default() {
@@ -247,6 +249,7 @@ impl Engine<'_> {
         let impulse = part * self.fixed.step_s * damping.at(closing) * closing;
         if impulse.is_finite() {
             self.losses.damped_j += impulse * closing;
+            self.losses.of[m.k].damped_j += impulse * closing;
             self.push_apart(m.k, impulse, 0.0);
         }
     }

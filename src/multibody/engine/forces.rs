@@ -69,6 +69,7 @@ impl Engine<'_> {
     /// Multiplies the forces of crush zones by what the speeds of their vehicles make of them.
     fn add_rates(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
         self.losses.power.damper_w = 0.0;
+        self.losses.of.iter_mut().for_each(|of| of.power_w = 0.0);
         let (v, a, forces) = (&self.v, &self.a_start, self.push.forces_n(at));
         for rated in &self.fixed.rated {
             let Rated { interface: k, sides: [slot, next], behind, ahead, .. } = *rated;
@@ -79,6 +80,7 @@ impl Engine<'_> {
             net_n[slot] += extra_n;
             self.rate_factors[k] = factor;
             self.losses.power.damper_w += extra_n * closing;
+            self.losses.of[k].power_w += extra_n * closing;
             self.events.interfaces[k].pressed(net_n[slot]);
         }
     }
@@ -105,7 +107,9 @@ impl Engine<'_> {
                 continue;
             }
             let difference = self.v[body] - self.v[zone];
-            self.losses.damped_j += 0.5 * before_kg * taken_kg / now_kg * difference * difference;
+            let lost_j = 0.5 * before_kg * taken_kg / now_kg * difference * difference;
+            self.losses.damped_j += lost_j;
+            self.losses.of[k].damped_j += lost_j;
             self.v[zone] += taken_kg / now_kg * difference;
             for (slot, mass_kg) in [(zone, now_kg), (body, self.mass_kg[body] - taken_kg)] {
                 // The forces stay, and so does the momentum that the next half step takes back.
@@ -138,6 +142,7 @@ impl Engine<'_> {
             }
             net_n[slot] = force;
             self.losses.power.damper_w += (force - spring) * closing;
+            self.losses.of[k].power_w += (force - spring) * closing;
             self.events.interfaces[k].pressed(force);
             self.events.interfaces[k].pulled(-force);
         }

@@ -42,7 +42,7 @@ use crate::error::Error;
 use events::Speeds;
 use outputs::OutputRecorder;
 pub(super) use state::Scheme;
-use state::{Engine, Fixed, Losses, Rated, Taken};
+use state::{Engine, Fixed, Loss, Losses, Rated, Taken};
 
 /// Runs the chain and fills in `run`.
 pub(super) fn run(
@@ -125,6 +125,10 @@ impl Engine<'_> {
             let mean = 0.5 * h;
             let now = self.losses.power;
             self.losses.damped_j += mean * (before.damper_w + now.damper_w);
+            for of in &mut self.losses.of {
+                of.damped_j += mean * (of.before_w + of.power_w);
+                of.before_w = of.power_w;
+            }
             self.losses.resisted_j += mean * (before.resistance_w + now.resistance_w);
             self.losses.impulse += mean * (before.resistance_n + now.resistance_n);
         }
@@ -214,13 +218,14 @@ impl<'a> Engine<'a> {
             crossings: Vec::new(),
             left: Vec::new(),
             end_s: 0.0,
-            losses: Losses::default(),
+            losses: Losses { of: vec![Loss::default(); interfaces.len()], ..Losses::default() },
             wall_impulse: 0.0,
             events: EventRecorder::new(chain, &layout),
             fixed: Fixed { chain, scheme, step_s, layout, rated, damped },
         };
         engine.move_to_first_contact();
         engine.accelerate_and_kick::<0>(StepPoint::End, 0.0, 0.0);
+        engine.losses.of.iter_mut().for_each(|of| of.before_w = of.power_w);
         engine.record_first_contacts();
         engine
     }

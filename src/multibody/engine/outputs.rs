@@ -205,7 +205,12 @@ impl Engine<'_> {
         let dissipated_j = recorder.dissipated_j.sum(n);
         run.ledger = recorder.account.close(recorder.work_j.sum(n) - dissipated_j, dissipated_j);
         let end_s = grid.output_s(grid.outputs);
-        for k in 0..self.fixed.chain.interfaces().len() {
+        for (k, history) in run.interfaces.iter_mut().enumerate() {
+            let slot = self.fixed.layout.of(k);
+            history.dissipated_at_end_j = recorder.dissipated_j[slot];
+            history.stored_at_end_j =
+                (recorder.work_j[slot] - recorder.dissipated_j[slot]).max(0.0);
+            history.damped_j = Some(self.losses.of[k].damped_j);
             self.events.interfaces[k].pressed(self.push.peak_n(k));
             self.events.interfaces[k].deflected(self.push.deflection_m(StepPoint::End, k), end_s);
             if let Some(pull) = &self.pull {

@@ -99,6 +99,16 @@ pub(super) struct Losses {
     /// Of the resistance.
     pub impulse: f64,
     pub power: Power,
+    /// The part of each interface.
+    pub of: Vec<Loss>,
+}
+
+/// Work of what depends on speeds at one interface so far, and its power at the last step and the one before.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Loss {
+    pub damped_j: f64,
+    pub power_w: f64,
+    pub before_w: f64,
 }
 
 /// Power of dampers and resistance, and the resisting force, at the last step.

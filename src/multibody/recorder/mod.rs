@@ -10,11 +10,13 @@
 //! - The force may fall below that for less than a look.
 //! - A contact that changes the speed by less than 0.5 % of the largest change does not count.
 
+mod occupant;
 mod spans;
 
 use super::chain::Chain;
 use super::rows::{LANES, LaneIndex, Layout, Row, Rows, each, larger};
 use super::run::{InterfaceHistory, Record, Run};
+use occupant::{occupant_load_m_per_s2, secondary_impact_m_per_s};
 use spans::{LEAST_N, Look, Phase, Spans};
 pub(super) use spans::{LOOK_S, Moment};
 
@@ -188,6 +190,11 @@ impl EventRecorder {
             }
             history.final_v_m_per_s = final_v_m_per_s;
             history.moving_mean_deceleration_m_per_s2 = moving_mean(&history.v_m_per_s, interval_s);
+            if interval_s <= COARSEST_S {
+                let speeds = &history.v_m_per_s;
+                history.secondary_impact_m_per_s = secondary_impact_m_per_s(speeds, interval_s);
+                history.occupant_load_m_per_s2 = occupant_load_m_per_s2(speeds, interval_s);
+            }
             if record == Record::Summary {
                 history.v_m_per_s = Vec::new();
             }

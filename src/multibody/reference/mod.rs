@@ -210,6 +210,7 @@ impl<'a> Reference<'a> {
             all_stored_j += stored_j;
             all_dissipated_j += dissipated_j;
             self.record_contact(k, &contact, time_s);
+            (history.stored_at_end_j, history.dissipated_at_end_j) = (stored_j, dissipated_j);
             if self.record == Record::Histories {
                 history.deflection_m.push(contact.deflection_m);
                 history.force_n.push(contact.force_n());
