@@ -192,6 +192,87 @@ fn rows_are_those_of_single_runs() {
     assert_eq!(rows.len(), 12);
 }
 
+/// Results that are named: as those of single runs; the share of runs over a limit; what follows what.
+#[test]
+fn further_results_and_what_they_follow() {
+    let plan = "[sweep]\nseed = 5\nsamples = 60\n\
+        results = [\"peak_force\", \"moving_mean_deceleration\", \"secondary_impact\", \"occupant_load\", \"energy\", \"over_limits\"]\n\
+        vary = [ { what = \"speed\", train = \"A\", distribution = \"uniform\", from = \"20km/h\", to = \"60km/h\" },\n\
+        { what = \"mass\", vehicle = \"B2\", distribution = \"uniform\", from = \"19t\", to = \"21t\" } ]\n";
+    let limits = "[limits]\nstandard = \"own\"\nedition = \"1\"\nmean_deceleration_g = 100.0\n\
+        secondary_impact = \"4m/s\"\ntrains = [\"A\"]\n";
+    let folder = Folder::new("");
+    let scenario = SCENARIO.replace("duration = \"60ms\"", "duration = \"500ms\"");
+    assert_ne!(scenario, SCENARIO);
+    for (nose, inner) in [(0.6, 0.4), (3.0, 3.0)] {
+        // Short curves end before the crush does, and then no limit is judged.
+        folder.put("nose.csv", &format!("d_m,force_MN\n0,0\n0.02,3\n0.05,1.6\n{nose},2\n"));
+        folder.put("inner.csv", &format!("d_m,force_MN\n0,0\n0.05,1.2\n{inner},1.4\n"));
+        folder.put("s.toml", &format!("{scenario}{limits}{plan}"));
+        let printed = folder.ok("sweep s.toml -o out.csv --restart");
+        let (header, rows) = rows(&folder.text("out.csv"));
+        let mut over = [0, 0];
+        for row in &rows {
+            let at = |column: &str| row[header.iter().position(|h| h == column).unwrap()].clone();
+            let text = scenario
+                .replace("speed = \"10m/s\"", &format!("speed = \"{}m/s\"", at("speed_m_per_s[A]")))
+                .replace(
+                    "{ name = \"B2\", mass = \"20t\" }",
+                    &format!("{{ name = \"B2\", mass = \"{}kg\" }}", at("mass_kg[B2]")),
+                );
+            folder.put("one.toml", &format!("{text}{limits}"));
+            let run = folder.json("simulate one.toml -q --json");
+            let number = |column: String| at(&column).parse::<f64>().ok();
+            let g = |value: &Value| value.as_f64().map(|g| g * 9.80665);
+            let close = |a: Option<f64>, b: Option<f64>| match (a, b) {
+                (Some(a), Some(b)) => (a - b).abs() <= 1e-12 * b.abs(),
+                (a, b) => a == b,
+            };
+            for body in run["summary"]["bodies"].as_array().unwrap() {
+                let name = body["name"].as_str().unwrap();
+                for (key, expected) in [
+                    ("moving_mean_deceleration_m_per_s2", g(&body["moving_mean_deceleration_g"])),
+                    ("secondary_impact_m_per_s", body["secondary_impact_m_per_s"].as_f64()),
+                    ("occupant_load_m_per_s2", g(&body["occupant_load_g"])),
+                ] {
+                    assert!(close(number(format!("{key}[{name}]")), expected), "{key} {name}");
+                }
+            }
+            for interface in run["summary"]["interfaces"].as_array().unwrap() {
+                let name = interface["name"].as_str().unwrap();
+                assert_eq!(number(format!("energy_J[{name}]")), interface["energy_J"].as_f64());
+            }
+            let judged = &run["summary"]["limits"];
+            let list = |value: &Value| value.as_array().unwrap().clone();
+            let names = list(&judged["occupants"][0]["over"]);
+            let has_all = list(&judged["occupants"][0]["unknown"]).is_empty();
+            let is_known =
+                list(&judged["beyond_data"]).is_empty() && (has_all || !names.is_empty());
+            assert!(names.iter().all(|name| name.as_str().unwrap().starts_with('A')), "{names:?}");
+            let expected = is_known.then(|| if names.is_empty() { 0.0 } else { 1.0 });
+            assert_eq!(number("over_limits".into()), expected);
+            over[0] += usize::from(expected == Some(1.0));
+            over[1] += usize::from(is_known);
+        }
+        assert!(over[0] > 0 && over[0] < over[1], "{over:?}");
+        assert_eq!(over[1] == 60, nose == 3.0, "{over:?}");
+        says(&printed, &format!("over a limit: {} of {} runs", over[0], over[1]));
+        let report = folder.json("sweep s.toml --json -q -o out.csv");
+        let found = |varied: &str, result: &str| {
+            let of = report["sensitivities"].as_array().unwrap().iter();
+            let of = of.filter(|s| s["varied"] == varied && s["result"] == result);
+            of.map(|s| s["rank_correlation"].as_f64().unwrap()).next().unwrap()
+        };
+        let peak = "energy_J[A1|B1]";
+        assert!(found("speed_m_per_s[A]", peak) > 0.98, "{report}");
+        assert!(found("mass_kg[B2]", peak).abs() < 0.4, "{report}");
+        says(&printed, "rank correlation with");
+    }
+    folder.put("s.toml", &format!("{scenario}{plan}"));
+    let said = folder.fails(1, "sweep s.toml -o other.csv");
+    says(&said, "sweep.results: over_limits needs limits: give the scenario [limits]");
+}
+
 /// A member of a band drives as the edge of the same force's band does that another export wrote; gives the crushes.
 fn members_are_between_the_edges(here: &Path, force: &str, sweep: &str) -> Vec<f64> {
     crumple_ok(here, &["export", "lead50.json", "--force", force, "-o", "own.csv"]);

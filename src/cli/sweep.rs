@@ -2,14 +2,17 @@
 
 use crate::plural::counted;
 use std::fs::OpenOptions;
-use std::io::Write;
+use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use crate::sweep::{self, ColumnStatistics, Report, Shard, Sweep, WriteOptions};
+use crate::plan::OVER_LIMITS;
+use crate::sweep::{
+    self, ColumnStatistics, Report, Sensitivity, Shard, Sweep, WriteOptions, share_interval,
+};
 use crate::table::Table;
 
 use super::output::{self, Bar};
@@ -228,6 +231,8 @@ fn say(report: &Report, begun: Instant, output: &Path, global: GlobalOptions) ->
     let document = document! { #[serde(flatten)] report: report, seconds: seconds, output: output };
     global.show(&document, |out| {
         output::table(out, statistics(&report.columns))?;
+        print_sensitivities(out, report)?;
+        print_share_over_limits(out, report)?;
         let resumed = match report.resumed {
             0 => String::new(),
             n if n == report.rows => ", all from an earlier run".into(),
@@ -254,6 +259,49 @@ fn statistics(columns: &[ColumnStatistics]) -> impl Into<Table> {
         .column("95 %", |c| number(c.p95))
         .column("max", |c| number(c.max))
         .column("mean", |c| number(c.mean))
+}
+
+/// Varied quantities that a table has room for; JSON has all.
+const MOST_VARIED: usize = 6;
+
+fn print_sensitivities(out: &mut dyn Write, report: &Report) -> io::Result<()> {
+    let mut varied: Vec<&str> = report.sensitivities.iter().map(|s| &*s.varied).collect();
+    varied.sort_unstable();
+    varied.dedup();
+    if varied.is_empty() || varied.len() > MOST_VARIED {
+        return Ok(());
+    }
+    let results: Vec<&[Sensitivity]> =
+        report.sensitivities.chunk_by(|a, b| a.result == b.result).collect();
+    let table = Table::of(&results).column("rank correlation with", |of| &of[0].result);
+    let table = varied.iter().fold(table, |table, varied| {
+        table.column(*varied, move |of| {
+            let of = of.iter().find(|of| of.varied == *varied);
+            of.map_or("-".into(), |of| format!("{:+.2}", of.rank_correlation))
+        })
+    });
+    output::table(out, table)?;
+    let least = report.sensitivities.iter().map(|s| s.rows).min().unwrap_or(1);
+    writeln!(out, "(Spearman; below {:.2} it may be chance)", 2.0 / (least as f64).sqrt())
+}
+
+fn print_share_over_limits(out: &mut dyn Write, report: &Report) -> io::Result<()> {
+    let Some(column) = report.columns.iter().find(|c| c.column == OVER_LIMITS) else {
+        return Ok(());
+    };
+    let Some(share) = column.mean else {
+        return writeln!(out, "over a limit: not known for any run");
+    };
+    let (low, high) = share_interval(share, column.count);
+    writeln!(
+        out,
+        "over a limit: {:.0} of {} ({:.1} %; with 95 % probability {:.1} to {:.1} %)",
+        share * column.count as f64,
+        counted(column.count, "run"),
+        1e2 * share,
+        1e2 * low,
+        1e2 * high
+    )
 }
 
 /// Six digits.

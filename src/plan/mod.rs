@@ -87,13 +87,39 @@ pub(crate) enum ResultName {
     OccupantLoad,
     /// Of each interface: energy that it has taken.
     Energy,
+    /// Of the run: 1 if a vehicle is over a limit of the scenario, else 0; no value if that is not known.
+    OverLimits,
 }
+
+impl ResultName {
+    /// What its columns begin with: the quantity of a single run.
+    pub(crate) fn quantity(self) -> &'static str {
+        match self {
+            Self::PeakForce => "peak_force_N",
+            Self::MaxDeflection => "max_deflection_m",
+            Self::MaxDeflectionTime => "max_deflection_time_s",
+            Self::Restitution => "restitution",
+            Self::FinalSpeed => "final_v_m_per_s",
+            Self::MeanDeceleration => "mean_deceleration_m_per_s2",
+            Self::EnergyError => "energy_error",
+            Self::MomentumError => "momentum_error",
+            Self::MovingMeanDeceleration => "moving_mean_deceleration_m_per_s2",
+            Self::SecondaryImpact => "secondary_impact_m_per_s",
+            Self::OccupantLoad => "occupant_load_m_per_s2",
+            Self::Energy => "energy_J",
+            Self::OverLimits => OVER_LIMITS,
+        }
+    }
+}
+
+/// The column of [`ResultName::OverLimits`].
+pub(crate) const OVER_LIMITS: &str = "over_limits";
 
 /// Results that are written if none are named, the first of [`RESULTS`].
 pub(crate) const USUAL_RESULTS: usize = 8;
 
 /// All results, in the order of their columns.
-pub(crate) const RESULTS: [ResultName; 12] = [
+pub(crate) const RESULTS: [ResultName; 13] = [
     ResultName::PeakForce,
     ResultName::MaxDeflection,
     ResultName::MaxDeflectionTime,
@@ -106,6 +132,7 @@ pub(crate) const RESULTS: [ResultName; 12] = [
     ResultName::SecondaryImpact,
     ResultName::OccupantLoad,
     ResultName::Energy,
+    ResultName::OverLimits,
 ];
 
 /// One thing that is varied.

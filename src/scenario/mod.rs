@@ -207,6 +207,16 @@ pub(crate) struct Limits<'a> {
     pub(crate) statement: String,
 }
 
+impl Limits<'_> {
+    /// Whether a vehicle is over any of them; `None` if that is not known.
+    pub(crate) fn are_broken(&self) -> Option<bool> {
+        let is_broken =
+            !self.over.is_empty() || self.occupants.iter().any(|of| !of.over.is_empty());
+        let is_known = is_broken || self.occupants.iter().all(|of| of.unknown.is_empty());
+        (is_known && self.beyond_data.is_empty()).then_some(is_broken)
+    }
+}
+
 /// What occupants meet against a limit.
 #[derive(Serialize)]
 pub(crate) struct OccupantLimit<'a> {

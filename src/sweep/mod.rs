@@ -38,7 +38,7 @@ use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName, Spread, USUAL_RES
 use crate::scenario::{self, CheckedScenario, Prepared, Scenario, Sources};
 pub use journal::{WriteOptions, merge, write, write_rows};
 pub use run::Chunk;
-pub(crate) use statistics::ColumnStatistics;
+pub(crate) use statistics::{ColumnStatistics, Sensitivity, share_interval};
 use variables::Variable;
 pub use variables::VariableSummary;
 
@@ -113,6 +113,8 @@ pub struct Report {
     pub messages: Vec<(u64, String)>,
     /// Statistics of the columns of numbers.
     pub(crate) columns: Vec<ColumnStatistics>,
+    /// How the results follow what is varied.
+    pub(crate) sensitivities: Vec<Sensitivity>,
 }
 
 impl Report {
@@ -160,7 +162,7 @@ impl Sweep {
         let invalid =
             |error: Error| error.inside(KeyPath::of("sweep")).placed(|key| document.place(key));
         let (variables, design) = variables::bind(&plan, &scenario).map_err(invalid)?;
-        let results = results(&plan).map_err(invalid)?;
+        let results = results(&plan, scenario.limits.is_some()).map_err(invalid)?;
         let sources = Sources::read(path, &scenario)?;
         let base = scenario::assemble(path, &scenario, &sources)?;
         let hash = hash(path, &text, plan_path, &scenario)?;
@@ -212,8 +214,14 @@ impl Sweep {
     }
 }
 
-fn results(plan: &Plan) -> Result<Vec<ResultName>, Error> {
+fn results(plan: &Plan, has_limits: bool) -> Result<Vec<ResultName>, Error> {
     let Some(asked) = &plan.results else { return Ok(RESULTS[..USUAL_RESULTS].to_vec()) };
+    if asked.contains(&ResultName::OverLimits) && !has_limits {
+        return Err(error!(
+            Sweep at "results",
+            "sweep.results: over_limits needs limits: give the scenario [limits]"
+        ));
+    }
     let kept: Vec<ResultName> = RESULTS.into_iter().filter(|r| asked.contains(r)).collect();
     if kept.len() == asked.len() && !kept.is_empty() {
         Ok(kept)
@@ -224,25 +232,26 @@ fn results(plan: &Plan) -> Result<Vec<ResultName>, Error> {
 
 /// Columns of the results, named as those of a single run.
 fn result_columns(results: &[ResultName], chain: &Chain, order: &[usize]) -> Vec<String> {
-    let of_interfaces = |quantity: &str| -> Vec<String> {
-        chain.interfaces().iter().map(|i| format!("{quantity}[{}]", i.name)).collect()
-    };
-    let of_bodies = |quantity: &str| -> Vec<String> {
-        order.iter().map(|&i| format!("{quantity}[{}]", chain.bodies()[i].name)).collect()
-    };
-    let columns = results.iter().flat_map(|result| match result {
-        ResultName::PeakForce => of_interfaces("peak_force_N"),
-        ResultName::MaxDeflection => of_interfaces("max_deflection_m"),
-        ResultName::MaxDeflectionTime => of_interfaces("max_deflection_time_s"),
-        ResultName::Restitution => of_interfaces("restitution"),
-        ResultName::FinalSpeed => of_bodies("final_v_m_per_s"),
-        ResultName::MeanDeceleration => of_bodies("mean_deceleration_m_per_s2"),
-        ResultName::EnergyError => vec!["energy_error".into()],
-        ResultName::MomentumError => vec!["momentum_error".into()],
-        ResultName::MovingMeanDeceleration => of_bodies("moving_mean_deceleration_m_per_s2"),
-        ResultName::SecondaryImpact => of_bodies("secondary_impact_m_per_s"),
-        ResultName::OccupantLoad => of_bodies("occupant_load_m_per_s2"),
-        ResultName::Energy => of_interfaces("energy_J"),
+    let columns = results.iter().flat_map(|result| {
+        let quantity = result.quantity();
+        let of = |name: &str| format!("{quantity}[{name}]");
+        match result {
+            ResultName::PeakForce
+            | ResultName::MaxDeflection
+            | ResultName::MaxDeflectionTime
+            | ResultName::Restitution
+            | ResultName::Energy => chain.interfaces().iter().map(|i| of(&i.name)).collect(),
+            ResultName::FinalSpeed
+            | ResultName::MeanDeceleration
+            | ResultName::MovingMeanDeceleration
+            | ResultName::SecondaryImpact
+            | ResultName::OccupantLoad => {
+                order.iter().map(|&i| of(&chain.bodies()[i].name)).collect()
+            }
+            ResultName::EnergyError | ResultName::MomentumError | ResultName::OverLimits => {
+                vec![quantity.to_string()]
+            }
+        }
     });
     columns.collect()
 }

@@ -220,6 +220,11 @@ fn push_results(results: &[ResultName], prepared: &Prepared, run: &Run, values: 
             ResultName::OccupantLoad => {
                 values.extend(bodies().map(|b| known(b.occupant_load_m_per_s2)));
             }
+            ResultName::OverLimits => {
+                let summary = prepared.summary(run);
+                let broken = summary.limits.and_then(|limits| limits.are_broken());
+                values.push(known(broken.map(|broken| f64::from(u8::from(broken)))));
+            }
             ResultName::Energy => values.extend(interfaces.map(|i| known(i.energy_at_end_j()))),
         }
     }

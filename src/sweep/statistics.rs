@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::Report;
 use super::row::{Line, Row, ShardHeader, Status};
+use crate::plan::{RESULTS, ResultName};
 use crate::stream::mix;
 
 /// Quantiles come from all rows of a sweep up to this size; of a larger one from about as many
@@ -33,17 +34,19 @@ struct Column {
     sum: f64,
     min: f64,
     max: f64,
+    /// Of the rows in the sample, NaN where there is no number.
     sample: Vec<f64>,
 }
 
 impl Column {
-    fn close(mut self) -> ColumnStatistics {
-        self.sample.sort_by(f64::total_cmp);
+    fn close(self) -> ColumnStatistics {
+        let mut sample: Vec<f64> = self.sample.into_iter().filter(|v| !v.is_nan()).collect();
+        sample.sort_by(f64::total_cmp);
         let quantile = |share: f64| {
-            let last = self.sample.len().checked_sub(1)?;
+            let last = sample.len().checked_sub(1)?;
             let at = share * last as f64;
             let (low, high) = (at.floor() as usize, at.ceil() as usize);
-            let (a, b) = (self.sample[low], self.sample[high]);
+            let (a, b) = (sample[low], sample[high]);
             Some(a + (b - a) * (at - at.floor()))
         };
         let [p5, median, p95] = SHARES.map(quantile);
@@ -56,10 +59,104 @@ impl Column {
             p5,
             median,
             p95,
-            quantiles_from: self.sample.len() as u64,
+            quantiles_from: sample.len() as u64,
             column: self.name,
         }
     }
+}
+
+/// How a result follows a varied quantity.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Sensitivity {
+    pub varied: String,
+    pub result: String,
+    /// Spearman's: 1 if the result always grows with the quantity, −1 if it always falls, about 0 if it does not
+    /// follow it in one direction.
+    pub rank_correlation: f64,
+    /// Rows that it rests on.
+    pub rows: u64,
+}
+
+/// Rank correlations are not given for fewer rows.
+const LEAST_ROWS: usize = 10;
+/// Results that follow nothing: errors of the method, a verdict, a ratio that is often absent.
+const NO_MEASURES: [ResultName; 4] = [
+    ResultName::EnergyError,
+    ResultName::MomentumError,
+    ResultName::Restitution,
+    ResultName::OverLimits,
+];
+
+fn sensitivities(columns: &[Column]) -> Vec<Sensitivity> {
+    let result_of = |column: &Column| {
+        let quantity = column.name.split('[').next();
+        RESULTS.into_iter().find(|result| Some(result.quantity()) == quantity)
+    };
+    let (varied, results): (Vec<&Column>, Vec<&Column>) =
+        columns.iter().partition(|column| result_of(column).is_none());
+    let measures =
+        results.into_iter().filter(|c| result_of(c).is_some_and(|r| !NO_MEASURES.contains(&r)));
+    let ranks_of = |column: &Column| {
+        let is_whole = column.sample.iter().all(|value| !value.is_nan());
+        is_whole.then(|| ranks(&column.sample))
+    };
+    let of_varied: Vec<Option<Vec<f64>>> = varied.iter().map(|column| ranks_of(column)).collect();
+    let mut all = Vec::new();
+    for result in measures {
+        let of_result = ranks_of(result);
+        for (varied, of_varied) in varied.iter().zip(&of_varied) {
+            let (correlation, rows) = match (of_varied, &of_result) {
+                (Some(x), Some(y)) => (correlation(x, y), x.len()),
+                _ => {
+                    let pairs = varied.sample.iter().zip(&result.sample);
+                    let pairs = pairs.filter(|(x, y)| !(x.is_nan() || y.is_nan()));
+                    let (x, y): (Vec<f64>, Vec<f64>) = pairs.map(|(x, y)| (*x, *y)).unzip();
+                    (correlation(&ranks(&x), &ranks(&y)), x.len())
+                }
+            };
+            if let Some(rank_correlation) = correlation.filter(|_| rows >= LEAST_ROWS) {
+                let (varied, result) = (varied.name.clone(), result.name.clone());
+                all.push(Sensitivity { varied, result, rank_correlation, rows: rows as u64 });
+            }
+        }
+    }
+    all
+}
+
+/// The rank of each value; equal ones share the mean of theirs.
+fn ranks(values: &[f64]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    let mut ranks = vec![0.0; values.len()];
+    let mut from = 0;
+    for equal in order.chunk_by(|&a, &b| values[a] == values[b]) {
+        let mean = from as f64 + 0.5 * (equal.len() - 1) as f64;
+        equal.iter().for_each(|&k| ranks[k] = mean);
+        from += equal.len();
+    }
+    ranks
+}
+
+/// Pearson's correlation; `None` if one of the two does not vary.
+fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    let (mean_x, mean_y) = (mean(x), mean(y));
+    let (mut xx, mut yy, mut xy) = (0.0, 0.0, 0.0);
+    for (x, y) in x.iter().zip(y) {
+        let (x, y) = (x - mean_x, y - mean_y);
+        (xx, yy, xy) = (xx + x * x, yy + y * y, xy + x * y);
+    }
+    (xx > 0.0 && yy > 0.0).then(|| xy / (xx * yy).sqrt())
+}
+
+/// A share of `count` runs with the interval that holds it with 95 % probability (Wilson, JASA 22, 1927).
+pub(crate) fn share_interval(share: f64, count: u64) -> (f64, f64) {
+    const Z: f64 = 1.959_963_985;
+    let n = count as f64;
+    let centre = share + Z * Z / (2.0 * n);
+    let half = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
+    let scale = 1.0 + Z * Z / n;
+    ((centre - half).max(0.0) / scale, (centre + half) / scale)
 }
 
 /// A report, row by row.
@@ -97,6 +194,7 @@ impl Tally {
                 warned: 0,
                 messages: Vec::new(),
                 columns: Vec::new(),
+                sensitivities: Vec::new(),
             },
             columns: head.number_columns().map(column).collect(),
             head: head.clone(),
@@ -114,6 +212,9 @@ impl Tally {
     ) {
         let sampled = mix(item) <= self.threshold;
         for (column, value) in self.columns.iter_mut().zip(numbers) {
+            if sampled {
+                column.sample.push(value);
+            }
             if value.is_nan() {
                 continue;
             }
@@ -121,9 +222,6 @@ impl Tally {
             column.sum += value;
             column.min = column.min.min(value);
             column.max = column.max.max(value);
-            if sampled {
-                column.sample.push(value);
-            }
         }
         let report = &mut self.report;
         report.done += 1;
@@ -154,6 +252,7 @@ impl Tally {
     }
 
     pub(crate) fn close(mut self) -> Report {
+        self.report.sensitivities = sensitivities(&self.columns);
         self.report.columns = self.columns.into_iter().map(Column::close).collect();
         self.report
     }
@@ -163,6 +262,37 @@ impl Tally {
 mod tests {
     use super::super::Shard;
     use super::*;
+
+    /// Against ranks and correlations by hand, with ties and missing numbers.
+    #[test]
+    fn results_follow_what_is_varied() {
+        assert_eq!(ranks(&[3.0, 1.0, 3.0, -2.0]), [2.5, 1.0, 2.5, 0.0]);
+        let columns =
+            ["speed_m_per_s[A]", "gap_m[x]", "peak_force_N[A|wall]", "final_v_m_per_s[A]"];
+        let rows = 12;
+        let (x, gap) = (|k: u32| f64::from(k), |_| 1.0);
+        let force = |k: u32| f64::from(k).powi(3);
+        let last = |k: u32| if k == 3 { f64::NAN } else { -f64::from(k / 2) };
+        let of: [&dyn Fn(u32) -> f64; 4] = [&x, &gap, &force, &last];
+        let column = |(name, of): (&&str, &&dyn Fn(u32) -> f64)| Column {
+            name: name.to_string(),
+            count: 0,
+            sum: 0.0,
+            min: 0.0,
+            max: 0.0,
+            sample: (0..rows).map(of).collect(),
+        };
+        let columns: Vec<Column> = columns.iter().zip(&of).map(column).collect();
+        let found = sensitivities(&columns);
+        let names: Vec<(&str, u64)> = found.iter().map(|s| (&*s.result, s.rows)).collect();
+        assert_eq!(names, [("peak_force_N[A|wall]", 12), ("final_v_m_per_s[A]", 11)]);
+        assert!((found[0].rank_correlation - 1.0).abs() < 1e-12);
+        // 11 rows in five pairs and a single one: of 110 only what the pairs' own order adds is missing.
+        let expected = -(110.0 - 5.0 * 0.5) / (110.0 * (110.0 - 5.0 * 0.5) as f64).sqrt();
+        assert!((found[1].rank_correlation - expected).abs() < 1e-12, "{found:?}");
+        let (low, high) = share_interval(0.0, 20);
+        assert!(low == 0.0 && (high - 0.161).abs() < 1e-3, "{high}");
+    }
 
     #[test]
     fn of_small_and_large_sweeps() {
