@@ -725,7 +725,7 @@ fn wall_curves_do_not_drive_pairs() {
     let error = crumple_fails(folder.path(), 1, "simulate s.toml");
     says(
         &error,
-        "curve \"c\" was measured at wall speeds, but interface A1|B1 needs one of closing speeds",
+        "curve \"c\" was measured at wall speeds, but interface A1|B1 needs one of closing speeds: train a model on the wall runs and let it be the vehicles' ends (ends, or front and rear), or, if the wall was the plane of symmetry of two vehicles, build the study with half_model = true",
     );
 }
 

@@ -266,7 +266,7 @@ fn further_results_and_what_they_follow() {
         let peak = "energy_J[A1|B1]";
         assert!(found("speed_m_per_s[A]", peak) > 0.98, "{report}");
         assert!(found("mass_kg[B2]", peak).abs() < 0.4, "{report}");
-        says(&printed, "rank correlation with");
+        says(&printed, "rank corr. mass_kg[B2]");
     }
     folder.put("s.toml", &format!("{scenario}{plan}"));
     let said = folder.fails(1, "sweep s.toml -o other.csv");

@@ -10,9 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use crate::plan::OVER_LIMITS;
-use crate::sweep::{
-    self, ColumnStatistics, Report, Sensitivity, Shard, Sweep, WriteOptions, share_interval,
-};
+use crate::sweep::{self, Report, Shard, Sweep, WriteOptions, share_interval};
 use crate::table::Table;
 
 use super::output::{self, Bar};
@@ -230,8 +228,14 @@ fn say(report: &Report, begun: Instant, output: &Path, global: GlobalOptions) ->
     }
     let document = document! { #[serde(flatten)] report: report, seconds: seconds, output: output };
     global.show(&document, |out| {
-        output::table(out, statistics(&report.columns))?;
-        print_sensitivities(out, report)?;
+        output::table(out, statistics(report))?;
+        if let Some(least) = varied(report).and(report.sensitivities.iter().map(|s| s.rows).min()) {
+            let chance = 2.0 / (least as f64).sqrt();
+            writeln!(
+                out,
+                "rank corr.: Spearman's rank correlation; below {chance:.2} it may be chance"
+            )?;
+        }
         print_share_over_limits(out, report)?;
         let resumed = match report.resumed {
             0 => String::new(),
@@ -249,40 +253,35 @@ fn say(report: &Report, begun: Instant, output: &Path, global: GlobalOptions) ->
     Ok(outcome)
 }
 
-fn statistics(columns: &[ColumnStatistics]) -> impl Into<Table> {
+fn statistics(report: &Report) -> impl Into<Table> {
     let number = |value: Option<f64>| value.map_or("-".into(), digits);
-    Table::of(columns)
+    let table = Table::of(&report.columns)
         .column("column", |c| &c.column)
         .column("min", |c| number(c.min))
         .column("5 %", |c| number(c.p5))
         .column("median", |c| number(c.median))
         .column("95 %", |c| number(c.p95))
         .column("max", |c| number(c.max))
-        .column("mean", |c| number(c.mean))
+        .column("mean", |c| number(c.mean));
+    let sensitivities = &report.sensitivities;
+    varied(report).unwrap_or_default().into_iter().fold(table, |table, varied| {
+        table.column(format!("rank corr. {varied}"), move |column| {
+            let mut of = sensitivities.iter();
+            let of = of.find(|of| of.varied == varied && of.result == column.column);
+            of.map_or("-".into(), |of| format!("{:+.2}", of.rank_correlation))
+        })
+    })
 }
 
 /// Varied quantities that a table has room for; JSON has all.
 const MOST_VARIED: usize = 6;
 
-fn print_sensitivities(out: &mut dyn Write, report: &Report) -> io::Result<()> {
+/// What results may follow, if a table has room for it.
+fn varied(report: &Report) -> Option<Vec<&str>> {
     let mut varied: Vec<&str> = report.sensitivities.iter().map(|s| &*s.varied).collect();
     varied.sort_unstable();
     varied.dedup();
-    if varied.is_empty() || varied.len() > MOST_VARIED {
-        return Ok(());
-    }
-    let results: Vec<&[Sensitivity]> =
-        report.sensitivities.chunk_by(|a, b| a.result == b.result).collect();
-    let table = Table::of(&results).column("rank correlation with", |of| &of[0].result);
-    let table = varied.iter().fold(table, |table, varied| {
-        table.column(*varied, move |of| {
-            let of = of.iter().find(|of| of.varied == *varied);
-            of.map_or("-".into(), |of| format!("{:+.2}", of.rank_correlation))
-        })
-    });
-    output::table(out, table)?;
-    let least = report.sensitivities.iter().map(|s| s.rows).min().unwrap_or(1);
-    writeln!(out, "(Spearman; below {:.2} it may be chance)", 2.0 / (least as f64).sqrt())
+    Some(varied).filter(|varied| (1..=MOST_VARIED).contains(&varied.len()))
 }
 
 fn print_share_over_limits(out: &mut dyn Write, report: &Report) -> io::Result<()> {

@@ -41,7 +41,7 @@ pub(crate) struct Plan {
     /// How distributions are drawn.
     #[serde(default)]
     pub(crate) sampling: Sampling,
-    /// Results to keep; all if absent.
+    /// Results to keep; from `peak_force` to `momentum_error` if absent.
     pub(crate) results: Option<Vec<ResultName>>,
     /// What is varied, in the order of the columns.
     pub(crate) vary: Vec<Vary>,

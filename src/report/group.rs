@@ -407,7 +407,7 @@ pub(super) fn add_train(
 
 /// Masses, speeds and decelerations.
 fn vehicles(summary: &Summary<'_>) -> impl Into<Table> {
-    Table::of(&summary.bodies)
+    Table::of(summary.bodies.iter().filter(|body| !body.is_crush_zone))
         .column("vehicle", |body| body.name)
         .column("mass", |body| mass(body.mass_kg))
         .column("speed before", |body| format!("{:.2} m/s", body.initial_v_m_per_s))

@@ -71,7 +71,18 @@ pub(super) fn assemble_at(
     let lasting = warnings.len();
     warnings.extend(of_impact);
     let of_one = (of_one, lasting);
-    Ok(Prepared { chain, settings, order, used, limits, limited, warnings, of_one, origin })
+    Ok(Prepared {
+        chain,
+        settings,
+        order,
+        used,
+        vehicles,
+        limits,
+        limited,
+        warnings,
+        of_one,
+        origin,
+    })
 }
 
 /// The bodies of the vehicles that limits hold for; `vehicles` lists those of all trains.
@@ -324,10 +335,16 @@ impl<'a> Builder<'a> {
         if kind == expected {
             return Ok(());
         }
+        let way_out = match kind {
+            SpeedKind::Wall => {
+                ": train a model on the wall runs and let it be the vehicles' ends (ends, or front and rear), or, if the wall was the plane of symmetry of two vehicles, build the study with half_model = true"
+            }
+            SpeedKind::Closing => "",
+        };
         let (kind, expected, interface) = (kind.name(), expected.name(), &slot.name);
         let error = error!(
             Scenario,
-            "curve \"{curve}\" was measured at {kind} speeds, but interface {interface} needs one of {expected} speeds"
+            "curve \"{curve}\" was measured at {kind} speeds, but interface {interface} needs one of {expected} speeds{way_out}"
         );
         Err(self.failed(error.at(place::curve(curve))))
     }

@@ -66,6 +66,8 @@ pub struct Prepared {
     pub order: Vec<usize>,
     /// What each interface of the chain uses.
     pub(crate) used: Vec<CurveInUse>,
+    /// Bodies that are vehicles, or what is left of them: the others are masses of crush zones.
+    pub(crate) vehicles: Vec<usize>,
     /// Limits that results are compared with.
     pub(crate) limits: Option<LimitsTable>,
     /// Bodies that the limits hold for: indices into the chain.
@@ -249,8 +251,7 @@ impl Prepared {
     /// What `run`, a run of this scenario, comes to.
     pub(crate) fn summary<'a>(&'a self, run: &'a Run) -> Summary<'a> {
         let (bodies, interfaces) = (self.chain.bodies(), self.chain.interfaces());
-        let is_crush_zone =
-            |i| interfaces.iter().filter_map(|i| i.stopping.as_ref()).any(|s| s.zone == i);
+        let is_crush_zone = |i: usize| !self.vehicles.contains(&i);
         let of_body = |&i: &usize| {
             let (body, history) = (&bodies[i], &run.bodies[i]);
             let in_g = |a_m_per_s2: f64| a_m_per_s2 / STANDARD_GRAVITY_M_PER_S2;
