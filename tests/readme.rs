@@ -30,6 +30,7 @@ documents! {
     the_tour_holds: "docs/tour.md";
     the_reference_holds: "docs/reference.md";
     init_holds: "docs/init.md";
+    scenarios_hold: "docs/scenario.md";
     the_command_line_holds: "docs/command-line.md";
     error_codes_hold: "docs/error-codes.md";
     results_hold: "docs/results.md";
