@@ -256,7 +256,8 @@ fn states_are_written_one_by_one_or_from_the_whole() {
         (1, 50..90) if state < node => 0.0,
         _ => (state + node * 17 + component * 6000) as f64 / 7.0 + 0.25,
     };
-    let written = |change: &dyn Fn(usize, usize, &mut Vec<f64>)| {
+    type Change<'a> = &'a dyn Fn(usize, usize, &mut Vec<f64>);
+    let written = |change: Change<'_>| {
         let mut out = Written::new();
         out.ids("nodout", &(1..=nodes).map(|id| id as i64).collect::<Vec<_>>());
         for state in 0..states {
@@ -270,7 +271,7 @@ fn states_are_written_one_by_one_or_from_the_whole() {
         }
         out.bytes
     };
-    let cases: [(&str, &dyn Fn(usize, usize, &mut Vec<f64>)); 5] = [
+    let cases: [(&str, Change<'_>); 5] = [
         ("", &|_, _, _| {}),
         ("are zero, but not in the states around it", &|state, k, values| {
             if (state, k) == (300, 2) {

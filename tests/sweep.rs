@@ -249,7 +249,7 @@ fn further_results_and_what_they_follow() {
             let is_known =
                 list(&judged["beyond_data"]).is_empty() && (has_all || !names.is_empty());
             assert!(names.iter().all(|name| name.as_str().unwrap().starts_with('A')), "{names:?}");
-            let expected = is_known.then(|| if names.is_empty() { 0.0 } else { 1.0 });
+            let expected = is_known.then_some(if names.is_empty() { 0.0 } else { 1.0 });
             assert_eq!(number("over_limits".into()), expected);
             over[0] += usize::from(expected == Some(1.0));
             over[1] += usize::from(is_known);

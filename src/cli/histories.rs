@@ -170,7 +170,7 @@ fn is_hdf5(args: &Args, output: Option<&Path>) -> Result<bool, Failure> {
     }
     for (name, is_set) in [("--f32", args.f32), ("--chunk", args.chunk)] {
         if is_set && !is_hdf5 {
-            return usage(&format!("{name} is for HDF5 (-o FILE.h5)"));
+            return usage(format!("{name} is for HDF5 (-o FILE.h5)"));
         }
     }
     Ok(is_hdf5)
