@@ -256,7 +256,13 @@ fn further_results_and_what_they_follow() {
         }
         assert!(over[0] > 0 && over[0] < over[1], "{over:?}");
         assert_eq!(over[1] == 60, nose == 3.0, "{over:?}");
-        says(&printed, &format!("over a limit: {} of {} runs", over[0], over[1]));
+        let unknown = 60 - over[1];
+        let expected = match unknown {
+            0 => "confidence interval".to_string(),
+            _ => format!("%: {unknown} are not known)"),
+        };
+        says(&printed, &format!("over a limit: {} of 60 runs (", over[0]));
+        says(&printed, &expected);
         let report = folder.json("sweep s.toml --json -q -o out.csv");
         let found = |varied: &str, result: &str| {
             let of = report["sensitivities"].as_array().unwrap().iter();

@@ -475,8 +475,14 @@ fn limits_on_occupants_are_judged() {
     let (text, _) = judged(&limits, "15ms");
     says(
         &text,
-        "secondary impact over 0.1 m/s: no vehicle; not known, because the run ended before: A1, A2, A3",
+        "secondary impact over 0.1 m/s: no vehicle of which it is known; the run ended before it is known of A1, A2, A3",
     );
+    let text = std::fs::read_to_string(here.join("limits.toml")).unwrap();
+    let coarse = text.replace("output_interval = \"0.75ms\"", "output_interval = \"7.5ms\"");
+    assert_ne!(coarse, text);
+    std::fs::write(here.join("coarse.toml"), coarse).unwrap();
+    let said = crumple_fails(here, 1, "simulate coarse.toml");
+    says(&said, "[limits] on occupants need outputs at most 5 ms apart: shorten output_interval");
     for (limits, expected) in [
         ("occupant_load_g = 0.0", "[limits] occupant_load_g = 0: expected more than 0"),
         ("secondary_impact = \"8\"", "secondary_impact"),

@@ -127,7 +127,9 @@ fn print(out: &mut dyn Write, summary: &Summary<'_>, ledger: &Ledger) -> io::Res
         .column("max crush", |i| format!("{:.4} m", i.history.max_deflection_m))
         .column("at", |i| format!("{:.1} ms", i.history.max_deflection_time_s * 1e3))
         .column("energy", |i| i.energy_j.map_or("-".into(), |j| energy.text(j)))
-        .column("share", |i| i.energy_share.map_or("-".into(), |s| format!("{:.0} %", 1e2 * s)))
+        .column("share of energy", |i| {
+            i.energy_share.map_or("-".into(), |s| format!("{:.0} %", 1e2 * s))
+        })
         .column("restitution", |i| i.history.restitution.map_or("-".into(), |e| format!("{e:.3}")))
         .column("force", |i| i.used.force.unwrap_or("unknown"))
         .column("curve for", |i| i.used.speed_m_per_s.map_or("-".into(), km_per_h));

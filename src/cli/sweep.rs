@@ -124,7 +124,7 @@ pub(super) fn run(args: &Args, global: GlobalOptions) -> CommandResult {
             format!("stopped after {done} of {rows} rows; the same command resumes there");
         return Err(failed(message));
     }
-    say(&report, begun, output, global)
+    say(&report, sweep.is_random(), begun, output, global)
 }
 
 fn is_hdf5(output: &Path) -> bool {
@@ -201,10 +201,17 @@ fn merge(shards: &[PathBuf], output: &Path, global: GlobalOptions) -> CommandRes
         keep_input(input, output)?;
     }
     let begun = Instant::now();
-    say(&sweep::merge(shards, output)?, begun, output, global)
+    say(&sweep::merge(shards, output)?, false, begun, output, global)
 }
 
-fn say(report: &Report, begun: Instant, output: &Path, global: GlobalOptions) -> CommandResult {
+/// Prints what was done; `is_random`: whether the items are known to be a random sample.
+fn say(
+    report: &Report,
+    is_random: bool,
+    begun: Instant,
+    output: &Path,
+    global: GlobalOptions,
+) -> CommandResult {
     let seconds = begun.elapsed().as_secs_f64();
     if report.failed > 0 {
         let mut text = format!(
@@ -230,13 +237,13 @@ fn say(report: &Report, begun: Instant, output: &Path, global: GlobalOptions) ->
     global.show(&document, |out| {
         output::table(out, statistics(report))?;
         if let Some(least) = varied(report).and(report.sensitivities.iter().map(|s| s.rows).min()) {
-            let chance = 2.0 / (least as f64).sqrt();
-            writeln!(
-                out,
-                "rank corr.: Spearman's rank correlation; below {chance:.2} it may be chance"
-            )?;
+            let chance = match is_random {
+                true => format!("; below {:.2} it may be chance", 2.0 / (least as f64).sqrt()),
+                false => String::new(),
+            };
+            writeln!(out, "rank corr.: Spearman's rank correlation{chance}")?;
         }
-        print_share_over_limits(out, report)?;
+        print_share_over_limits(out, report, is_random)?;
         let resumed = match report.resumed {
             0 => String::new(),
             n if n == report.rows => ", all from an earlier run".into(),
@@ -284,23 +291,29 @@ fn varied(report: &Report) -> Option<Vec<&str>> {
     Some(varied).filter(|varied| (1..=MOST_VARIED).contains(&varied.len()))
 }
 
-fn print_share_over_limits(out: &mut dyn Write, report: &Report) -> io::Result<()> {
+fn print_share_over_limits(
+    out: &mut dyn Write,
+    report: &Report,
+    is_random: bool,
+) -> io::Result<()> {
     let Some(column) = report.columns.iter().find(|c| c.column == OVER_LIMITS) else {
         return Ok(());
     };
-    let Some(share) = column.mean else {
-        return writeln!(out, "over a limit: not known for any run");
-    };
-    let (low, high) = share_interval(share, column.count);
-    writeln!(
-        out,
-        "over a limit: {:.0} of {} ({:.1} %; with 95 % probability {:.1} to {:.1} %)",
-        share * column.count as f64,
-        counted(column.count, "run"),
-        1e2 * share,
-        1e2 * low,
-        1e2 * high
-    )
+    let over = (column.mean.unwrap_or(0.0) * column.count as f64).round();
+    let percent = |runs: f64| 1e2 * runs / report.rows as f64;
+    write!(out, "over a limit: {over:.0} of {} (", counted(report.rows, "run"))?;
+    // A run over a limit is known sooner than one that keeps to all: the known ones are no sample.
+    let unknown = report.rows - column.count;
+    if unknown > 0 {
+        let (least, most) = (percent(over), percent(over + unknown as f64));
+        return writeln!(out, "{least:.1} to {most:.1} %: {unknown} are not known)");
+    }
+    write!(out, "{:.1} %", percent(over))?;
+    if is_random {
+        let (low, high) = share_interval(over / report.rows as f64, report.rows);
+        write!(out, "; 95 % confidence interval {:.1} to {:.1} %", 1e2 * low, 1e2 * high)?;
+    }
+    writeln!(out, ")")
 }
 
 /// Six digits.

@@ -24,7 +24,7 @@ mod chain;
 mod contacts;
 mod engine;
 mod law;
-mod recorder;
+pub(crate) mod recorder;
 mod reference;
 mod rows;
 mod run;

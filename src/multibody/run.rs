@@ -121,11 +121,12 @@ pub struct BodyHistory {
     /// the outputs; `None` in a shorter run and for outputs more than 5 ms apart.
     pub moving_mean_deceleration_m_per_s2: Option<f64>,
     /// Speed in m/s at which an unrestrained occupant, who goes on at the body's first speed, meets the interior after
-    /// a free flight of 0.6 m relative to the body; below 0 if it meets what is behind it. `None` if the run ends
+    /// a free flight of 0.6 m relative to the body; above 0 if the occupant goes on in the direction of positive speeds,
+    /// below 0 if against it. `None` if the run ends
     /// before, and for outputs more than 5 ms apart.
     pub secondary_impact_m_per_s: Option<f64>,
     /// Occupant load criterion in m/s²: the constant deceleration that stops an occupant relative to the body within
-    /// 235 mm after a free flight of 65 mm; below 0 if it is accelerated. `None` as above.
+    /// 235 mm after a free flight of 65 mm, with the same sign. `None` as above.
     pub occupant_load_m_per_s2: Option<f64>,
 }
 

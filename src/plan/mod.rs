@@ -81,9 +81,9 @@ pub(crate) enum ResultName {
     MomentumError,
     /// Of each body: over 120 ms.
     MovingMeanDeceleration,
-    /// Of each body: speed of an unrestrained occupant after 0.6 m.
+    /// Of each vehicle: speed of an unrestrained occupant after 0.6 m.
     SecondaryImpact,
-    /// Of each body: occupant load criterion.
+    /// Of each vehicle: occupant load criterion.
     OccupantLoad,
     /// Of each interface: energy that it has taken.
     Energy,
@@ -311,6 +311,14 @@ pub(crate) struct Design {
     pub(crate) items: u64,
     seed: u64,
     sampling: Sampling,
+}
+
+impl Design {
+    /// Whether every variable is drawn by itself.
+    pub(crate) fn is_random(&self) -> bool {
+        self.sampling == Sampling::Random
+            && self.spreads.iter().all(|spread| matches!(spread, Spread::Drawn(_)))
+    }
 }
 
 impl Plan {

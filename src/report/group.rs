@@ -457,7 +457,7 @@ fn limits(limits: &Limits<'_>) -> String {
     let occupants: String =
         limits.occupants.iter().map(|of| format!(" Occupants, {}.", of.text())).collect();
     format!(
-        "Mean deceleration over {} g ({}:{}): {over}.{occupants} They come from a one-dimensional model, say nothing about survival space, and are not evidence of conformity.",
+        "Mean deceleration over {} g ({}:{}): {over}.{occupants} These values come from a one-dimensional model, say nothing about survival space, and are not evidence of conformity.",
         limits.mean_deceleration_limit_g, limits.standard, limits.edition
     )
 }

@@ -136,8 +136,8 @@ fn no_chain(
 /// of neighbouring runs differ by some per cent.
 const SAME_RUN: f64 = 0.05;
 
-#[derive(Clone, Debug)]
 /// A curve that is of one impact, and the interface where it drives the first of the train.
+#[derive(Clone, Debug)]
 pub(super) struct OfOneImpact {
     curve: String,
     interface: String,

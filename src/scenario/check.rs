@@ -9,6 +9,7 @@ use super::{
     CrushZone, CurveTable, LawName, LimitsTable, Scenario, TrainTable, VehicleTable, place,
 };
 use crate::error::{Document, Error, KeyPath, error};
+use crate::multibody::recorder::COARSEST_S;
 use crate::unit::km_per_h;
 
 /// A scenario that has been checked; read its tables as those of the [`Scenario`] it was.
@@ -42,6 +43,14 @@ impl Scenario {
         check_shape(self)?;
         if let Some(limits) = &self.limits {
             check_limits(limits, &self.train)?;
+            let of_occupants =
+                limits.secondary_impact.is_some() || limits.occupant_load_g.is_some();
+            if of_occupants && self.run.output_interval.0 > COARSEST_S {
+                return Err(error!(
+                    Scenario at "run.output_interval",
+                    "[limits] on occupants need outputs at most 5 ms apart: shorten output_interval"
+                ));
+            }
         }
         check_names(self)?;
         check_contact(self)?;

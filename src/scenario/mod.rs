@@ -233,17 +233,20 @@ pub(crate) struct OccupantLimit<'a> {
 impl OccupantLimit<'_> {
     /// In words.
     pub(crate) fn text(&self) -> String {
-        let name =
-            |names: &[&str]| if names.is_empty() { "no vehicle".into() } else { names.join(", ") };
         let (what, unit) = match self.what {
             "occupant_load_g" => ("occupant load", "g"),
             _ => ("secondary impact", "m/s"),
         };
+        let known = match (&*self.over, &*self.unknown) {
+            ([], []) => "no vehicle".into(),
+            ([], _) => "no vehicle of which it is known".into(),
+            (over, _) => over.join(", "),
+        };
         let unknown = match &*self.unknown {
             [] => String::new(),
-            names => format!("; not known, because the run ended before: {}", names.join(", ")),
+            names => format!("; the run ended before it is known of {}", names.join(", ")),
         };
-        format!("{what} over {} {unit}: {}{unknown}", self.limit, name(&self.over))
+        format!("{what} over {} {unit}: {known}{unknown}", self.limit)
     }
 }
 
@@ -310,7 +313,7 @@ impl Prepared {
             occupants: occupants(limits),
             beyond_data: run.beyond_data().map(|k| &*interfaces[k].name).collect(),
             statement: format!(
-                "mean decelerations come from a one-dimensional model and say nothing about survival space; they are not evidence of conformity with {}:{}",
+                "these values come from a one-dimensional model and say nothing about survival space; they are not evidence of conformity with {}:{}",
                 limits.standard, limits.edition
             ),
         });

@@ -47,12 +47,12 @@ pub(crate) struct LimitsTable {
     pub(crate) edition: String,
     /// Of the mean deceleration while the net contact force acts, in g.
     pub(crate) mean_deceleration_g: f64,
-    /// Of the speed at which an unrestrained occupant meets the interior after 0.6 m.
+    /// Limit of the speed at which an unrestrained occupant meets the interior after 0.6 m.
     pub(crate) secondary_impact: Option<ImpactSpeedText>,
-    /// Of the occupant load criterion, in g.
+    /// Limit of the occupant load criterion, in g.
     pub(crate) occupant_load_g: Option<f64>,
     /// Trains whose vehicles (without crush zones that are masses of their own) are compared with
-    /// it, by name; all if absent.
+    /// them, by name; all if absent.
     pub(crate) trains: Option<Vec<String>>,
 }
 

@@ -33,7 +33,6 @@ use serde::Serialize;
 use crate::error::{Document, Error, KeyPath, error};
 use crate::file;
 use crate::manifest;
-use crate::multibody::Chain;
 use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName, Spread, USUAL_RESULTS};
 use crate::scenario::{self, CheckedScenario, Prepared, Scenario, Sources};
 pub use journal::{WriteOptions, merge, write, write_rows};
@@ -190,7 +189,7 @@ impl Sweep {
     pub fn columns(&self) -> Vec<String> {
         let mut columns = vec!["item".to_string()];
         columns.extend(self.variables.iter().map(|v| v.column.clone()));
-        columns.extend(result_columns(&self.results, &self.base.chain, &self.base.order));
+        columns.extend(result_columns(&self.results, &self.base));
         columns.extend(["status", "message"].map(String::from));
         columns
     }
@@ -203,6 +202,11 @@ impl Sweep {
             values: (!matches!(spread, Spread::Drawn(_))).then(|| spread.len()),
         };
         variables.map(summary).collect()
+    }
+
+    /// Whether its items are a random sample, so that their shares estimate probabilities.
+    pub(crate) fn is_random(&self) -> bool {
+        self.design.is_random()
     }
 
     /// The varied values of an item, as they are in its row.
@@ -230,8 +234,9 @@ fn results(plan: &Plan, has_limits: bool) -> Result<Vec<ResultName>, Error> {
     }
 }
 
-/// Columns of the results, named as those of a single run.
-fn result_columns(results: &[ResultName], chain: &Chain, order: &[usize]) -> Vec<String> {
+/// Columns of the results, which begin with the quantities' names.
+fn result_columns(results: &[ResultName], base: &Prepared) -> Vec<String> {
+    let Prepared { chain, order, .. } = base;
     let columns = results.iter().flat_map(|result| {
         let quantity = result.quantity();
         let of = |name: &str| format!("{quantity}[{name}]");
@@ -243,10 +248,12 @@ fn result_columns(results: &[ResultName], chain: &Chain, order: &[usize]) -> Vec
             | ResultName::Energy => chain.interfaces().iter().map(|i| of(&i.name)).collect(),
             ResultName::FinalSpeed
             | ResultName::MeanDeceleration
-            | ResultName::MovingMeanDeceleration
-            | ResultName::SecondaryImpact
-            | ResultName::OccupantLoad => {
+            | ResultName::MovingMeanDeceleration => {
                 order.iter().map(|&i| of(&chain.bodies()[i].name)).collect()
+            }
+            ResultName::SecondaryImpact | ResultName::OccupantLoad => {
+                let vehicles = order.iter().filter(|i| base.vehicles.contains(i));
+                vehicles.map(|&i| of(&chain.bodies()[i].name)).collect()
             }
             ResultName::EnergyError | ResultName::MomentumError | ResultName::OverLimits => {
                 vec![quantity.to_string()]

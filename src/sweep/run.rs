@@ -123,8 +123,7 @@ impl<'a> Worker<'a> {
             Err(error) => {
                 row.status = Status::Failed;
                 row.values.truncate(self.values.len());
-                let chain = &sweep.base.chain;
-                let columns = super::result_columns(&sweep.results, chain, &sweep.base.order);
+                let columns = super::result_columns(&sweep.results, &sweep.base);
                 row.values.resize(self.values.len() + columns.len(), f64::NAN);
                 // The scenario's path is the same for all items and known to the reader.
                 vec![error.message().to_string()]
@@ -191,6 +190,10 @@ fn without_numbers(text: &str) -> impl Iterator<Item = char> {
 
 fn push_results(results: &[ResultName], prepared: &Prepared, run: &Run, values: &mut Vec<f64>) {
     let bodies = || prepared.order.iter().map(|&i| &run.bodies[i]);
+    let vehicles = || {
+        let of = prepared.order.iter().filter(|i| prepared.vehicles.contains(i));
+        of.map(|&i| &run.bodies[i])
+    };
     let known = |value: Option<f64>| value.unwrap_or(f64::NAN);
     for result in results {
         let interfaces = run.interfaces.iter();
@@ -215,10 +218,10 @@ fn push_results(results: &[ResultName], prepared: &Prepared, run: &Run, values: 
                 values.extend(bodies().map(|b| known(b.moving_mean_deceleration_m_per_s2)));
             }
             ResultName::SecondaryImpact => {
-                values.extend(bodies().map(|b| known(b.secondary_impact_m_per_s)));
+                values.extend(vehicles().map(|b| known(b.secondary_impact_m_per_s)));
             }
             ResultName::OccupantLoad => {
-                values.extend(bodies().map(|b| known(b.occupant_load_m_per_s2)));
+                values.extend(vehicles().map(|b| known(b.occupant_load_m_per_s2)));
             }
             ResultName::OverLimits => {
                 let summary = prepared.summary(run);

@@ -209,7 +209,7 @@ impl EventRecorder {
 /// Window of the moving mean deceleration, in s (EN 15227).
 const MOVING_MEAN_S: f64 = 0.120;
 /// Between outputs further apart, in s, the largest mean would be missed by too much.
-const COARSEST_S: f64 = 0.005;
+pub(crate) const COARSEST_S: f64 = 0.005;
 
 /// Mean deceleration in m/s² over the 120 ms in which its magnitude is largest, from the speeds
 /// at both ends; `None` for a record that is shorter or too coarse.

@@ -57,8 +57,8 @@ impl Flight {
     }
 }
 
-/// Speed in m/s at which an unrestrained occupant meets the interior after [`FREE_FLIGHT_M`], below 0 if it meets what
-/// is behind it; `None` if it never does.
+/// Speed in m/s at which an unrestrained occupant meets the interior after [`FREE_FLIGHT_M`], below 0 if it goes
+/// on against the direction of positive speeds; `None` if it never does.
 pub(super) fn secondary_impact_m_per_s(speeds: &[f64], interval_s: f64) -> Option<f64> {
     let flight = Flight::new(speeds, interval_s)?;
     let (k, share) = flight.reaches(FREE_FLIGHT_M)?;
@@ -66,7 +66,7 @@ pub(super) fn secondary_impact_m_per_s(speeds: &[f64], interval_s: f64) -> Optio
 }
 
 /// Occupant load criterion in m/s²: the constant deceleration that stops an occupant relative to the body within
-/// 235 mm after a free flight of 65 mm, below 0 if it is accelerated; `None` if the run ends before.
+/// 235 mm after a free flight of 65 mm, with the same sign; `None` if the run ends before.
 pub(super) fn occupant_load_m_per_s2(speeds: &[f64], interval_s: f64) -> Option<f64> {
     let flight = Flight::new(speeds, interval_s)?;
     let begin = flight.reaches(SLACK_M)?;
