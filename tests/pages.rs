@@ -277,27 +277,6 @@ occupant_load_g = 8.0
 "),
     ("FE's run", &["ReferenceTable"], ""),
     ("Sweeps", &["Plan", "Vary"], "\
-[run]
-duration = \"400ms\"
-
-[curves]
-nose = { stages = [ { stroke = \"1m\", from = \"1MN\" } ], unloading = \"80MN/m\" }
-
-[[train]]
-name = \"A\"
-speed = \"25km/h\"
-vehicles = [ { name = \"A1\", mass = \"24t\" } ]
-
-[wall]
-
-[contact]
-curve = \"nose\"
-
-[limits]
-standard = \"EN 15227\"
-edition = \"2020\"
-mean_deceleration_g = 5.0
-
 [sweep]
 samples = 200
 results = [\"max_deflection\", \"mean_deceleration\", \"over_limits\"]
@@ -318,11 +297,16 @@ fn scenarios_are_described() {
     );
     let folder = tempfile::tempdir().unwrap();
     let mut described = Vec::new();
-    for (heading, tables, example) in PARTS {
+    let mut before = "";
+    for (heading, tables, own) in PARTS {
+        // A sweep is of the scenario above it.
+        let example =
+            if heading == "Sweeps" { format!("{before}\n{own}") } else { own.to_string() };
+        before = if own.is_empty() { before } else { own };
         writeln!(page, "\n## {heading}").unwrap();
         if !example.is_empty() {
             writeln!(page, "\n```toml\n{example}```").unwrap();
-            std::fs::write(folder.path().join("a.toml"), example).unwrap();
+            std::fs::write(folder.path().join("a.toml"), &example).unwrap();
             let run = crumple_ok(folder.path(), "simulate a.toml --json --strict");
             let run: Value = serde_json::from_str(&run).unwrap();
             assert!(run["summary"]["interfaces"][0]["peak_force_N"].as_f64().unwrap() > 0.0);

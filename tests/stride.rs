@@ -394,14 +394,14 @@ fn kinds_are_read_by_their_layout_as_line_by_line() {
     let read_as = |kind: &str, text: &str, selection: &Selection| {
         read_from(kind, &[Box::new(text.as_bytes().to_vec())], selection).unwrap().remove(0)
     };
-    let told = |file: &SolverFile| {
+    let problems = |file: &SolverFile| {
         file.problems.iter().map(|p| (p.code, p.columns, p.message.clone())).collect::<Vec<_>>()
     };
     for (kind, state) in KINDS {
         for selection in [Selection::all(), Selection::nothing()] {
             let even = of_kind(kind, state, 40, false, None);
             let read = read_as(kind, &even, &selection);
-            assert_eq!(told(&read), [], "{kind}");
+            assert_eq!(problems(&read), [], "{kind}");
             assert_eq!(read.time.len(), 40, "{kind}");
             let lines = read_as(kind, &of_kind(kind, state, 40, true, None), &selection);
             assert!(content(&read) == content(&lines), "{kind}");
@@ -409,7 +409,7 @@ fn kinds_are_read_by_their_layout_as_line_by_line() {
                 let damaged = |uneven| of_kind(kind, state, 40, uneven, Some(at));
                 let read = read_as(kind, &damaged(false), &selection);
                 let lines = read_as(kind, &damaged(true), &selection);
-                assert_eq!(told(&read), told(&lines), "{kind} {at}");
+                assert_eq!(problems(&read), problems(&lines), "{kind} {at}");
                 assert!(content(&read) == content(&lines), "{kind} {at}");
             }
         }

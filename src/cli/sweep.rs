@@ -296,13 +296,12 @@ fn print_share_over_limits(
     report: &Report,
     is_random: bool,
 ) -> io::Result<()> {
-    let Some(column) = report.columns.iter().find(|c| c.column == OVER_LIMITS) else {
-        return Ok(());
-    };
+    let column = report.columns.iter().find(|c| c.column == OVER_LIMITS);
+    let Some(column) = column.filter(|_| report.rows > 0) else { return Ok(()) };
     let over = (column.mean.unwrap_or(0.0) * column.count as f64).round();
     let percent = |runs: f64| 1e2 * runs / report.rows as f64;
     write!(out, "over a limit: {over:.0} of {} (", counted(report.rows, "run"))?;
-    // A run over a limit is known sooner than one that keeps to all: the known ones are no sample.
+    // A run over a limit is known sooner than one that keeps to all: the known ones are not a random sample.
     let unknown = report.rows - column.count;
     if unknown > 0 {
         let (least, most) = (percent(over), percent(over + unknown as f64));

@@ -222,7 +222,7 @@ pub struct Tree<F> {
     pub(super) value: Vec<F>,
 }
 
-/// A tree in files: numbers as the Base64 of their bytes, a quarter of what their digits take to read.
+/// A tree in files: numbers as the Base64 of their bytes, which is shorter than their digits and read faster.
 #[derive(Serialize, Deserialize)]
 struct StoredTree {
     feature: Vec<i32>,

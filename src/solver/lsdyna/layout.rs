@@ -224,7 +224,7 @@ impl Layout {
         Plan { reads: self.reads(0..self.head), is_dense, stores: false, audit: false }
     }
 
-    /// Reads the wanted lines and those that are no rows, and the first and last of the rows between them,
+    /// Reads the wanted lines and those that are not rows, and the first and last of the rows between them,
     /// unless most pages are wanted.
     pub(crate) fn some(&self) -> Plan {
         let is_plain = |row: &Row| {
@@ -348,7 +348,7 @@ struct State {
 const MAX_TIME: usize = 24;
 
 impl State {
-    /// Reads a field that is no value; `None` if it contradicts those above it.
+    /// Reads a field that is not a value; `None` if it contradicts those above it.
     fn note(&mut self, field: &Field, line: &[u8]) -> Option<()> {
         let text = field.text(line);
         match field.kind {
@@ -525,7 +525,7 @@ impl Field {
         &line[self.from..self.to]
     }
 
-    /// The number of a line that conforms; `None` if it is no finite one.
+    /// The number of a line that conforms; `None` if it is not finite.
     #[inline(always)]
     fn number(&self, line: &[u8]) -> Option<f64> {
         let quick = match self.kind {

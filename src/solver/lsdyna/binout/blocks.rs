@@ -103,12 +103,11 @@ impl Values {
             None => 1,
         };
         let fits = |record: &DataRecord| record.width() == width * per_entity;
-        let (time, values) = (states.time.clone(), Vec::new());
         histories.extend(kept.iter().map(|&(_, entity)| History {
             entity,
             component: name.clone(),
-            time: time.clone(),
-            values: values.clone(),
+            time: states.time.clone(),
+            values: Vec::new(),
         }));
         let pick = Pick::new(kept.iter().map(|&(k, _)| Some(k)).collect());
         let point = series.point.unwrap_or(0);
