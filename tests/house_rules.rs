@@ -45,7 +45,7 @@ const MAY_NAME: [(&str, &str); 37] = [
     ("sweep", "guess scenario plan multibody hdf5 stream manifest file unit"),
     ("init", "guess scenario surrogate study solver curve signal history file unit"),
     ("assess", "guess plural manifest scenario nsdm rating multibody surrogate dataset database solver curve signal history file unit"),
-    ("charts", "assess multibody surrogate dataset curve signal history plot unit"),
+    ("charts", "guess sweep scenario assess multibody surrogate dataset curve signal history plot unit"),
     ("report", "plural table charts assess scenario multibody surrogate dataset database curve plot unit"),
     ("failure", "report charts sweep assess scenario import init curate nsdm formats multibody surrogate dataset build study database history_hdf5 rating solver manifest plot file"),
 ];

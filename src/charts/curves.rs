@@ -148,7 +148,14 @@ fn add_prediction(panel: &mut Panel, curve: &PredictedCurve) {
     if let (Some(low), Some(high)) = (&curve.force_low_n, &curve.force_high_n) {
         let (low, high) = (to_end(low), to_end(high));
         let name = band_name(curve);
-        panel.bands.push(plot::Band { name, look: PREDICTED, x: to_end(d), low, high });
+        panel.bands.push(plot::Band {
+            name,
+            look: PREDICTED,
+            x: to_end(d),
+            low,
+            high,
+            is_stacked: false,
+        });
     }
     let name = format!("{} at {}", curve.model, speed(curve.speed_m_per_s));
     let mut add = |name: &str, look, force_n: &[f64], shown| {

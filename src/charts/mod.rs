@@ -19,12 +19,17 @@
 //! ```
 
 mod curves;
+mod histories;
 mod motion;
+mod sweep;
 
 use crate::unit::km_per_h;
 pub(crate) use curves::file_curve;
 pub use curves::{group_curves, left_out_at, prediction};
-pub use motion::{Motion, Quantity, histories, train_speeds};
+pub use histories::histories;
+pub(crate) use motion::USUAL_CLASS;
+pub use motion::{Motion, Quantity, motion, train_speeds};
+pub use sweep::sweep;
 
 /// A speed in km/h with at most one digit after the point.
 fn speed(m_per_s: f64) -> String {

@@ -1,68 +1,81 @@
-//! A multi-body run over time: speeds, accelerations, forces, energies; force over deflection; and
-//! the speeds of a train by several methods; histories of a solver file, raw and filtered.
+//! Multi-body runs over time: speeds, accelerations, forces, energies; force over deflection; and
+//! the speeds of a train by several methods.
 
 use crate::assess::train::TrainComparison;
 use crate::error::{Error, ErrorCode, error};
-use crate::history::History;
-use crate::multibody::{Chain, Run};
-use crate::plot::{Axis, Chart, Panel, Series, Shown};
+use crate::guess::hint;
+use crate::multibody::{Run, STANDARD_GRAVITY_M_PER_S2};
+use crate::plot::{Axis, Band, Chart, Panel, Series, Shown};
+use crate::scenario::{PLATES, Prepared};
 use crate::signal::cfc;
-use crate::unit::UnitSystem;
 
 /// What of a run is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Speeds of the bodies over time.
     Velocity,
-    /// Accelerations of the bodies over time.
+    /// Accelerations of the bodies over time, in g, filtered.
     Acceleration,
     /// Forces of the interfaces over time.
     Force,
     /// Forces of the interfaces over their deflection.
     Crush,
-    /// Kinetic, stored and dissipated energy over time.
+    /// Energy over time: what each interface has taken, and what is still kinetic.
     Energy,
+}
+
+impl Quantity {
+    /// Whether it is of interfaces, else of bodies.
+    pub fn is_of_interfaces(self) -> bool {
+        matches!(self, Self::Force | Self::Crush | Self::Energy)
+    }
 }
 
 /// Histories of a body.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct BodyMotion {
-    pub(crate) name: String,
+struct BodyMotion {
+    name: String,
     /// Speed in m/s, one value per time.
-    pub(crate) v_m_per_s: Vec<f64>,
-    pub(crate) a_m_per_s2: Vec<f64>,
+    v_m_per_s: Vec<f64>,
+    a_m_per_s2: Vec<f64>,
+    /// Whether it is drawn without being asked for: crush zones are not.
+    is_usual: bool,
 }
 
 /// Histories of an interface.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct InterfaceMotion {
-    pub(crate) name: String,
+struct InterfaceMotion {
+    name: String,
     /// Deflection in m, one value per time.
-    pub(crate) deflection_m: Vec<f64>,
-    pub(crate) force_n: Vec<f64>,
-}
-
-/// Energies of the whole chain, one value per time, in J.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Energies {
-    pub(crate) kinetic_j: Vec<f64>,
-    /// That would come back.
-    pub(crate) stored_j: Vec<f64>,
-    /// Lost in the interfaces.
-    pub(crate) dissipated_j: Vec<f64>,
+    deflection_m: Vec<f64>,
+    force_n: Vec<f64>,
+    /// Stored and dissipated in J; empty where they are not known.
+    taken_j: Vec<f64>,
+    /// Deflection in m up to which its curve has data.
+    data_end_m: f64,
+    /// Whether it is drawn without being asked for: plates that meet are not.
+    is_usual: bool,
 }
 
 /// A run as it is drawn: from a scenario, or from the file of a result.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motion {
     /// Times in s.
-    pub time_s: Vec<f64>,
+    time_s: Vec<f64>,
     /// In the order of the legend.
-    pub(crate) bodies: Vec<BodyMotion>,
+    bodies: Vec<BodyMotion>,
     /// In the order of the legend.
-    pub(crate) interfaces: Vec<InterfaceMotion>,
-    /// Absent where the masses are not known.
-    pub(crate) energies: Option<Energies>,
+    interfaces: Vec<InterfaceMotion>,
+    /// Kinetic energy in J; empty where the masses are not known.
+    kinetic_j: Vec<f64>,
+    /// Where the curves come from.
+    notes: Vec<String>,
+}
+
+/// Whether a body is the crush zone of another one, by their names.
+fn is_crush_zone(name: &str, all: &[String]) -> bool {
+    let vehicle = name.strip_suffix(" front").or(name.strip_suffix(" rear"));
+    vehicle.is_some_and(|vehicle| all.iter().any(|other| other == vehicle))
 }
 
 fn not_csv(error: csv::Error) -> Error {
@@ -128,11 +141,14 @@ impl Motion {
             };
             header.iter().filter_map(inside).collect::<Vec<String>>()
         };
-        let bodies: Vec<BodyMotion> = names("v_m_per_s")
-            .into_iter()
+        let known = names("v_m_per_s");
+        let bodies: Vec<BodyMotion> = known
+            .iter()
+            .cloned()
             .map(|name| BodyMotion {
                 v_m_per_s: of("v_m_per_s", &name),
                 a_m_per_s2: of("a_m_per_s2", &name),
+                is_usual: !is_crush_zone(&name, &known),
                 name,
             })
             .collect();
@@ -141,104 +157,315 @@ impl Motion {
             .map(|name| InterfaceMotion {
                 deflection_m: of("deflection_m", &name),
                 force_n: of("force_N", &name),
+                taken_j: Vec::new(),
+                data_end_m: f64::INFINITY,
+                is_usual: true,
                 name,
             })
             .collect();
         if bodies.is_empty() && interfaces.is_empty() {
             return Err(other_columns());
         }
-        Ok(Self { time_s: columns.swap_remove(0), bodies, interfaces, energies: None })
+        let time_s = columns.swap_remove(0);
+        Ok(Self { time_s, bodies, interfaces, kinetic_j: Vec::new(), notes: Vec::new() })
     }
 
-    /// Of a run of a chain, with the bodies in the order of `order` (indices into the chain).
-    pub fn of_run(chain: &Chain, run: &Run, order: &[usize]) -> Self {
+    /// Of a run of a scenario. `notes` say where its curves come from, a line each.
+    pub fn of_run(prepared: &Prepared, run: &Run, notes: Vec<String>) -> Self {
+        let bodies = prepared.chain.bodies();
         let body = |&i: &usize| BodyMotion {
-            name: chain.bodies()[i].name.clone(),
+            name: bodies[i].name.clone(),
             v_m_per_s: run.bodies[i].v_m_per_s.clone(),
             a_m_per_s2: run.bodies[i].a_m_per_s2.clone(),
+            is_usual: prepared.vehicles.contains(&i),
         };
-        let interfaces = chain.interfaces().iter().zip(&run.interfaces);
-        let states = run.time_s.len();
-        let sum = |of: &dyn Fn(usize) -> f64| (0..states).map(of).collect::<Vec<f64>>();
+        let interfaces = prepared.chain.interfaces().iter().zip(&run.interfaces);
         let kinetic = |t: usize| {
-            let bodies = chain.bodies().iter().zip(&run.bodies);
+            let bodies = bodies.iter().zip(&run.bodies);
             bodies.map(|(b, h)| 0.5 * b.mass_kg * h.v_m_per_s[t] * h.v_m_per_s[t]).sum()
         };
         Self {
             time_s: run.time_s.clone(),
-            bodies: order.iter().map(body).collect(),
+            bodies: prepared.order.iter().map(body).collect(),
             interfaces: interfaces
-                .map(|(interface, history)| InterfaceMotion {
+                .zip(&prepared.used)
+                .map(|((interface, history), used)| InterfaceMotion {
                     name: interface.name.clone(),
                     deflection_m: history.deflection_m.clone(),
                     force_n: history.force_n.clone(),
+                    taken_j: history
+                        .stored_j
+                        .iter()
+                        .zip(&history.dissipated_j)
+                        .map(|(stored, dissipated)| stored + dissipated)
+                        .collect(),
+                    data_end_m: history.data_end_m,
+                    is_usual: used.curve != PLATES,
                 })
                 .collect(),
-            energies: Some(Energies {
-                kinetic_j: sum(&kinetic),
-                stored_j: sum(&|t| run.interfaces.iter().map(|i| i.stored_j[t]).sum()),
-                dissipated_j: sum(&|t| run.interfaces.iter().map(|i| i.dissipated_j[t]).sum()),
-            }),
+            kinetic_j: (0..run.time_s.len()).map(kinetic).collect(),
+            notes,
         }
     }
 
-    /// The chart of one quantity; `None` for energies that are not known.
-    pub fn chart(&self, title: &str, quantity: Quantity) -> Option<Chart> {
-        let panel = match quantity {
-            Quantity::Velocity => {
-                self.of_bodies(Axis::new("speed", "m/s", 1.0), |body| &body.v_m_per_s)
-            }
-            Quantity::Acceleration => {
-                self.of_bodies(Axis::new("acceleration", "m/s²", 1.0), |body| &body.a_m_per_s2)
-            }
-            Quantity::Force => {
-                let series =
-                    self.interfaces.iter().enumerate().map(|(k, i)| {
-                        Series::line(&i.name, k, self.time_s.clone(), i.force_n.clone())
-                    });
-                Panel { series: series.collect(), ..Panel::new(time(), self.force_axis()) }
-            }
-            Quantity::Crush => self.crush(),
-            Quantity::Energy => self.energy()?,
-        };
-        Some(Chart::of(title, panel))
+    /// Bodies or interfaces by name, with whether each is drawn without being asked for.
+    fn names(&self, of_interfaces: bool) -> Vec<(&str, bool)> {
+        if of_interfaces {
+            self.interfaces.iter().map(|i| (&*i.name, i.is_usual)).collect()
+        } else {
+            self.bodies.iter().map(|b| (&*b.name, b.is_usual)).collect()
+        }
     }
+}
 
-    fn of_bodies(&self, y: Axis, values: impl Fn(&BodyMotion) -> &Vec<f64>) -> Panel {
-        let series = self.bodies.iter().enumerate().map(|(k, body)| {
-            Series::line(&body.name, k, self.time_s.clone(), values(body).clone())
+/// Lines that one panel takes; more get a panel each.
+const MOST_LINES: usize = 6;
+/// Height of a panel among many, in pixels.
+pub(super) const SMALL: f64 = 110.0;
+/// Interfaces that the stack of energies names, as many as there are colours for; of more, all but five are one area.
+const MOST_AREAS: usize = 6;
+/// Class of the filter that accelerations of vehicles are compared with.
+pub(crate) const USUAL_CLASS: u32 = 60;
+
+/// One quantity of a run, or of several over one another, each with a name. `chosen` names the bodies or
+/// interfaces; the vehicles, and all interfaces but plates, if it is empty. Accelerations are filtered with a channel
+/// frequency class of SAE J211-1. More than six lines are drawn in a panel per body or interface.
+///
+/// # Errors
+/// For a name that no run has, and for energies where a result does not hold them.
+pub fn motion(
+    title: &str,
+    runs: &[(String, Motion)],
+    quantity: Quantity,
+    chosen: &[String],
+    filter_class: u32,
+) -> Result<Chart, Error> {
+    let names = names(runs, quantity, chosen)?;
+    let mut chart = match quantity {
+        Quantity::Energy => {
+            let panels = runs.iter().map(|(name, run)| energy(name, run, &names, runs.len() > 1));
+            Chart::row(title, panels.collect::<Result<_, _>>()?)
+        }
+        _ => lines(title, runs, quantity, &names, filter_class),
+    };
+    for (name, run) in runs {
+        chart.notes.extend(run.notes.iter().map(|note| match runs {
+            [_] => note.clone(),
+            _ => format!("{name}: {note}"),
+        }));
+    }
+    Ok(chart)
+}
+
+/// The names that are drawn, in the order of the first run that has them.
+fn names(
+    runs: &[(String, Motion)],
+    quantity: Quantity,
+    chosen: &[String],
+) -> Result<Vec<String>, Error> {
+    let mut known: Vec<(&str, bool)> = Vec::new();
+    for (_, run) in runs {
+        for (name, is_usual) in run.names(quantity.is_of_interfaces()) {
+            if known.iter().all(|(other, _)| *other != name) {
+                known.push((name, is_usual));
+            }
+        }
+    }
+    for name in chosen {
+        if known.iter().all(|(known, _)| known != name) {
+            let what = if quantity.is_of_interfaces() { "interface" } else { "body" };
+            let all: Vec<&str> = known.iter().map(|(known, _)| *known).collect();
+            let (all, guess) = (all.join(", "), hint(name, &all.join(", ")));
+            return Err(error!(
+                Plot,
+                "there is no {what} \"{name}\": expected one of {all}{guess}"
+            ));
+        }
+    }
+    let is_drawn = |(name, is_usual): &(&str, bool)| match chosen {
+        [] => *is_usual,
+        chosen => chosen.iter().any(|chosen| chosen == name),
+    };
+    Ok(known.into_iter().filter(is_drawn).map(|(name, _)| name.into()).collect())
+}
+
+/// A line of a run, before it is known in which panel it is.
+struct Line<'a> {
+    of: &'a str,
+    run: usize,
+    shown: Shown,
+    x: Vec<f64>,
+    y: Vec<f64>,
+}
+
+fn lines(
+    title: &str,
+    runs: &[(String, Motion)],
+    quantity: Quantity,
+    names: &[String],
+    filter_class: u32,
+) -> Chart {
+    let mut lines = Vec::new();
+    let mut notes: Vec<String> = Vec::new();
+    for (k, (_, run)) in runs.iter().enumerate() {
+        for name in names {
+            let body = run.bodies.iter().find(|body| body.name == *name);
+            let interface = run.interfaces.iter().find(|interface| interface.name == *name);
+            let over_time = |y| (Shown::Line, run.time_s.clone(), y);
+            let parts = match (quantity, body, interface) {
+                (Quantity::Velocity, Some(body), _) => vec![over_time(body.v_m_per_s.clone())],
+                (Quantity::Acceleration, Some(body), _) => {
+                    vec![over_time(filtered(run, body, filter_class, &mut notes))]
+                }
+                (Quantity::Force, _, Some(of)) => vec![over_time(of.force_n.clone())],
+                (Quantity::Crush, _, Some(of)) => crush(of),
+                _ => Vec::new(),
+            };
+            lines.extend(parts.into_iter().map(|(shown, x, y)| Line {
+                of: name,
+                run: k,
+                shown,
+                x,
+                y,
+            }));
+        }
+    }
+    let (x, y) = axes(quantity, &lines);
+    let title = match quantity {
+        Quantity::Acceleration if notes.is_empty() => &format!("{title}, CFC {filter_class}"),
+        _ => title,
+    };
+    let count = runs.len() * names.len();
+    let label = |line: &Line<'_>, is_alone: bool| match (line.shown, is_alone, runs) {
+        (Shown::Assumed, ..) => "beyond the data of the curve".into(),
+        (_, false, [_]) => line.of.to_string(),
+        (_, false, _) => format!("{}, {}", line.of, runs[line.run].0),
+        (_, true, [_]) => y.quantity.clone(),
+        (_, true, _) => runs[line.run].0.clone(),
+    };
+    let mut chart = if count <= MOST_LINES {
+        let mut panel = Panel::new(x, y.clone());
+        for line in &lines {
+            let at = names.iter().position(|name| name == line.of).unwrap_or_default();
+            let look = line.run * names.len() + at;
+            let name = label(line, false);
+            let series = Series::line(&name, look, line.x.clone(), line.y.clone());
+            panel.series.push(series.shown(line.shown));
+        }
+        Chart::of(title, panel)
+    } else {
+        let panels = names.iter().map(|name| {
+            let mut panel = Panel::new(x.clone(), y.clone());
+            panel.title.clone_from(name);
+            for line in lines.iter().filter(|line| line.of == name) {
+                let name = label(line, true);
+                let series = Series::line(&name, line.run, line.x.clone(), line.y.clone());
+                panel.series.push(series.shown(line.shown));
+            }
+            panel
         });
-        Panel { series: series.collect(), ..Panel::new(time(), y) }
-    }
+        Chart { height: SMALL, ..Chart::row(title, panels.collect()) }
+    };
+    chart.notes = notes;
+    chart
+}
 
-    fn force_axis(&self) -> Axis {
-        let forces = self.interfaces.iter().flat_map(|i| &i.force_n);
-        Axis::prefixed("force", "N", forces.fold(0.0, |top: f64, f| top.max(f.abs())))
-    }
+/// Axes that are the same for every panel, so that these can be compared.
+fn axes(quantity: Quantity, lines: &[Line<'_>]) -> (Axis, Axis) {
+    let largest = |of: for<'l> fn(&'l Line<'_>) -> &'l Vec<f64>| {
+        let values = lines.iter().flat_map(of).copied().filter(|v| v.is_finite());
+        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)))
+    };
+    let (low, high) = largest(|line| &line.y);
+    let y = match quantity {
+        Quantity::Velocity => Axis::new("speed", "m/s", 1.0),
+        Quantity::Acceleration => Axis::new("acceleration", "g", 1.0 / STANDARD_GRAVITY_M_PER_S2),
+        _ => Axis::prefixed("force", "N", low.abs().max(high.abs())),
+    };
+    let x = match quantity {
+        Quantity::Crush => Axis::new("deflection", "m", 1.0),
+        _ => time(),
+    };
+    let room = 0.04 * (high - low);
+    let y = y.over((low - room).min(0.0), (high + room).max(0.0));
+    let (_, end) = largest(|line| &line.x);
+    let x = if quantity == Quantity::Crush { x.over(0.0, 1.02 * end) } else { x };
+    (x, y)
+}
 
-    /// From where an interface closes; before, its gap is open.
-    fn crush(&self) -> Panel {
-        let mut panel = Panel::new(Axis::new("deflection", "m", 1.0), self.force_axis());
-        for (k, interface) in self.interfaces.iter().enumerate() {
-            let pairs = interface.deflection_m.iter().zip(&interface.force_n);
-            let closed: Vec<(f64, f64)> =
-                pairs.filter(|(d, f)| **d > 0.0 || **f != 0.0).map(|(d, f)| (*d, *f)).collect();
-            let (d, f) = closed.into_iter().unzip();
-            panel.series.push(Series::line(&interface.name, k, d, f));
+/// A body's acceleration, filtered; as it is, and why, where the filter does not take it.
+fn filtered(run: &Motion, body: &BodyMotion, class: u32, notes: &mut Vec<String>) -> Vec<f64> {
+    match cfc::filter(class, &run.time_s, &body.a_m_per_s2) {
+        Ok(filtered) => filtered.values,
+        Err(error) => {
+            let note = format!("Not filtered: {error}.");
+            if !notes.contains(&note) {
+                notes.push(note);
+            }
+            body.a_m_per_s2.clone()
         }
-        panel
     }
+}
 
-    fn energy(&self) -> Option<Panel> {
-        let Energies { kinetic_j, stored_j, dissipated_j } = self.energies.as_ref()?;
-        let top = kinetic_j.iter().chain(dissipated_j).copied().fold(0.0, f64::max);
-        let mut panel = Panel::new(time(), Axis::prefixed("energy", "J", top));
-        let all = [("kinetic", kinetic_j), ("stored", stored_j), ("dissipated", dissipated_j)];
-        for (k, (name, values)) in all.into_iter().enumerate() {
-            panel.series.push(Series::line(name, k, self.time_s.clone(), values.clone()));
-        }
-        Some(panel)
+type Part = (Shown, Vec<f64>, Vec<f64>);
+
+/// Force over deflection from where the interface closes, before which its gap is open; from where it is crushed
+/// further than its curve has data it is another part.
+fn crush(interface: &InterfaceMotion) -> Vec<Part> {
+    let pairs = interface.deflection_m.iter().zip(&interface.force_n);
+    let closed: Vec<(f64, f64)> =
+        pairs.filter(|(d, f)| **d > 0.0 || **f != 0.0).map(|(d, f)| (*d, *f)).collect();
+    let end = closed.iter().position(|(d, _)| *d > interface.data_end_m).unwrap_or(closed.len());
+    let known = closed[..end].iter().copied().unzip();
+    // They meet in the last point of the first.
+    let beyond = closed[end.saturating_sub(1)..].iter().copied().unzip();
+    let part = |shown, (d, f): (Vec<f64>, Vec<f64>)| (shown, d, f);
+    let parts = [part(Shown::Line, known), part(Shown::Assumed, beyond)];
+    parts.into_iter().take(if end < closed.len() { 2 } else { 1 }).collect()
+}
+
+/// What the interfaces have taken, one above the other, then what is still kinetic.
+fn energy(name: &str, run: &Motion, names: &[String], is_named: bool) -> Result<Panel, Error> {
+    if run.kinetic_j.is_empty() {
+        return Err(error!(
+            Plot,
+            "{name} has no energies, which need the masses: give the scenario itself"
+        ));
     }
+    let start_j = run.kinetic_j.first().copied().unwrap_or_default();
+    let mut panel = Panel::new(time(), Axis::prefixed("energy", "J", start_j));
+    if is_named {
+        panel.title = name.into();
+    }
+    let last = |taken_j: &Vec<f64>| taken_j.last().copied().unwrap_or_default();
+    let mut of: Vec<&InterfaceMotion> =
+        run.interfaces.iter().filter(|of| names.contains(&of.name)).collect();
+    of.sort_by(|a, b| last(&b.taken_j).total_cmp(&last(&a.taken_j)));
+    let others = of.split_off(if of.len() > MOST_AREAS { MOST_AREAS - 1 } else { of.len() });
+    let mut parts: Vec<(String, Vec<f64>)> =
+        of.iter().map(|of| (of.name.clone(), of.taken_j.clone())).collect();
+    let states = run.time_s.len();
+    if !others.is_empty() {
+        let sum = |t: usize| others.iter().map(|of| of.taken_j[t]).sum();
+        let name = format!("{} further interfaces", others.len());
+        parts.push((name, (0..states).map(sum).collect()));
+    }
+    let all = |t: usize| run.interfaces.iter().map(|of| of.taken_j[t]).sum::<f64>();
+    let lost: Vec<f64> = (0..states).map(|t| start_j - run.kinetic_j[t] - all(t)).collect();
+    // Below this it is the method's own error.
+    if last(&lost) > 1e-3 * start_j {
+        parts.push(("rate, stopped mass, dampers, resistance".into(), lost));
+    }
+    parts.push(("kinetic".into(), run.kinetic_j.clone()));
+    let mut low = vec![0.0; states];
+    for (look, (name, values)) in parts.into_iter().enumerate() {
+        let high: Vec<f64> =
+            low.iter().zip(&values).map(|(low, value)| low + value.max(0.0)).collect();
+        let x = run.time_s.clone();
+        panel.bands.push(Band { name, look, x, low, high: high.clone(), is_stacked: true });
+        low = high;
+    }
+    Ok(panel)
 }
 
 fn time() -> Axis {
@@ -277,137 +504,4 @@ pub fn train_speeds(title: &str, comparison: &TrainComparison) -> Chart {
         panel
     });
     Chart::row(title, panels.collect())
-}
-
-/// Maximum number of lines of a chart.
-const MOST: usize = 24;
-
-/// Histories over time; quantities of different components are in panels side by side. Without
-/// `units`, numbers stand as in the file; a channel frequency class of SAE J211-1, such as 60, adds
-/// filtered lines.
-///
-/// # Errors
-/// For none or more than 24 histories, or samples that the filter does not take.
-pub fn histories(
-    title: &str,
-    histories: &[&History],
-    units: Option<UnitSystem>,
-    filter_class: Option<u32>,
-) -> Result<Chart, Error> {
-    if histories.is_empty() {
-        return Err(error!(Plot, "there is no history: give other ids or components"));
-    }
-    if histories.len() > MOST {
-        return Err(error!(
-            Plot,
-            "{found} histories are too many for one picture, {MOST} at most: choose with --id and --component",
-            found = histories.len()
-        ));
-    }
-    if filter_class.is_some() && units.is_none() {
-        return Err(error!(Plot, "a CFC filter needs the unit of time: give the file's units"));
-    }
-    let mut components: Vec<&str> = Vec::new();
-    for history in histories {
-        if !components.contains(&&*history.component) {
-            components.push(&history.component);
-        }
-    }
-    let mut panels = Vec::new();
-    for component in components {
-        let of_component = || histories.iter().filter(|h| &*h.component == component);
-        let (time, value) = axes(component, units, of_component().flat_map(|h| &h.values));
-        let mut panel = Panel::new(time, value);
-        for history in of_component() {
-            add(&mut panel, history, filter_class.zip(units))?;
-        }
-        panels.push(panel);
-    }
-    Ok(Chart::row(title, panels))
-}
-
-/// What a component is measured in: its SI unit, and that unit in the file's.
-fn unit(component: &str, units: &UnitSystem) -> Option<(&'static str, f64)> {
-    let is_rotation =
-        component.starts_with('r') && component.get(1..3).is_some_and(|c| c.ends_with('_'));
-    let ends = |end: &str| component.ends_with(end);
-    let per_s = 1.0 / units.time_s;
-    Some(match () {
-        () if ends("displacement") && is_rotation => ("rad", 1.0),
-        () if ends("velocity") && is_rotation => ("rad/s", per_s),
-        () if ends("acceleration") && is_rotation => ("rad/s²", per_s * per_s),
-        () if ends("displacement") || ends("coordinate") => ("m", units.length_m),
-        () if ends("velocity") => ("m/s", units.speed()),
-        () if ends("acceleration") => ("m/s²", units.acceleration()),
-        () if ends("force") => ("N", units.force()),
-        () if ends("moment") => ("N·m", units.force() * units.length_m),
-        () if ends("energy") || ends("work") => ("J", units.force() * units.length_m),
-        () if ends("mass") => ("kg", units.mass_kg),
-        () if ends("momentum") => ("kg·m/s", units.mass_kg * units.speed()),
-        () => return None,
-    })
-}
-
-/// Axes of time and of a component, whose values are in the file's units.
-fn axes<'a>(
-    component: &str,
-    units: Option<UnitSystem>,
-    values: impl Iterator<Item = &'a f64>,
-) -> (Axis, Axis) {
-    let as_in_file = |quantity: &str| Axis::new(quantity, "unit of the file", 1.0);
-    let Some(units) = units else { return (as_in_file("time"), as_in_file(component)) };
-    let time = Axis::new("time", "ms", 1e3 * units.time_s);
-    let Some((unit, si)) = unit(component, &units) else { return (time, as_in_file(component)) };
-    let largest = values.copied().filter(|v| v.is_finite()).fold(0.0, |l: f64, v| l.max(v.abs()));
-    let value = match unit {
-        "N" | "J" | "N·m" => Axis::prefixed(component, unit, si * largest),
-        _ => Axis::new(component, unit, 1.0),
-    };
-    (time, Axis { scale: value.scale * si, ..value })
-}
-
-fn add(
-    panel: &mut Panel,
-    history: &History,
-    filter: Option<(u32, UnitSystem)>,
-) -> Result<(), Error> {
-    let entity = history.entity.map_or_else(|| "whole model".to_string(), |e| e.to_string());
-    let time = history.time.to_vec();
-    let look = panel.series.len();
-    panel.series.push(Series::line(&entity, look, time.clone(), history.values.clone()));
-    let Some((class, units)) = filter else { return Ok(()) };
-    let time_s: Vec<f64> = time.iter().map(|t| t * units.time_s).collect();
-    let filtered = cfc::filter(class, &time_s, &history.values)
-        .map_err(|source| error!(Plot, "{entity}: {source}").caused_by(source))?;
-    let name = format!("{entity}, CFC {class}");
-    let line = Series::line(&name, look + 1, time, filtered.values);
-    panel.series.push(line.shown(Shown::Emphasis));
-    Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn too_many_lines_are_refused() {
-        let history = History {
-            entity: None,
-            component: "kinetic_energy".into(),
-            time: [0.0, 1.0].into(),
-            values: vec![0.0, 1.0],
-        };
-        let all: Vec<&History> = std::iter::repeat_n(&history, MOST + 1).collect();
-        let most = error!(
-            Plot,
-            "{found} histories are too many for one picture, {MOST} at most: choose with --id and --component",
-            found = MOST + 1
-        );
-        assert_eq!(histories("", &all, None, None), Err(most));
-        assert!(histories("", &all[1..], None, None).is_ok());
-        assert_eq!(
-            histories("", &[], None, None),
-            Err(error!(Plot, "there is no history: give other ids or components"))
-        );
-    }
 }

@@ -180,6 +180,8 @@ pub(super) enum FileKind {
     Scenario,
     /// Result of a multi-body run.
     Result,
+    /// Results of a sweep.
+    Sweep,
     /// Anything else: what a solver has written, if it is known at all.
     Solver,
 }
@@ -208,6 +210,7 @@ impl FileKind {
             () if text.trim_start().starts_with('{') => Self::Curve,
             () if is_toml => Self::Scenario,
             () if text.starts_with("time_s,") => Self::Result,
+            () if text.starts_with("# crumple sweep") => Self::Sweep,
             () => Self::Solver,
         })
     }
@@ -220,6 +223,7 @@ impl FileKind {
             Self::Curve => "a predicted curve",
             Self::Scenario => "a scenario",
             Self::Result => "a result",
+            Self::Sweep => "a sweep's result",
             Self::Solver => "read as a solver file",
         }
     }

@@ -32,7 +32,9 @@ impl Input {
             FileKind::Database => Self::Database(path.into(), Database::read(path)?),
             FileKind::Model => Self::Model(Box::new(Model::read(path)?)),
             FileKind::Curve => Self::Curve(Box::new(json::predicted(path)?)),
-            FileKind::Scenario | FileKind::Result | FileKind::Solver => Self::File(path.into()),
+            FileKind::Scenario | FileKind::Result | FileKind::Sweep | FileKind::Solver => {
+                Self::File(path.into())
+            }
         })
     }
 

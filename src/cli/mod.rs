@@ -144,6 +144,7 @@ impl GlobalOptions {
             FileKind::Solver if solver::is_output(output) => "a solver's file",
             FileKind::Database => "an HDF5 file",
             FileKind::Model => "a model",
+            FileKind::Sweep => "a sweep's result",
             FileKind::Solver | FileKind::Curve | FileKind::Result => return Ok(()),
         };
         if kind == own && !(kind == FileKind::Database && database::is_database(output)) {

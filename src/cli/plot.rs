@@ -13,9 +13,10 @@ use crate::file::{self, write_all_whole};
 use crate::formats::ReadOptions;
 use crate::formats::read::{self, json};
 use crate::plot::Chart;
-use crate::scenario;
+use crate::scenario::{self, CurveOrigin};
 use crate::solver::{self, WantedId};
 use crate::surrogate::{Model, ModelCase, PredictedCurve, Query, predict};
+use crate::sweep::SweepColumns;
 use crate::unit::{UnitSystem, km_per_h};
 
 use super::arguments::{self, FileKind, Reading, one_of, selection, units};
@@ -32,14 +33,17 @@ use super::{
   crumple plot curves.h5 --group lead-car-wall --left-out 48km/h -o left-out.png
   crumple plot lead.model --speed 50km/h -o lead50.svg                  # with band and neighbouring runs
   crumple plot scenario.toml --quantity energy -o energy.svg            # runs the scenario
-  crumple plot result.csv --quantity crush -o crush.svg
+  crumple plot result.csv --quantity crush --interface 'A1|A2' -o crush.svg
+  crumple plot one.csv other.csv --quantity acceleration -o both.svg    # over one another
+  crumple plot sweep.csv --over 'speed_m_per_s[A]' --result mean_deceleration -o sweep.svg
   crumple plot train-set.toml --train -o train.svg                      # FE's train and the methods
   crumple plot run/nodout --id 900001 --component x_velocity --units mm-t-s --cfc 60 -o nodout.svg
 The kind of file is recognised by its content. SVG and PNG show the same drawing; \"-o -\" is SVG on standard output.")]
 pub(super) struct Args {
-    /// Database, model, predicted curve, scenario, result (CSV), solver file, or a curve's file (crumple db
-    /// add --list)
-    file: PathBuf,
+    /// Database, model, predicted curve, scenario, result or sweep (CSV), solver file, or a curve's file (crumple db
+    /// add --list); several scenarios or results are drawn over one another
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
     /// Picture to write: .svg or .png; may be repeated
     #[arg(short, long, required = true)]
     output: Vec<PathBuf>,
@@ -58,6 +62,19 @@ pub(super) struct Args {
     /// Of a scenario or result: quantity to draw
     #[arg(long, value_parser = one_of(QUANTITIES), default_value = "velocity")]
     quantity: Quantity,
+    /// Of a scenario or result: body to draw; may be repeated (default: every vehicle)
+    #[arg(long = "body", value_name = "NAME")]
+    bodies: Vec<String>,
+    /// Of a scenario or result: interface to draw; may be repeated (default: all)
+    #[arg(long = "interface", value_name = "NAME")]
+    interfaces: Vec<String>,
+    /// Of a sweep: varied quantity to draw over, by its column; may be given twice, for a map
+    #[arg(long, value_name = "COLUMN")]
+    over: Vec<String>,
+    /// Of a sweep: result to draw, by its column, or all of a kind such as peak_force; may be repeated (default:
+    /// max_deflection)
+    #[arg(long = "result", value_name = "RESULT")]
+    results: Vec<String>,
     /// Of a scenario with FE's run as reference: compare the methods in the whole train
     #[arg(long)]
     train: bool,
@@ -77,20 +94,21 @@ pub(super) struct Args {
     /// curve's file: its units if it does not state them
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
-    /// Of a solver file: also draw filtered lines, by channel frequency class such as 60
-    #[arg(long, value_name = "CLASS", requires = "units", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    /// Channel frequency class: of a solver file, also draw filtered lines; of a scenario or result, the class of
+    /// accelerations (default: 60)
+    #[arg(long, value_name = "CLASS", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     cfc: Option<u32>,
     #[command(flatten)]
     reading: Reading,
     /// Title above the picture (default: what is drawn)
     #[arg(long)]
     title: Option<String>,
-    /// Width in pixels
-    #[arg(long, default_value_t = 780.0, value_parser = pixels)]
-    width: f64,
-    /// Height of the plot area in pixels
-    #[arg(long, default_value_t = 320.0, value_parser = pixels)]
-    height: f64,
+    /// Width in pixels (default: 780)
+    #[arg(long, value_parser = pixels)]
+    width: Option<f64>,
+    /// Height of each plot area in pixels (default: 320, of many panels 110)
+    #[arg(long, value_parser = pixels)]
+    height: Option<f64>,
     /// Pixels of a PNG per pixel of the width
     #[arg(long, default_value_t = 2.0, value_parser = scale)]
     scale: f64,
@@ -103,10 +121,14 @@ const FORCES: &[(&str, ForceKind, &str)] = &[
 
 const QUANTITIES: &[(&str, Quantity, &str)] = &[
     ("velocity", Quantity::Velocity, "Speeds of the bodies over time"),
-    ("acceleration", Quantity::Acceleration, "Accelerations of the bodies over time"),
+    (
+        "acceleration",
+        Quantity::Acceleration,
+        "Accelerations of the bodies over time, in g, filtered",
+    ),
     ("force", Quantity::Force, "Forces of the interfaces over time"),
     ("crush", Quantity::Crush, "Forces of the interfaces over their deflection"),
-    ("energy", Quantity::Energy, "Kinetic, stored and dissipated energy over time"),
+    ("energy", Quantity::Energy, "Energy over time: taken by each interface, and still kinetic"),
 ];
 
 fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
@@ -127,14 +149,17 @@ const MOST_RESULT: u64 = 1 << 30;
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let is_png = args.output.iter().map(|path| is_png(path)).collect::<Result<Vec<_>, _>>()?;
-    args.output.iter().try_for_each(|output| keep_input(&args.file, output))?;
+    for (file, output) in args.files.iter().flat_map(|f| args.output.iter().map(move |o| (f, o))) {
+        keep_input(file, output)?;
+    }
     args.output.iter().try_for_each(|output| options.keep_others(output, FileKind::Curve))?;
     let to_stdout = options.on_stdout(&args.output)?;
     let mut chart = chart(args, options)?;
     if let Some(title) = &args.title {
         chart.title.clone_from(title);
     }
-    (chart.width, chart.height) = (args.width, args.height);
+    chart.width = args.width.unwrap_or(chart.width);
+    chart.height = args.height.unwrap_or(chart.height);
     let drawing = chart.drawing();
     let mut files = Vec::new();
     for (path, is_png) in args.output.iter().zip(is_png) {
@@ -185,32 +210,41 @@ fn is_png(path: &Path) -> Result<bool, Failure> {
 
 /// The chart of whatever the file is.
 fn chart(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
-    let kind = FileKind::of(&args.file)?;
-    args.refuse_unused(kind)?;
+    let [file, others @ ..] = &args.files[..] else { return usage("name the file") };
+    let kind = FileKind::of(file)?;
+    args.refuse_unused(file, kind)?;
+    for other in others {
+        let is_run = |kind| matches!(kind, FileKind::Scenario | FileKind::Result);
+        let of_other = FileKind::of(other)?;
+        if args.train || !is_run(kind) || !is_run(of_other) {
+            let (not, kind) = if is_run(kind) { (other, of_other) } else { (file, kind) };
+            return usage(format!(
+                "several files: only scenarios and results are drawn over one another: {} is {}",
+                not.display(),
+                kind.name()
+            ));
+        }
+    }
     match kind {
-        FileKind::Database => of_database(args, options),
-        FileKind::Model => of_model(args),
-        FileKind::Curve => of_force(args, json::predicted(&args.file)?, &[]),
-        FileKind::Scenario if args.train => of_train(args, options),
-        FileKind::Scenario => {
-            let prepared = scenario::load(&args.file)?;
-            let run = prepared.run()?;
-            options.warn_all(prepared.warnings.iter().chain(&run.all_warnings()));
-            of_motion(args, &Motion::of_run(&prepared.chain, &run, &prepared.order))
+        FileKind::Database => of_database(args, file, options),
+        FileKind::Model => of_model(args, file),
+        FileKind::Curve => of_force(args, json::predicted(file)?, &[]),
+        FileKind::Scenario if args.train => of_train(file, options),
+        FileKind::Scenario | FileKind::Result => of_runs(args, options),
+        FileKind::Sweep => {
+            let columns = SweepColumns::read(file)?;
+            Ok(charts::sweep(&stem(file), &columns, &args.over, &args.results)?)
         }
-        FileKind::Result => {
-            let text = file::read(&args.file, MOST_RESULT).map_err(|e| failed_at(&args.file, e))?;
-            of_motion(args, &Motion::of_csv(&text).map_err(|e| failed_at(&args.file, e))?)
-        }
-        FileKind::Solver => of_solver_file(args, options),
+        FileKind::Solver => of_solver_file(args, file, options),
     }
 }
 
 impl Args {
     /// Refuses options that have no use for the kind of file.
-    fn refuse_unused(&self, kind: FileKind) -> Result<(), Failure> {
+    fn refuse_unused(&self, file: &Path, kind: FileKind) -> Result<(), Failure> {
         let is = |kinds: &[FileKind]| kinds.contains(&kind);
         let of_solver = is(&[FileKind::Solver]);
+        let of_run = is(&[FileKind::Scenario, FileKind::Result]);
         for (given, allowed, what) in [
             (self.group.is_some(), is(&[FileKind::Database]), "--group is for a database"),
             (
@@ -226,19 +260,42 @@ impl Args {
             (self.section.is_some(), of_solver, "--section is for a solver file"),
             (self.format.is_some(), of_solver, "--format is for a solver file"),
             (self.units.is_some(), of_solver, "--units is for a solver file"),
+            (
+                self.cfc.is_some(),
+                of_solver || of_run,
+                "--cfc is for a solver file, scenario or result",
+            ),
+            (!self.bodies.is_empty(), of_run, "--body is for a scenario or result"),
+            (!self.interfaces.is_empty(), of_run, "--interface is for a scenario or result"),
+            (!self.over.is_empty(), is(&[FileKind::Sweep]), "--over is for a sweep"),
+            (!self.results.is_empty(), is(&[FileKind::Sweep]), "--result is for a sweep"),
             (self.reading.is_asked(), of_solver, "--curve and the like are for a curve's file"),
         ] {
             if given && !allowed {
-                return usage(format!("{what}: {} is {}", self.file.display(), kind.name()));
+                return usage(format!("{what}: {} is {}", file.display(), kind.name()));
             }
+        }
+        if of_solver && self.cfc.is_some() && self.units.is_none() {
+            return usage("--cfc needs the units of the solver file: give --units, such as mm-t-s");
+        }
+        let (unused, of) = match self.quantity.is_of_interfaces() {
+            true => (&self.bodies, "--interface"),
+            false => (&self.interfaces, "--body"),
+        };
+        if !unused.is_empty() {
+            return usage(format!("this quantity is chosen with {of}, see --quantity"));
         }
         Ok(())
     }
 }
 
-fn of_database(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
-    let database = Database::read(&args.file)?;
-    let (group, cases) = database.group_or_only(&args.file, args.group.as_deref())?;
+fn stem(file: &Path) -> String {
+    file.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+fn of_database(args: &Args, file: &Path, options: GlobalOptions) -> Result<Chart, Failure> {
+    let database = Database::read(file)?;
+    let (group, cases) = database.group_or_only(file, args.group.as_deref())?;
     let Some(speed) = args.left_out else {
         let own = cases.first().map_or(ForceKind::Contact, |case| case.curves.force_kind);
         return Ok(charts::group_curves(group, cases, args.force.unwrap_or(own)));
@@ -249,8 +306,8 @@ fn of_database(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
 }
 
 /// A model's curve over its neighbours.
-fn of_model(args: &Args) -> Result<Chart, Failure> {
-    let model = Model::read(&args.file)?;
+fn of_model(args: &Args, file: &Path) -> Result<Chart, Failure> {
+    let model = Model::read(file)?;
     let Some(speed) = args.speed else { return Err(speed_of_model(&model)) };
     of_force(args, predict(&model, &Query::at(speed))?, &model.cases)
 }
@@ -277,51 +334,65 @@ fn speed_of_model(model: &Model) -> Failure {
     ))
 }
 
-fn of_train(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
-    let scenario = scenario::read(&args.file)?;
+fn of_train(file: &Path, options: GlobalOptions) -> Result<Chart, Failure> {
+    let scenario = scenario::read(file)?;
     let settings = ComparisonSettings { nsdm_seeds: 0, ..ComparisonSettings::default() };
     let _bar = Bar::new(options, "comparing in the train");
-    let comparison = compare_train(&args.file, &scenario, &settings)?;
+    let comparison = compare_train(file, &scenario, &settings)?;
     Ok(charts::train_speeds("Train: FE and the methods", &comparison))
 }
 
-fn of_motion(args: &Args, motion: &Motion) -> Result<Chart, Failure> {
-    let stem = args.file.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+/// One run, or several over one another.
+fn of_runs(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
+    let mut runs: Vec<(String, Motion)> = Vec::new();
+    for file in &args.files {
+        let motion = if FileKind::of(file)? == FileKind::Scenario {
+            let (prepared, origins) = scenario::load_with_origins(file)?;
+            let run = prepared.run()?;
+            options.warn_all(prepared.warnings.iter().chain(&run.all_warnings()));
+            let notes = origins.iter().map(CurveOrigin::text).collect();
+            Motion::of_run(&prepared, &run, notes)
+        } else {
+            let text = file::read(file, MOST_RESULT).map_err(|e| failed_at(file, e))?;
+            Motion::of_csv(&text).map_err(|e| failed_at(file, e))?
+        };
+        let is_taken = |name: &String| runs.iter().any(|(other, _)| other == name);
+        let name = Some(stem(file)).filter(|name| !is_taken(name));
+        runs.push((name.unwrap_or_else(|| file.display().to_string()), motion));
+    }
     let (quantity, ..) =
         QUANTITIES.iter().find(|(_, q, _)| *q == args.quantity).expect("one of the list");
-    motion.chart(&format!("{stem}: {quantity}"), args.quantity).ok_or_else(|| {
-        usage_error(format!(
-            "{} has no energies, which need the masses: give the scenario itself",
-            args.file.display()
-        ))
-    })
+    let names: Vec<&str> = runs.iter().map(|(name, _)| &**name).collect();
+    let title = format!("{}: {quantity}", names.join(", "));
+    let chosen = if args.quantity.is_of_interfaces() { &args.interfaces } else { &args.bodies };
+    let class = args.cfc.unwrap_or(charts::USUAL_CLASS);
+    Ok(charts::motion(&title, &runs, args.quantity, chosen, class)?)
 }
 
-fn of_solver_file(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
+fn of_solver_file(args: &Args, file: &Path, options: GlobalOptions) -> Result<Chart, Failure> {
     let selection = selection(&args.ids, &args.components, args.section.as_deref());
-    let file = match solver::read(&args.file, args.format.as_deref(), &selection) {
+    let found = match solver::read(file, args.format.as_deref(), &selection) {
         // Not what a solver wrote, so a curve's file, if any reader of these knows it.
         Err(error)
             if args.format.is_none() && (error.is_about("format") || error.is_about("deck")) =>
         {
             let how = ReadOptions { units: args.units, ..args.reading.options() };
-            let (curve, _) = read::read(&args.file, &how)
+            let (curve, _) = read::read(file, &how)
                 .map_err(|of_curve| error.followed_by(&format!("; and as a curve: {of_curve}")))?;
-            let (title, name) = (args.file.display().to_string(), curve.title.as_deref());
+            let (title, name) = (file.display().to_string(), curve.title.as_deref());
             let (d, f) = (&curve.deflection_m, &curve.force_n);
             let mut chart = charts::file_curve(&title, name.unwrap_or("curve"), d, f);
             let is_change = |n: &&String| n.starts_with("points: ") || n.starts_with("sign: ");
             chart.notes.extend(curve.notes.iter().filter(is_change).cloned());
             return Ok(chart);
         }
-        file => file?,
+        found => found?,
     };
-    options.warn_of(&args.file, &file.problems);
-    let title = match &file.title {
-        Some(title) => format!("{}: {title}", args.file.display()),
-        None => args.file.display().to_string(),
+    options.warn_of(file, &found.problems);
+    let title = match &found.title {
+        Some(title) => format!("{}: {title}", file.display()),
+        None => file.display().to_string(),
     };
-    let histories: Vec<_> = file.histories.iter().collect();
-    charts::histories(&title, &histories, args.units, args.cfc)
-        .map_err(|e| failed_at(&args.file, e))
+    let histories: Vec<_> = found.histories.iter().collect();
+    charts::histories(&title, &histories, args.units, args.cfc).map_err(|e| failed_at(file, e))
 }

@@ -45,6 +45,8 @@ pub struct Panel {
     pub series: Vec<Series>,
     /// Upright lines.
     pub marks: Vec<Mark>,
+    /// Of a map: below everything else.
+    pub cells: Vec<Cell>,
 }
 
 impl Panel {
@@ -57,6 +59,7 @@ impl Panel {
             bands: Vec::new(),
             series: Vec::new(),
             marks: Vec::new(),
+            cells: Vec::new(),
         }
     }
 }
@@ -158,6 +161,8 @@ pub struct Band {
     pub low: Vec<f64>,
     /// Upper edge in SI.
     pub high: Vec<f64>,
+    /// Whether its width is the value, as part of a sum.
+    pub is_stacked: bool,
 }
 
 /// An upright line with a word at its top.
@@ -167,6 +172,19 @@ pub struct Mark {
     pub name: String,
     /// Where, in SI.
     pub x: f64,
+}
+
+/// A rectangle of a map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cell {
+    /// From left to right, in SI.
+    pub x: (f64, f64),
+    /// From bottom to top, in SI.
+    pub y: (f64, f64),
+    /// From 0, pale, to 1, deep.
+    pub depth: f64,
+    /// Its number, left out where there is no room.
+    pub text: String,
 }
 
 /// A chart in pixels.

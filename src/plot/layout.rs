@@ -14,8 +14,10 @@ const TICK: f64 = 12.0;
 const NOTE: f64 = 11.0;
 /// A line of text takes its size times this.
 const LINE: f64 = 1.35;
-/// Between ticks, upwards, in pixels at least.
+/// Between ticks, upwards, in pixels at least; less in low panels, where two would not do.
 const TICK_ROOM: f64 = 40.0;
+const LOW_TICK_ROOM: f64 = 26.0;
+const LOW: f64 = 160.0;
 /// Between the numbers of two ticks, in pixels at least.
 const NUMBER_GAP: f64 = 14.0;
 /// Between markers along a line, in pixels.
@@ -93,9 +95,13 @@ fn shown_ticks(axis: &Axis, (low, high): (f64, f64), most: usize) -> Ticks {
     Ticks::new(a.min(b), a.max(b), most)
 }
 
+fn most_y_ticks(height: f64) -> usize {
+    (height / if height < LOW { LOW_TICK_ROOM } else { TICK_ROOM }) as usize
+}
+
 fn y_ticks(panel: &Panel, place: &PanelPlace) -> Ticks {
     let height = place.area[3] - place.area[1];
-    shown_ticks(&panel.y, place.y_span, (height / TICK_ROOM) as usize)
+    shown_ticks(&panel.y, place.y_span, most_y_ticks(height))
 }
 
 /// As many ticks as their numbers have room for.
@@ -152,7 +158,7 @@ fn unplaced(panel: &Panel, height: f64) -> (PanelPlace, (f64, f64)) {
     let bands = panel.bands.iter().flat_map(|b| b.low.iter().chain(&b.high));
     let ys = panel.series.iter().flat_map(|s| &s.y).chain(bands);
     let x_span = span(&panel.x, xs.chain(panel.marks.iter().map(|m| &m.x)).copied(), 10);
-    let y_span = span(&panel.y, ys.copied(), (height / TICK_ROOM) as usize);
+    let y_span = span(&panel.y, ys.copied(), most_y_ticks(height));
     let place = PanelPlace { area: [0.0, 0.0, USUAL_AREA, height], x_span, y_span };
     let widest =
         |ticks: Ticks| ticks.texts().map(|(_, t)| font::width(&t, TICK)).fold(0.0, f64::max);
@@ -175,6 +181,7 @@ fn draw_panel(
         shapes.push(text(&title, (left, top - 8.0), LABEL, Paint::Ink, None));
     }
     draw_ticks(shapes, number, panel, place);
+    draw_cells(shapes, panel, place);
     draw_labels(shapes, panel, place, picture_width);
     for (k, band) in panel.bands.iter().enumerate() {
         let edges: Vec<(f64, f64, f64)> =
@@ -192,7 +199,7 @@ fn draw_panel(
             lines: vec![outline],
             is_closed: true,
             stroke: None,
-            fill: Some((Paint::Series(band.look), BAND)),
+            fill: Some((Paint::Series(band.look), opacity(band.is_stacked))),
             shows: Some(Shows::Band(number, k)),
         });
     }
@@ -203,6 +210,32 @@ fn draw_panel(
     let corner = vec![(left, top), (left, bottom), (right, bottom)];
     shapes.push(path(vec![corner], frame, None));
     draw_marks(shapes, &panel.marks, place);
+}
+
+/// Paler than this a cell would look empty, deeper than that no number could be read on it.
+const DEPTHS: (f64, f64) = (0.08, 0.9);
+
+fn draw_cells(shapes: &mut Vec<Shape>, panel: &Panel, place: &PanelPlace) {
+    for cell in &panel.cells {
+        let (left, bottom) = place.place(cell.x.0, cell.y.0);
+        let (right, top) = place.place(cell.x.1, cell.y.1);
+        let corners = vec![(left, top), (right, top), (right, bottom), (left, bottom)];
+        let opacity = DEPTHS.0 + (DEPTHS.1 - DEPTHS.0) * cell.depth.clamp(0.0, 1.0);
+        let stroke = Some(Stroke { paint: Paint::Paper, width: 1.0, dash: Vec::new() });
+        let fill = Some((Paint::Series(0), opacity));
+        shapes.push(Shape::Path {
+            lines: vec![corners],
+            is_closed: true,
+            stroke,
+            fill,
+            shows: None,
+        });
+        let (x, y) = (0.5 * (left + right), 0.5 * (top + bottom) + 0.35 * NOTE);
+        if font::width(&cell.text, NOTE) + 2.0 <= right - left && LINE * NOTE <= bottom - top {
+            let paint = if opacity > 0.5 { Paint::Paper } else { Paint::Ink };
+            shapes.push(centred(&cell.text, (x, y), NOTE, paint, None));
+        }
+    }
 }
 
 fn path(lines: Vec<Vec<(f64, f64)>>, stroke: Stroke, shows: Option<Shows>) -> Shape {
@@ -339,25 +372,30 @@ const GAP: f64 = 7.0;
 const COLUMN_GAP: f64 = 20.0;
 const ROW: f64 = 19.0;
 pub(super) const SIZE: f64 = 13.0;
-pub(super) const BAND: f64 = 0.22;
+
+/// Parts of a sum meet no line of their own, so they are stronger than the band around one.
+pub(super) fn opacity(is_stacked: bool) -> f64 {
+    if is_stacked { 0.6 } else { 0.22 }
+}
 
 #[derive(PartialEq)]
 struct Entry<'a> {
     name: &'a str,
     look: usize,
-    /// `None` for a band.
-    shown: Option<Shown>,
+    /// Of a band: whether it is stacked.
+    shown: Result<Shown, bool>,
 }
 
 fn entries(chart: &Chart) -> Vec<Entry<'_>> {
     let mut entries: Vec<Entry> = Vec::new();
     for panel in &chart.panels {
-        let series = panel.series.iter().map(|s| Entry {
-            name: &s.name,
-            look: s.look,
-            shown: Some(s.shown),
+        let series =
+            panel.series.iter().map(|s| Entry { name: &s.name, look: s.look, shown: Ok(s.shown) });
+        let bands = panel.bands.iter().map(|b| Entry {
+            name: &b.name,
+            look: b.look,
+            shown: Err(b.is_stacked),
         });
-        let bands = panel.bands.iter().map(|b| Entry { name: &b.name, look: b.look, shown: None });
         for entry in series.chain(bands) {
             if !entry.name.is_empty() && !entries.contains(&entry) {
                 entries.push(entry);
@@ -410,17 +448,15 @@ fn columns(names: &[String], room: f64) -> (usize, Vec<f64>) {
 /// A short piece of what the entry names.
 fn sample(entry: &Entry, x: f64, y: f64) -> Vec<Shape> {
     let shows = Some(Shows::Legend);
-    let Some(shown) = entry.shown else {
-        let corners =
-            vec![(x, y - 6.0), (x + SAMPLE, y - 6.0), (x + SAMPLE, y + 6.0), (x, y + 6.0)];
-        let fill = Some((Paint::Series(entry.look), BAND));
-        return vec![Shape::Path {
-            lines: vec![corners],
-            is_closed: true,
-            stroke: None,
-            fill,
-            shows,
-        }];
+    let shown = match entry.shown {
+        Ok(shown) => shown,
+        Err(is_stacked) => {
+            let corners =
+                vec![(x, y - 6.0), (x + SAMPLE, y - 6.0), (x + SAMPLE, y + 6.0), (x, y + 6.0)];
+            let fill = Some((Paint::Series(entry.look), opacity(is_stacked)));
+            let lines = vec![corners];
+            return vec![Shape::Path { lines, is_closed: true, stroke: None, fill, shows }];
+        }
     };
     let mut shapes = Vec::new();
     if let Some(stroke) = stroke(entry.look, shown) {

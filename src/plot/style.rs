@@ -4,14 +4,14 @@ use std::fmt::Write;
 
 use serde_json::{Value, json};
 
-/// Colours that people with any colour vision distinguish (Okabe and Ito, "Color Universal Design", 2008), the
-/// palest last.
+/// Colours that people with any colour vision distinguish (Okabe and Ito, "Color Universal Design", 2008), with grey in
+/// place of their yellow, which cannot be seen on paper.
 const COLOURS: [&str; 8] =
-    ["#0072b2", "#d55e00", "#009e73", "#000000", "#cc79a7", "#56b4e9", "#e69f00", "#f0e442"];
+    ["#0072b2", "#d55e00", "#009e73", "#000000", "#cc79a7", "#56b4e9", "#e69f00", "#808080"];
 
 /// The same on a dark page: black becomes white, and dark blue lighter.
 const DARK_COLOURS: [&str; 8] =
-    ["#4aa8e0", "#f07a2a", "#2fc496", "#ffffff", "#e09cc0", "#8fd0f5", "#f0b840", "#f0e442"];
+    ["#4aa8e0", "#f07a2a", "#2fc496", "#ffffff", "#e09cc0", "#8fd0f5", "#f0b840", "#a0a0a0"];
 
 /// Lengths of strokes and gaps in pixels; none is a solid line.
 const DASHES: [&[f64]; 4] = [&[], &[8.0, 4.0], &[2.0, 3.0], &[10.0, 3.0, 2.0, 3.0]];

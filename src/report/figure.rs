@@ -89,7 +89,7 @@ fn panel_data(panel: &Panel, place: &PanelPlace) -> Value {
             points.sort_unstable();
             points.dedup();
             json!({
-                "name": b.name, "look": b.look, "x": abscissa(numbers(&b.x, &points, &panel.x)),
+                "name": b.name, "look": b.look, "is_stacked": b.is_stacked, "x": abscissa(numbers(&b.x, &points, &panel.x)),
                 "low": numbers(&b.low, &points, &panel.y), "high": numbers(&b.high, &points, &panel.y),
             })
         })

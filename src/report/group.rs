@@ -363,17 +363,17 @@ pub(super) fn add_train(
     let run = prepared.run()?;
     let number = content.sections.len() + 1;
     let name = file_name(path);
-    let motion = Motion::of_run(&prepared.chain, &run, &prepared.order);
+    let runs = [(name.clone(), Motion::of_run(&prepared, &run, Vec::new()))];
     let mut parts = Vec::new();
     for (quantity, what) in [
         (Quantity::Velocity, "speeds"),
         (Quantity::Crush, "force over crush at each interface"),
         (Quantity::Energy, "energy"),
     ] {
-        if let Some(chart) = motion.chart(&format!("{name}: {what}"), quantity) {
-            let id = format!("s{number}-{}", what.split(' ').next().unwrap_or_default());
-            parts.push(Part::Figure(Figure::new(id, chart)));
-        }
+        let chart =
+            charts::motion(&format!("{name}: {what}"), &runs, quantity, &[], charts::USUAL_CLASS)?;
+        let id = format!("s{number}-{}", what.split(' ').next().unwrap_or_default());
+        parts.push(Part::Figure(Figure::new(id, chart)));
     }
     let summary = prepared.summary(&run);
     parts.push(Part::table("Vehicles", vehicles(&summary)));

@@ -51,7 +51,7 @@ pub(crate) use assemble::{PLATES, adjust};
 pub use check::CheckedScenario;
 pub(crate) use local::assemble;
 use place::Origin;
-pub(crate) use sources::{CurveSource, Sources};
+pub(crate) use sources::{CurveOrigin, CurveSource, Sources};
 pub use tables::Scenario;
 pub(crate) use tables::*;
 
@@ -136,9 +136,14 @@ pub fn read(path: &Path) -> Result<CheckedScenario<'static>, Error> {
 /// # Errors
 /// It names the key, curve or file.
 pub fn load(path: &Path) -> Result<Prepared, Error> {
+    load_with_origins(path).map(|(prepared, _)| prepared)
+}
+
+/// The same, with what its curves come from.
+pub(crate) fn load_with_origins(path: &Path) -> Result<(Prepared, Vec<CurveOrigin>), Error> {
     let scenario = read(path)?;
     let sources = Sources::read(path, &scenario)?;
-    assemble(path, &scenario, &sources)
+    Ok((assemble(path, &scenario, &sources)?, sources.origins(&scenario)))
 }
 
 /// A run in numbers.

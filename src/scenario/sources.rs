@@ -5,12 +5,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::{CheckedScenario, CurveTable, Scenario, StageTable, place};
-use crate::curve::{Case, Envelope, ForceCurve};
+use crate::curve::{Case, Envelope, ForceCurve, ForceKind};
 use crate::database::Database;
 use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::formats::ReadOptions;
 use crate::formats::read::{self, DrivingFile};
+use crate::surrogate::leave_one_out::Means;
 use crate::surrogate::{Model, PredictedCurve};
+use crate::unit::{Shown, km_per_h};
 
 /// What the curves of a scenario are made of: the same for every variation of it.
 #[derive(Clone, Debug)]
@@ -28,6 +30,39 @@ pub(crate) enum CurveSource {
     /// Stages of a device between two bodies.
     Stages(Envelope),
     Case(Box<Case>),
+}
+
+/// What a curve comes from, in words and with what is known of its errors.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct CurveOrigin {
+    pub(crate) curve: String,
+    /// Such as `lead.model`; `stages`.
+    pub(crate) from: String,
+    /// Such as `crush-law of lead-car-wall`.
+    pub(crate) what: String,
+    /// Slowest and fastest FE run, in m/s.
+    pub(crate) speeds_m_per_s: Option<(f64, f64)>,
+    /// How many FE runs.
+    pub(crate) runs: usize,
+    /// What leaving its speeds out came to, if that was done.
+    pub(crate) left_out: Option<Means>,
+    /// Gap, unloading and stages as the scenario gives them.
+    pub(crate) stated: String,
+}
+
+impl CurveOrigin {
+    /// On one line.
+    pub(crate) fn text(&self) -> String {
+        let Self { curve, from, what, .. } = self;
+        let runs = match self.speeds_m_per_s {
+            Some((low, high)) if self.runs > 1 => {
+                format!(", {} FE runs, {} to {}", self.runs, km_per_h(low), km_per_h(high))
+            }
+            Some((speed, _)) => format!(", {}", km_per_h(speed)),
+            None => String::new(),
+        };
+        format!("Curve {curve}: {from}: {what}{runs}.")
+    }
 }
 
 /// Over this length the force steps from one stage to the next: a step is not a function.
@@ -92,6 +127,25 @@ impl Sources {
         Ok(Self { curves })
     }
 
+    /// What each curve comes from, but for those of tension.
+    pub(crate) fn origins(&self, scenario: &Scenario) -> Vec<CurveOrigin> {
+        let origin = |(name, source): (&String, &CurveSource)| {
+            let table = &scenario.curves[name];
+            let file = table.model.as_ref().or(table.file.as_ref()).or(table.database.as_ref());
+            let from = file.map_or("stages".into(), |file| file.display().to_string());
+            let (what, speeds_m_per_s, runs) = source.what();
+            let left_out = match source {
+                CurveSource::Model(model) => model.leave_one_out.as_ref().and_then(|found| {
+                    found.means.iter().find(|means| means.model == model.kind.name()).cloned()
+                }),
+                _ => None,
+            };
+            let stated = table.stated();
+            CurveOrigin { curve: name.clone(), from, what, speeds_m_per_s, runs, left_out, stated }
+        };
+        self.curves.iter().map(origin).collect()
+    }
+
     /// The model of a curve, if it comes from one.
     pub(crate) fn model(&self, curve: &str) -> Option<&Model> {
         match self.curves.get(curve)? {
@@ -114,7 +168,54 @@ impl Sources {
     }
 }
 
+impl CurveTable {
+    /// Gap, unloading, stages and factor, where they are given.
+    fn stated(&self) -> String {
+        let mut parts: Vec<String> = Vec::new();
+        for (i, stage) in self.stages.iter().flatten().enumerate() {
+            let from = stage.from.map_or(0.0, |from| from.0);
+            let to = stage.to.map_or(from, |to| to.0);
+            let shown = Shown::force(from.max(to));
+            let force = match from == to {
+                true => shown.text(from),
+                false => format!("{} to {}", shown.text(from), shown.text(to)),
+            };
+            let name = stage.name.clone().unwrap_or_else(|| format!("stage {}", i + 1));
+            parts.push(format!("{name} {:.0} mm, {force}", 1e3 * stage.stroke.0));
+        }
+        parts.extend(self.gap.map(|gap| format!("gap {:.0} mm", 1e3 * gap.0)));
+        parts.extend(self.unloading.map(|k| format!("unloading {}", Shown::one_stiffness(k.0))));
+        parts.extend(self.scale.map(|factor| format!("force times {factor}")));
+        parts.join("; ")
+    }
+}
+
 impl CurveSource {
+    /// In words, with the span of its speeds in m/s and the number of FE runs behind it.
+    fn what(&self) -> (String, Option<(f64, f64)>, usize) {
+        match self {
+            Self::Model(model) => {
+                let what = format!("{} of {}", model.kind.name(), model.group);
+                (what, Some(model.range_m_per_s()), model.cases.len())
+            }
+            Self::Predicted(curve) => {
+                let speed = curve.speed_m_per_s;
+                let what = format!("{} of {}", curve.model, curve.provenance.group);
+                (what, Some((speed, speed)), 1)
+            }
+            Self::Curve(curve, _) => {
+                let force = curve.kind.map_or("force", ForceKind::name);
+                let speed = curve.speed_m_per_s;
+                (format!("{force} of a curve's file"), speed.map(|v| (v, v)), 1)
+            }
+            Self::Case(case) => {
+                let (id, speed) = (&case.id, case.conditions.speed.m_per_s);
+                (format!("FE run {}/{}", id.group, id.name), Some((speed, speed)), 1)
+            }
+            Self::Stages(_) => ("as the scenario states".into(), None, 0),
+        }
+    }
+
     /// Reads the source named in the table of curve `name` in the scenario at `path`.
     fn read(path: &Path, name: &str, table: &CurveTable) -> Result<Self, Error> {
         let folder = path.parent().unwrap_or(Path::new(""));

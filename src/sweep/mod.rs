@@ -20,6 +20,7 @@
 //! laws and only changes the numbers in them (`scenario::adjust`). `cargo bench --bench sweep` prints the saving.
 
 mod journal;
+mod results;
 mod row;
 mod run;
 mod statistics;
@@ -36,6 +37,8 @@ use crate::manifest;
 use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName, Spread, USUAL_RESULTS};
 use crate::scenario::{self, CheckedScenario, Prepared, Scenario, Sources};
 pub use journal::{WriteOptions, merge, write, write_rows};
+pub(crate) use results::ResultColumn;
+pub use results::SweepColumns;
 pub use run::Chunk;
 pub(crate) use statistics::{ColumnStatistics, Sensitivity, share_interval};
 use variables::Variable;

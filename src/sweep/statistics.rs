@@ -87,11 +87,19 @@ const NO_MEASURES: [ResultName; 4] = [
     ResultName::OverLimits,
 ];
 
+/// The result that a column holds, by its name; `None` for what is varied.
+pub(super) fn result_of(name: &str) -> Option<ResultName> {
+    let quantity = name.split('[').next();
+    RESULTS.into_iter().find(|result| Some(result.quantity()) == quantity)
+}
+
+/// Of `rows` items about [`SAMPLE`] have a hash that is not above this, of fewer all.
+pub(super) fn sample_threshold(rows: u64) -> u64 {
+    if rows <= SAMPLE { u64::MAX } else { (u64::MAX / rows).saturating_mul(SAMPLE) }
+}
+
 fn sensitivities(columns: &[Column]) -> Vec<Sensitivity> {
-    let result_of = |column: &Column| {
-        let quantity = column.name.split('[').next();
-        RESULTS.into_iter().find(|result| Some(result.quantity()) == quantity)
-    };
+    let result_of = |column: &Column| result_of(&column.name);
     let (varied, results): (Vec<&Column>, Vec<&Column>) =
         columns.iter().partition(|column| result_of(column).is_none());
     let measures =
@@ -181,8 +189,7 @@ impl Tally {
             max: f64::NEG_INFINITY,
             sample: Vec::new(),
         };
-        let threshold =
-            if rows <= SAMPLE { u64::MAX } else { (u64::MAX / rows).saturating_mul(SAMPLE) };
+        let threshold = sample_threshold(rows);
         Self {
             report: Report {
                 items: head.items,
