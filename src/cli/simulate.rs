@@ -70,7 +70,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     document.insert("ledger".into(), json!(run.ledger));
     document.insert("warnings".into(), json!(warnings));
     options.show(&document, |out| {
-        print(out, &summary, &run.ledger)?;
+        print(out, &summary, &run.ledger, options.verbose)?;
         match &args.output {
             Some(path) => writeln!(out, "wrote {}", path.display()),
             None => Ok(()),
@@ -117,14 +117,22 @@ fn write_csv(out: &mut dyn Write, columns: &[(String, &[f64])]) -> io::Result<()
     output::csv(out, columns, |out, number| write!(out, "{number:?}"))
 }
 
-fn print(out: &mut dyn Write, summary: &Summary<'_>, ledger: &Ledger) -> io::Result<()> {
+/// Events that are printed without being asked for.
+const SHOWN_EVENTS: usize = 12;
+
+fn print(
+    out: &mut dyn Write,
+    summary: &Summary<'_>,
+    ledger: &Ledger,
+    is_verbose: bool,
+) -> io::Result<()> {
     let largest_n = summary.interfaces.iter().map(|i| i.history.peak_force_n).fold(0.0, f64::max);
     let force = Shown::force(largest_n);
     let energy = Shown::energy(ledger.initial_kinetic_j);
     let interfaces = Table::of(&summary.interfaces)
         .column("interface", |i| i.name)
         .column("peak force", |i| force.text(i.history.peak_force_n))
-        .column("max crush", |i| format!("{:.4} m", i.history.max_deflection_m))
+        .column("max crush", |i| format!("{:.3} m", i.history.max_deflection_m))
         .column("at", |i| format!("{:.1} ms", i.history.max_deflection_time_s * 1e3))
         .column("energy", |i| i.energy_j.map_or("-".into(), |j| energy.text(j)))
         .column("share of energy", |i| {
@@ -137,11 +145,9 @@ fn print(out: &mut dyn Write, summary: &Summary<'_>, ledger: &Ledger) -> io::Res
     let speed = format!("speed at {} ms", (summary.end_s * 1e6).round() / 1e3);
     let bodies = Table::of(summary.bodies.iter().filter(|body| !body.is_crush_zone))
         .column("body", |b| b.name)
-        .column(speed, |b| format!("{:.3} m/s", b.final_v_m_per_s))
-        .column("mean deceleration", |b| {
-            let so_far = if b.still_loaded_at_end { " so far" } else { "" };
-            format!("{:.2} g{so_far}", b.mean_deceleration_g)
-        })
+        .column(speed, |b| format!("{:.2} m/s", b.final_v_m_per_s))
+        .column("peak (CFC 60)", |b| b.peak_text().unwrap_or("-".into()))
+        .column("mean deceleration", |b| b.mean_text())
         .column("over 120 ms", |b| {
             b.moving_mean_deceleration_g.map_or("-".into(), |a| format!("{a:.2} g"))
         })
@@ -150,6 +156,19 @@ fn print(out: &mut dyn Write, summary: &Summary<'_>, ledger: &Ledger) -> io::Res
         })
         .column("occupant load", |b| b.occupant_load_g.map_or("-".into(), |a| format!("{a:.1} g")));
     output::table(out, bodies)?;
+    let shown = if is_verbose { summary.sequence.len() } else { SHOWN_EVENTS };
+    let events = Table::of(summary.sequence.iter().take(shown))
+        .column("at", |event| format!("{:.1} ms", 1e3 * event.time_s))
+        .column("interface", |event| event.interface)
+        .column("event", |event| event.what.text());
+    output::table(out, events)?;
+    match summary.sequence.len().saturating_sub(shown) {
+        0 => {}
+        further => writeln!(out, "{further} further events: --verbose")?,
+    }
+    if let Some(time_s) = summary.common_speed_time_s {
+        writeln!(out, "common speed at {:.1} ms", 1e3 * time_s)?;
+    }
     if let Some(limits) = &summary.limits {
         print_limits(out, limits)?;
     }

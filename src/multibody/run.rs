@@ -117,6 +117,8 @@ pub struct BodyHistory {
     pub mean_deceleration_m_per_s2: f64,
     /// That net contact force still acts when the run ends: the mean is of a part.
     pub is_loaded_at_end: bool,
+    /// From when until when, in s; `None` without contact.
+    pub loaded_s: Option<(f64, f64)>,
     /// Mean of `−a` over the 120 ms in which its magnitude is largest, with windows that end at
     /// the outputs; `None` in a shorter run and for outputs more than 5 ms apart.
     pub moving_mean_deceleration_m_per_s2: Option<f64>,

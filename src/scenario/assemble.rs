@@ -41,9 +41,12 @@ pub(super) fn assemble_at(
     }
     let chain = Chain::new(bodies.clone(), interfaces)
         .map_err(|error| no_chain(path, scenario, &layout, error))?;
-    let meeting = scenario.meeting_m_per_s();
+    let speed_m_per_s = scenario.meeting_m_per_s();
     let of_one = builder.of_one;
-    let of_impact: Vec<String> = of_one.iter().flat_map(|o| o.warnings(slots, meeting)).collect();
+    let of_impact = of_one.iter().flat_map(|of| of.warnings(slots, speed_m_per_s));
+    let of_impact: Vec<String> = of_impact.collect();
+    let is_meeting = |slot: &Connection<'_>| matches!(slot.role, Role::Wall | Role::Noses);
+    let meeting = slots.iter().position(is_meeting).unwrap_or_default();
     let Layout { order, vehicles, .. } = layout;
     let settings = RunSettings::new(scenario.run.duration.0, scenario.run.output_interval.0)
         .with_method(scenario.run.method);
@@ -77,6 +80,7 @@ pub(super) fn assemble_at(
         order,
         used,
         vehicles,
+        meeting,
         limits,
         limited,
         warnings,
@@ -315,6 +319,7 @@ impl<'a> Builder<'a> {
             curve: curve.into(),
             force: Some("crush"),
             speed_m_per_s: Some(crush.speed_m_per_s),
+            ..CurveInUse::default()
         };
         Ok((interface, used))
     }
@@ -356,7 +361,11 @@ impl<'a> Builder<'a> {
         })?;
         Ok((
             interface,
-            CurveInUse { curve: PLATES.into(), force: Some("contact"), speed_m_per_s: None },
+            CurveInUse {
+                curve: PLATES.into(),
+                force: Some("contact"),
+                ..CurveInUse::default()
+            },
         ))
     }
 
@@ -387,7 +396,8 @@ impl<'a> Builder<'a> {
         let force = spring.curve.kind.map(super::super::curve::ForceKind::name);
         let (law, said) =
             spring.law_with_warnings(table).map_err(|source| self.no_spring(curve, source))?;
-        let used = CurveInUse { curve: curve.into(), force, speed_m_per_s };
+        let stages = table.stage_begins().into();
+        let used = CurveInUse { curve: curve.into(), force, speed_m_per_s, stages };
         self.warnings.extend(said.iter().map(|w| format!("curve \"{curve}\": {w}")));
         let made = CachedLaw { curve: curve.into(), key, law: Arc::new(law), used };
         self.made.push(made.clone());

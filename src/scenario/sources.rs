@@ -169,6 +169,17 @@ impl Sources {
 }
 
 impl CurveTable {
+    /// Where each stage after the first begins, in m, and its name.
+    pub(super) fn stage_begins(&self) -> Vec<(f64, String)> {
+        let mut begin_m = 0.0;
+        let mut begins = Vec::new();
+        for (i, stage) in self.stages.iter().flatten().enumerate() {
+            begins.push((begin_m, stage.title(i)));
+            begin_m += stage.stroke.0;
+        }
+        begins.into_iter().skip(1).collect()
+    }
+
     /// Gap, unloading, stages and factor, where they are given.
     fn stated(&self) -> String {
         let mut parts: Vec<String> = Vec::new();
@@ -180,13 +191,19 @@ impl CurveTable {
                 true => shown.text(from),
                 false => format!("{} to {}", shown.text(from), shown.text(to)),
             };
-            let name = stage.name.clone().unwrap_or_else(|| format!("stage {}", i + 1));
-            parts.push(format!("{name} {:.0} mm, {force}", 1e3 * stage.stroke.0));
+            parts.push(format!("{} {:.0} mm, {force}", stage.title(i), 1e3 * stage.stroke.0));
         }
         parts.extend(self.gap.map(|gap| format!("gap {:.0} mm", 1e3 * gap.0)));
         parts.extend(self.unloading.map(|k| format!("unloading {}", Shown::one_stiffness(k.0))));
         parts.extend(self.scale.map(|factor| format!("force times {factor}")));
         parts.join("; ")
+    }
+}
+
+impl StageTable {
+    /// Its name, or its number.
+    fn title(&self, i: usize) -> String {
+        self.name.clone().unwrap_or_else(|| format!("stage {}", i + 1))
     }
 }
 

@@ -201,6 +201,7 @@ impl EventRecorder {
             if let Some(contact) = spans.first() {
                 history.mean_deceleration_m_per_s2 = contact.mean_deceleration();
                 history.is_loaded_at_end = contact.is_cut;
+                history.loaded_s = Some(contact.times_s());
             }
         }
     }

@@ -164,6 +164,11 @@ impl Phase {
 }
 
 impl Span {
+    /// Begin and end in s.
+    pub(super) fn times_s(&self) -> (f64, f64) {
+        (self.begin.time_s, self.end.time_s)
+    }
+
     /// Magnitude of the change of speed.
     fn change(&self) -> f64 {
         (self.begin.v_m_per_s - self.end.v_m_per_s).abs()
