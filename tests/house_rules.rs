@@ -46,7 +46,7 @@ const MAY_NAME: [(&str, &str); 37] = [
     ("init", "guess scenario surrogate study solver curve signal history file unit"),
     ("assess", "guess plural manifest scenario nsdm rating multibody surrogate dataset database solver curve signal history file unit"),
     ("charts", "guess sweep scenario assess multibody surrogate dataset curve signal history plot unit"),
-    ("report", "plural table charts assess scenario multibody surrogate dataset database curve plot unit"),
+    ("report", "plural table rating charts assess scenario multibody surrogate dataset database curve plot unit"),
     ("failure", "report charts sweep assess scenario import init curate nsdm formats multibody surrogate dataset build study database history_hdf5 rating solver manifest plot file"),
 ];
 

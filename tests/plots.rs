@@ -77,10 +77,14 @@ fn texts_of_all_charts_are_free() {
     for name in ["scenario.toml", "eight-on-eight.toml", "en15227-identical-units.toml"] {
         let prepared = scenario::load(&folder.join(name)).unwrap();
         let run = simulate(&prepared.chain, &prepared.settings).unwrap();
-        let motion = Motion::of_run(&prepared.chain, &run, &prepared.order);
+        let motion = Motion::of_run(&prepared, &run, vec!["a note".into()]);
         use Quantity::{Acceleration, Crush, Energy, Force, Velocity};
         for quantity in [Velocity, Acceleration, Force, Crush, Energy] {
-            check(&motion.chart(name, quantity).unwrap(), name);
+            for runs in [vec!["one"], vec!["one", "other"]] {
+                let runs: Vec<(String, Motion)> =
+                    runs.into_iter().map(|name| (name.into(), motion.clone())).collect();
+                check(&charts::motion(name, &runs, quantity, &[], 60).unwrap(), name);
+            }
         }
     }
     let path = folder.join("train-set.toml");
@@ -127,6 +131,7 @@ fn names_of_any_length_have_their_place() {
             x: vec![0.0, 1.0],
             low: vec![-1e300, f64::NAN],
             high: vec![1e300, f64::INFINITY],
+            is_stacked: k % 2 == 0,
         });
         for i in 0..30 {
             panel.marks.push(Mark { name: name.into(), x: 0.03 * f64::from(i) });
@@ -165,6 +170,25 @@ fn every_kind_of_file_is_drawn() {
     let folder = demo_folder();
     let folder = folder.path();
     crumple_ok(folder, "simulate scenario.toml -o result.csv");
+    let slower =
+        fs::read_to_string(folder.join("scenario.toml")).unwrap().replace("54km/h", "40km/h");
+    fs::write(folder.join("slower.toml"), slower).unwrap();
+    crumple_ok(folder, "simulate slower.toml -o slower.csv");
+    let speed =
+        "{ what = \"speed\", train = \"A\", from = \"30km/h\", to = \"60km/h\", steps = 3 }";
+    for (name, samples, force) in [
+        ("sweep", "", ""),
+        ("grid", "", ", { what = \"force\", curve = \"nose\", from = 0.9, to = 1.1, steps = 2 }"),
+        (
+            "drawn",
+            "samples = 20\n",
+            ", { what = \"force\", curve = \"nose\", distribution = \"normal\", mean = 1, sd = 0.1 }",
+        ),
+    ] {
+        let plan = format!("[sweep]\n{samples}vary = [{speed}{force}]\n");
+        fs::write(folder.join(format!("{name}.plan.toml")), plan).unwrap();
+        crumple_ok(folder, &format!("sweep scenario.toml --plan {name}.plan.toml -o {name}.csv"));
+    }
     #[rustfmt::skip]
     let cases = [
         ("curves.h5 --group lead-car-wall", &["FE at 72 km/h", "deflection [m]", "force [MN]"][..]),
@@ -173,8 +197,18 @@ fn every_kind_of_file_is_drawn() {
         ("lead.model --speed 50km/h", &["FE at 48 km/h", "FE at 60 km/h", "maximum crush", "empirical 90 % range from 5 left-out inner speeds"]),
         ("lead50.json", &["lead-car-wall at 50 km/h: contact force by the model crush-law"]),
         ("lead50.json --force body", &["lead-car-wall at 50 km/h: body force by the model crush-law"]),
-        ("scenario.toml --quantity energy", &["kinetic", "dissipated", "energy [MJ]", "time [ms]"]),
+        ("scenario.toml --quantity energy", &["kinetic", "A1|wall", "energy [MJ]", "time [ms]"]),
+        ("scenario.toml --quantity acceleration --cfc 180", &["scenario: acceleration, CFC 180", "acceleration [g]", "Curve nose: lead.model: crush-law of lead-car-wall, 7 FE runs, 12 km/h to 72 km/h."]),
         ("result.csv --quantity crush", &["A1|wall", "deflection [m]"]),
+        ("result.csv slower.csv", &["A1, result", "A1, slower", "speed [m/s]"]),
+        // Small multiples beyond six, and what is chosen in one panel.
+        ("two-sets.toml two-sets.toml", &["B4", "two-sets", "two-sets.toml"]),
+        ("two-sets.toml --body A1 --body B1", &["A1", "B1"]),
+        ("two-sets.toml --quantity crush --interface A1|B1 --interface A1|A2", &["A1|A2", "force [MN]"]),
+        ("train-set.toml --quantity crush", &["beyond the data of the curve"]),
+        ("sweep.csv", &["max deflection [m]", "speed A [km/h]"]),
+        ("grid.csv --result final_v --result max_deflection_m[A1|wall]", &["final v A1 [m/s]", "force factor nose"]),
+        ("drawn.csv --over force_factor --result peak_force", &["median", "5 to 95 % of the runs", "Also varied: speed_m_per_s[A]."]),
         ("train-set.toml --train", &["A1", "A3", "FE", "best_local", "speed [m/s]"]),
         ("fe/lead-car-wall/36kmh/nodout --id 900001 --component x_velocity --units mm-t-s --cfc 60", &["900001, CFC 60", "x_velocity [m/s]"]),
         ("fe/lead-car-wall/36kmh/crashT01 --section rwforc --component normal_force", &["normal_force [unit of the file]"]),
@@ -210,6 +244,7 @@ fn wrong_wishes_are_refused() {
     let folder = demo_folder();
     let folder = folder.path();
     fs::write(folder.join("bad.csv"), "time_s,v_m_per_s[A1]\n0,1\n1,x\n").unwrap();
+    fs::write(folder.join("cut.csv"), "# crumple sweep, layout 1\n# written").unwrap();
     fs::write(folder.join("other.csv"), "time_s,b\n0,1\n").unwrap();
     let before = entries(folder);
     #[rustfmt::skip]
@@ -222,6 +257,11 @@ fn wrong_wishes_are_refused() {
         (2, "lead50.json --speed 50km/h -o a.svg", "--speed is for a model: lead50.json is a predicted curve"),
         (2, "lead.model --speed 50km/h --id 3 -o a.svg", "--id is for a solver file"),
         (1, "bad.csv -o a.svg", "bad.csv: line 3, column 2: expected a number, found \"x\""),
+        (2, "two-sets.toml lead.model -o a.svg", "lead.model is a model"),
+        (1, "two-sets.toml --body A9 -o a.svg", "there is no body \"A9\": expected one of A1, A2"),
+        (2, "two-sets.toml --interface A1|A2 -o a.svg", "this quantity is chosen with --body"),
+        (2, "lead.model --speed 50km/h --over speed -o a.svg", "--over is for a sweep"),
+        (1, "cut.csv -o a.svg", "cut.csv: expected \"# crumple sweep\" in the first line and a whole head"),
         (1, "other.csv -o a.svg", "expected the columns of crumple simulate -o"),
         (1, "nothing.csv -o a.svg", "nothing.csv"),
         (2, "lead.model --speed 50km/h -o lead.model", "pictures are written"),

@@ -22,7 +22,7 @@ fn report(arguments: &[&str]) -> (tempfile::TempDir, String) {
 fn the_demo_ends_with_a_small_page_that_needs_nothing() {
     let folder = demo_folder();
     let page = fs::read_to_string(folder.path().join("report.html")).unwrap();
-    assert!(page.len() <= 400_000, "{} bytes", page.len());
+    assert!(page.len() <= 900_000, "{} bytes", page.len());
     says(
         &page,
         "content=\"default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'\"",
@@ -37,7 +37,9 @@ fn the_demo_ends_with_a_small_page_that_needs_nothing() {
         "Predicted curve at",
         "Methods",
         "Scenario scenario.toml",
-        "Mean deceleration over 5 g (EN 15227:2020)",
+        "mean deceleration over 5 g (EN 15227:2020",
+        "What drives the interfaces",
+        "most energy is taken at",
         "energy lost",
         "Next FE run:",
         "BLAKE3",
@@ -128,6 +130,11 @@ fn wrong_wishes_are_refused() {
         (2, "curves.h5 -o curves.h5", "names the input itself"),
         (2, "curves.h5 scenario.toml -o lead.model", "names the input itself"),
         (2, "curves.h5", "--output"),
+        (
+            2,
+            "curves.h5 lead.model -o a.html",
+            "lead.model is a model: a report is made of databases and scenarios",
+        ),
     ] {
         let mut all = vec!["report"];
         all.extend(arguments.split(' '));
@@ -135,6 +142,56 @@ fn wrong_wishes_are_refused() {
         assert!(error.contains(says), "{arguments}:\n{error}");
     }
     assert_eq!(entries(folder), before, "nothing was written");
+}
+
+/// Two designs, and two variants of a train, stand side by side; who made the page and how is at its top.
+#[test]
+fn designs_and_trains_stand_side_by_side() {
+    let folder = demo_folder();
+    let folder = folder.path();
+    fs::copy(folder.join("curves.h5"), folder.join("other.h5")).unwrap();
+    let slower =
+        fs::read_to_string(folder.join("two-sets.toml")).unwrap().replace("36km/h", "30km/h");
+    fs::write(folder.join("slower.toml"), slower).unwrap();
+    let arguments = [
+        "report",
+        "curves.h5",
+        "other.h5",
+        "two-sets.toml",
+        "slower.toml",
+        "scenario.toml",
+        "--group",
+        "lead-car-wall",
+        "--methods",
+        "none",
+        "--author",
+        "A. Engineer",
+        "-o",
+        "both.html",
+    ];
+    crumple_ok(folder, &arguments);
+    let page = fs::read_to_string(folder.join("both.html")).unwrap();
+    for text in [
+        "Designs side by side",
+        "lead-car-wall, other.h5",
+        "Scenarios side by side",
+        ", A. Engineer</p>",
+        "crumple report curves.h5 other.h5 two-sets.toml slower.toml scenario.toml --group lead-car-wall --methods none --author &#x27;A. Engineer&#x27; -o both.html",
+    ] {
+        assert!(page.contains(text), "{text}");
+    }
+    // The third scenario has one vehicle of eight in common: it is no variant.
+    let side_by_side = page
+        .split("Scenarios side by side</h2>")
+        .nth(1)
+        .unwrap()
+        .split("</section>")
+        .next()
+        .unwrap();
+    assert!(side_by_side.contains("slower.toml") && !side_by_side.contains(">scenario.toml<"));
+    // Trains alone make a page as well.
+    crumple_ok(folder, "report slower.toml -o train.html");
+    says(&fs::read_to_string(folder.join("train.html")).unwrap(), "no limits are stated");
 }
 
 /// Chromium: no message, no request, values under the pointer, zoom, keyboard, dark and light, print, no script.
@@ -192,6 +249,12 @@ fn browser_shows_the_page() {
     assert_eq!(seen["print"]["hidden_series"], 0, "print shows all series");
     assert!(seen["print"]["pages"].as_u64().unwrap() > 3);
     assert_eq!(seen["print"]["torn_headings"], serde_json::json!([]));
+    for (of, seen) in seen["sizes"].as_object().unwrap() {
+        assert_eq!(seen["faults"], serde_json::json!([]), "{of}: {seen}");
+        assert!(seen["smallest_text_px"].as_f64().unwrap() >= 9.0, "{of}: {seen}");
+        assert_eq!(seen["is_wider_than_screen"], false, "{of}: {seen}");
+        assert_eq!(seen["texts_overlap"], serde_json::json!([]), "{of}: {seen}");
+    }
     assert!(seen["without_script"]["pictures"].as_u64().unwrap() >= 15);
     assert_eq!(seen["without_script"]["legend_is_drawn"], true);
 }

@@ -126,8 +126,12 @@ pub(crate) fn compare(
     let times = rest.cases.iter().map(|case| case.solver_time_s());
     let training_time_s: Option<f64> =
         times.collect::<Option<Vec<f64>>>().map(|times| times.iter().sum());
-    let rows =
-        RowBuilder { reference, fe_time_s: case.provenance.solver_wall_time_s, training_time_s };
+    let rows = RowBuilder {
+        reference,
+        max_crush_m: case.max_deflection_m(),
+        fe_time_s: case.provenance.solver_wall_time_s,
+        training_time_s,
+    };
 
     let mut compared = Vec::new();
     for method in methods::of_fe(&left_out) {

@@ -9,6 +9,7 @@ use super::methods::{FittedNsdm, Method, Times};
 use super::reference::Reference;
 use crate::curve::ForceKind;
 use crate::error::Error;
+use crate::rating::acceptance::Acceptance;
 use crate::rating::{Quantity, Rating, RatingSettings, Signal, rate};
 use crate::signal::l1_ratio;
 
@@ -37,6 +38,8 @@ pub(crate) struct Row {
     pub peak_force_n: f64,
     /// Maximum deflection of the run, in m.
     pub max_crush_m: f64,
+    /// By the acceptance rule for numerical crash models, as one stage.
+    pub acceptance: Acceptance,
     /// Time to fit, from the training cases on.
     pub fit_time_s: f64,
     /// Time to predict the curve.
@@ -56,6 +59,8 @@ pub(crate) struct Row {
 /// What all rows of one comparison share.
 pub(super) struct RowBuilder<'a> {
     pub reference: &'a Reference,
+    /// FE's maximum deflection, in m.
+    pub max_crush_m: f64,
     pub fe_time_s: Option<f64>,
     /// Of all runs that curves are trained on.
     pub training_time_s: Option<f64>,
@@ -112,6 +117,15 @@ impl RowBuilder<'_> {
         self.rated("nsdm", fitted.made_from.clone(), None, motion, times)
     }
 
+    /// Of one mass, which has all of the energy at first; the force is the mean that stops it.
+    fn acceptance(&self, velocity: &[f64], max_crush_m: f64) -> Acceptance {
+        let reference = self.reference;
+        let last = |speeds: &[f64]| speeds.last().map_or(0.0, |v| v / reference.speed_m_per_s());
+        let (fe, ours) = (last(&reference.velocity()[..velocity.len()]), last(velocity));
+        let crush = max_crush_m / self.max_crush_m;
+        Acceptance::of(fe * fe - ours * ours, crush - 1.0, 1.0 / crush - 1.0)
+    }
+
     fn rated(
         &self,
         method: &str,
@@ -144,6 +158,7 @@ impl RowBuilder<'_> {
             force_l1: None,
             peak_force_n,
             max_crush_m,
+            acceptance: self.acceptance(&velocity[..inside], max_crush_m),
             fit_time_s: times.fit_s,
             predict_time_s: times.predict_s,
             simulation_time_s: simulation_s,

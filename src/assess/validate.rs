@@ -19,6 +19,7 @@ use crate::curve::{Case, ForceKind, group};
 use crate::dataset::{TrainingSet, is_same_speed};
 use crate::error::Error;
 use crate::plural::counted;
+use crate::rating::acceptance::Acceptance;
 use crate::surrogate::band::{self, Band, ForceScatter, LeftOutSpeeds, Residuals};
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::leave_one_out::{Floor, LeftOut, Means, Validation};
@@ -58,6 +59,13 @@ pub enum GroupReport {
         /// Why, in a sentence.
         error: String,
     },
+}
+
+/// A prediction of a left-out speed by the acceptance rule, the whole crush as one stage; FE's own work stands for the
+/// initial energy, of which the rebound is a few per cent.
+pub(crate) fn acceptance(row: &LeftOut) -> Acceptance {
+    let mean_force_error = (1.0 + row.energy_error) / (1.0 + row.max_crush_error) - 1.0;
+    Acceptance::of(row.energy_error, row.max_crush_error, mean_force_error)
 }
 
 /// Which model to train.

@@ -122,6 +122,22 @@ pub fn prediction(curve: &PredictedCurve, neighbours: &[ModelCase]) -> Chart {
     chart
 }
 
+/// Several predicted curves over one another, by name, without their bands.
+pub(crate) fn predictions<'a>(
+    title: &str,
+    curves: impl Iterator<Item = (&'a str, &'a PredictedCurve)>,
+) -> Chart {
+    let curves: Vec<(&str, &PredictedCurve)> = curves.collect();
+    let top = curves.iter().map(|(_, curve)| largest(&curve.force_n)).fold(0.0, f64::max);
+    let mut panel = axes(top);
+    for (k, (name, curve)) in curves.into_iter().enumerate() {
+        let name = format!("{name}, {}", speed(curve.speed_m_per_s));
+        let (d, f) = (curve.deflection_m.clone(), curve.force_n.clone());
+        panel.series.push(Series::line(&name, k, d, f));
+    }
+    Chart::of(title, panel)
+}
+
 /// The cases below and above a speed; at an end the two nearest.
 fn beside(cases: &[ModelCase], v: f64) -> Vec<&ModelCase> {
     let mut sorted: Vec<&ModelCase> = cases.iter().collect();

@@ -24,7 +24,7 @@ mod motion;
 mod sweep;
 
 use crate::unit::km_per_h;
-pub(crate) use curves::file_curve;
+pub(crate) use curves::{file_curve, predictions};
 pub use curves::{group_curves, left_out_at, prediction};
 pub use histories::histories;
 pub(crate) use motion::USUAL_CLASS;

@@ -208,6 +208,12 @@ impl Motion {
         }
     }
 
+    /// Times in s, and name, deflection in m and force in N of every interface.
+    pub(crate) fn interfaces(&self) -> (&[f64], impl Iterator<Item = (&str, &[f64], &[f64])>) {
+        let of = self.interfaces.iter().map(|i| (&*i.name, &*i.deflection_m, &*i.force_n));
+        (&self.time_s, of)
+    }
+
     /// Bodies or interfaces by name, with whether each is drawn without being asked for.
     fn names(&self, of_interfaces: bool) -> Vec<(&str, bool)> {
         if of_interfaces {

@@ -11,6 +11,7 @@ use crate::curve::ForceKind;
 use crate::database::Database;
 use crate::nsdm::Start;
 use crate::rating::Rating;
+use crate::rating::acceptance::{ACCEPTANCE, STANDARD};
 use crate::scenario;
 use crate::table::Table;
 use crate::unit::{Shown, km_per_h};
@@ -154,6 +155,10 @@ fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
         .column("force", |row| row.force_l1.map_or("-".into(), percent))
         .column("peak force", |row| Shown::force(row.peak_force_n).text(row.peak_force_n))
         .column("max crush", |row| format!("{:.4} m", row.max_crush_m))
+        .column("within 10 %", |row| match row.acceptance.passes {
+            true => "yes".into(),
+            false => format!("no, {:.0} %", 100.0 * row.acceptance.worst()),
+        })
         .column("fit", |row| format!("{:.1} ms", row.fit_time_s * 1e3))
         .column("predict", |row| milliseconds(row.predict_time_s))
         .column("run", |row| milliseconds(row.simulation_time_s))
@@ -220,6 +225,9 @@ fn several(comparisons: &[Comparison], options: GlobalOptions) -> CommandResult 
             acceleration_unfiltered_l1: mean(&|r| r.acceleration_unfiltered_l1),
             velocity_iso18571: mean(&|r| score(&r.velocity)),
             acceleration_iso18571: mean(&|r| score(&r.acceleration)),
+            accepted: comparisons.iter().flat_map(|c| &c.rows)
+                .filter(|r| r.method == row.method && r.acceptance.passes)
+                .count(),
         }
     });
     let means: Vec<_> = means.collect();
@@ -240,8 +248,10 @@ fn several(comparisons: &[Comparison], options: GlobalOptions) -> CommandResult 
                 format!("{:.1} % ({unfiltered:.1})", m.acceleration_l1 * 100.0)
             })
             .column("ISO/TS 18571 velocity", |m| format!("{:.3}", m.velocity_iso18571))
-            .column("acceleration", |m| format!("{:.3}", m.acceleration_iso18571));
-        output::table(out, table)
+            .column("acceleration", |m| format!("{:.3}", m.acceleration_iso18571))
+            .column("within 10 %", |m| format!("{} of {}", m.accepted, comparisons.len()));
+        output::table(out, table)?;
+        writeln!(out, "within 10 %: {ACCEPTANCE} ({STANDARD})")
     })
 }
 

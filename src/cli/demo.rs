@@ -8,6 +8,7 @@ use std::time::Instant;
 use crate::assess::choose::{Purpose, Selection};
 use crate::assess::validate::{train_chosen, validate};
 use crate::build::{self, BuiltRun, RunOutcome};
+use crate::clock::now_utc;
 use crate::curve::Case;
 use crate::database::Database;
 use crate::file::{self, not_written, write_at, write_whole};
@@ -236,6 +237,9 @@ impl Flow<'_> {
     fn report(&mut self, database: &Database, models: &[Model]) -> Result<(), Failure> {
         let settings = ReportSettings {
             title: Some("crumple demo".into()),
+            author: None,
+            made_at: now_utc(),
+            command: "crumple demo".into(),
             groups: Vec::new(),
             speed_m_per_s: None,
             methods: MethodSpeeds::Worst,
@@ -244,9 +248,9 @@ impl Flow<'_> {
         };
         let scenarios = REPORTED.map(|name| self.folder.join(name));
         let path = self.path("report.html");
-        let curves = self.folder.join("curves.h5");
+        let databases = [(self.folder.join("curves.h5"), database.clone())];
         let (page, _) =
-            report(&curves, database, &scenarios, models, &settings, |step| self.bar.step(step))?;
+            report(&databases, &scenarios, models, &settings, |step| self.bar.step(step))?;
         Ok(write_whole(&path, page.as_bytes())?)
     }
 }

@@ -3,16 +3,22 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use super::arguments::one_of;
+use super::arguments::{FileKind, one_of};
 use super::histories::check_section;
-use super::{CommandResult, Failure, GlobalOptions, Outcome, failed, output, usage, usage_error};
+use super::{
+    CommandResult, Failure, GlobalOptions, Outcome, failed, failed_at, output, usage, usage_error,
+};
+use crate::charts::Motion;
 use crate::error::Error;
+use crate::rating::acceptance::{
+    ACCEPTANCE, RunAcceptance, STANDARD, StageAcceptance, StageRecord, accept,
+};
 use crate::rating::differences::{Deceleration, MagnitudePhase};
 use crate::rating::iso18571::Iso18571;
 use crate::rating::{self, Quantity, Rating, RatingSettings, Signal};
 use crate::solver::{self, Selection, WantedId};
 use crate::table::Table;
-use crate::unit::TIME;
+use crate::unit::{Shown, TIME};
 use crate::{file, formats};
 
 /// Maximum number of bytes of a table that is rated: some million rows.
@@ -26,13 +32,16 @@ const MAX_TABLE_BYTES: u64 = 256 << 20;
   crumple rate 36kmh/nodout 48kmh/nodout --id 900001 --component x_acceleration --cfc 60 --json
   crumple rate fe/binout:rwforc/forces:1:normal_force fe/rwforc:1:normal_force
   crumple rate test.csv,time=ms model.csv,time=s
+  crumple rate one.csv other.csv      # two results of crumple simulate: the acceptance rule, interface by interface
 A is the reference r, B the prediction p. Each is a CSV file (a header line; the first column is the
 time), FILE:COLUMN, or any file that crumple histories reads, FILE:ID:COMPONENT, in a binout with
 several sections FILE:SECTION:ID:COMPONENT; append ,scale=FACTOR for the values and ,time=UNIT for
 the times (s, ms, us). What both share can be given once, by --id and --component or --column. Both
 are filtered on request, then interpolated linearly at common times 0.1 ms apart (10 kHz, as required
 by ISO/TS 18571). Accelerations are negative during deceleration. ISO/TS 18571 and CORA take at most 2 s:
-choose with --from and --to.")]
+choose with --from and --to. Of two results of crumple simulate, without a column, every interface that both have is
+rated by the acceptance rule for numerical crash models that rail practice quotes from EN 15227:2020+A1:2024: the same
+sequence, dissipated energy within 10 % of the initial one, displacement and mean force of each stage within 10 %.")]
 pub(super) struct Args {
     /// Reference: CSV or solver file, with the column or history to take
     #[arg(value_name = "A", value_parser = Address::parse, allow_hyphen_values = true)]
@@ -197,6 +206,9 @@ struct LoadedSignal {
 }
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
+    if args.are_runs()? {
+        return rate_runs(&args.reference.path, &args.prediction.path, options);
+    }
     let both = &args.both;
     let [a, b] = [&args.reference, &args.prediction].map(|address| SignalRequest { address, both });
     let (reference, prediction) = (a.read(options)?, b.read(options)?);
@@ -213,6 +225,97 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let outcome = options.warn_all(&rating.warnings);
     options.show(&rating, |out| print(out, &rating))?;
     Ok(outcome.max(Outcome::warned_if(reference.problems + prediction.problems > 0)))
+}
+
+impl Args {
+    /// Whether both files are results of runs, of which no column is named.
+    fn are_runs(&self) -> Result<bool, Failure> {
+        let SignalOptions { column, id, component, section, format } = &self.both;
+        let is_named = column.is_some()
+            || id.is_some()
+            || component.is_some()
+            || section.is_some()
+            || format.is_some();
+        for address in [&self.reference, &self.prediction] {
+            let is_result = address.within.is_none()
+                && !is_named
+                && address.path.exists()
+                && FileKind::of(&address.path)? == FileKind::Result;
+            if !is_result {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+}
+
+/// Interfaces that begin within so many s of each other have no order.
+const TIE_S: f64 = 0.002;
+
+/// Two runs by the acceptance rule.
+fn rate_runs(reference: &Path, prediction: &Path, options: GlobalOptions) -> CommandResult {
+    let read = |path: &Path| -> Result<Motion, Failure> {
+        let text = file::read(path, MAX_TABLE_BYTES).map_err(|e| failed_at(path, e))?;
+        Motion::of_csv(&text).map_err(|e| failed_at(path, e))
+    };
+    let (r, p) = (read(reference)?, read(prediction)?);
+    fn stages(motion: &Motion) -> Vec<StageRecord<'_>> {
+        let (time_s, interfaces) = motion.interfaces();
+        let of = interfaces.map(|(name, deflection_m, force_n)| StageRecord {
+            name,
+            time_s,
+            deflection_m,
+            force_n,
+        });
+        of.collect()
+    }
+    let Some(found) = accept(&stages(&r), &stages(&p), None, TIE_S) else {
+        return usage(format!(
+            "{} and {} have no interface in common that takes energy: to rate one column, name it: {}:COLUMN",
+            reference.display(),
+            prediction.display(),
+            reference.display()
+        ));
+    };
+    options.show(&found, |out| print_runs(out, &found))?;
+    Ok(Outcome::Clean)
+}
+
+fn print_runs(out: &mut dyn Write, found: &RunAcceptance) -> io::Result<()> {
+    let largest = |of: fn(&StageAcceptance) -> f64| found.stages.iter().map(of).fold(0.0, f64::max);
+    let energy = Shown::energy(largest(|s| s.reference.dissipated_j));
+    let force = Shown::force(largest(|s| s.reference.mean_force_n));
+    let signed = |error: f64| format!("{:+.1} %", 100.0 * error);
+    let table = Table::of(&found.stages)
+        .column("interface", |s| &s.stage)
+        .column("energy", |s| energy.text(s.reference.dissipated_j))
+        .column("other", |s| energy.text(s.prediction.dissipated_j))
+        .column("of initial", |s| signed(s.acceptance.energy_error))
+        .column("crush", |s| format!("{:.3} m", s.reference.displacement_m))
+        .column("other", |s| format!("{:.3} m", s.prediction.displacement_m))
+        .column("error", |s| signed(s.acceptance.displacement_error))
+        .column("mean force", |s| force.text(s.reference.mean_force_n))
+        .column("other", |s| force.text(s.prediction.mean_force_n))
+        .column("error", |s| signed(s.acceptance.mean_force_error))
+        .column("within 10 %", |s| match (s.counts, s.acceptance.passes) {
+            (false, _) => "does not count",
+            (true, true) => "yes",
+            (true, false) => "no",
+        });
+    output::table(out, table)?;
+    let [r, p] = found.sequences.each_ref().map(|names| names.join(", "));
+    let sequence = match found.same_sequence {
+        true => format!("the same sequence: {r}"),
+        false => format!("another sequence: {p} instead of {r}"),
+    };
+    writeln!(out, "{sequence}")?;
+    let verdict = if found.passes { "passes" } else { "fails" };
+    writeln!(
+        out,
+        "energy of all {} of {} taken by the reference; {verdict}: {ACCEPTANCE} of each interface that takes at least 1 % of the energy, and the same sequence ({STANDARD})",
+        signed(found.energy_error),
+        energy.text(found.initial_energy_j)
+    )
 }
 
 /// Refuses what chooses nothing: a column of a solver file, a node of a table.

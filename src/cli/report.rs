@@ -2,26 +2,28 @@
 
 use std::path::PathBuf;
 
+use crate::clock::now_utc;
 use crate::database::Database;
 use crate::file::write_whole;
 use crate::report::{MethodSpeeds, ReportSettings, report};
 
 use super::arguments::{self, FileKind, one_of};
 use super::output::{self, Bar};
-use super::{CommandResult, GlobalOptions, Outcome, keep_input, keep_inputs};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input, keep_inputs, usage};
 
-/// Write one self-contained HTML page: curves, validation, predictions, methods, train results
+/// Write one self-contained HTML page: verdicts, curves, validation, predictions, methods, train results
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   crumple report curves.h5 -o report.html
   crumple report curves.h5 scenario.toml train-set.toml -o report.html
   crumple report curves.h5 --group lead-car-wall --speed 50km/h --nsdm-seeds 3 -o report.html
+  crumple report old.h5 new.h5 -o designs.html              # two designs side by side
+  crumple report one.toml other.toml --author 'A. Engineer' -o trains.html
 The page needs no network and no other file. Scenarios are run; one with a [reference] is compared with FE.")]
 pub(super) struct Args {
-    /// Curve database
-    database: PathBuf,
-    /// Scenarios (TOML) whose runs are shown
-    scenarios: Vec<PathBuf>,
+    /// Curve databases, and scenarios (TOML) whose runs are shown; several of a kind are compared
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
     /// Page to write; "-" is standard output
     #[arg(short, long)]
     output: PathBuf,
@@ -31,9 +33,12 @@ pub(super) struct Args {
     /// Speed of the predicted curves (default: the middle of each group's widest speed interval)
     #[arg(long, value_parser = arguments::speed)]
     speed: Option<f64>,
-    /// Title of the page (default: the database's name)
+    /// Title of the page (default: the first file's name)
     #[arg(long)]
     title: Option<String>,
+    /// Who answers for the page
+    #[arg(long)]
+    author: Option<String>,
     /// Left-out speeds at which the methods are compared, half a second each
     #[arg(long, value_parser = one_of(METHODS), default_value = "worst")]
     methods: MethodSpeeds,
@@ -51,14 +56,47 @@ const METHODS: &[(&str, MethodSpeeds, &str)] = &[
     ("all", MethodSpeeds::All, "Every inner speed"),
 ];
 
+/// The command as a shell takes it.
+fn command() -> String {
+    let is_plain = |c: char| c.is_alphanumeric() || "-_./=:,+%@".contains(c);
+    let quoted = |argument: String| match argument.chars().all(is_plain) && !argument.is_empty() {
+        true => argument,
+        false => format!("'{}'", argument.replace('\'', r"'\''")),
+    };
+    let arguments = std::env::args_os().skip(1).map(|a| quoted(a.to_string_lossy().into_owned()));
+    std::iter::once("crumple".to_string()).chain(arguments).collect::<Vec<_>>().join(" ")
+}
+
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
-    keep_input(&args.database, &args.output)?;
-    args.scenarios.iter().try_for_each(|scenario| keep_inputs(scenario, &args.output))?;
+    let (mut databases, mut scenarios) = (Vec::new(), Vec::new());
+    for file in &args.files {
+        match FileKind::of(file)? {
+            FileKind::Database => {
+                keep_input(file, &args.output)?;
+                databases.push(file);
+            }
+            FileKind::Scenario => {
+                keep_inputs(file, &args.output)?;
+                scenarios.push(file.clone());
+            }
+            kind => {
+                return usage(format!(
+                    "{} is {}: a report is made of databases and scenarios",
+                    file.display(),
+                    kind.name()
+                ));
+            }
+        }
+    }
     options.keep_others(&args.output, FileKind::Curve)?;
     let to_stdout = options.on_stdout([&args.output])?;
-    let database = Database::read(&args.database)?;
+    let read = |path: &PathBuf| Ok((path.clone(), Database::read(path)?));
+    let databases = databases.into_iter().map(read).collect::<Result<Vec<_>, Failure>>()?;
     let settings = ReportSettings {
         title: args.title.clone(),
+        author: args.author.clone(),
+        made_at: now_utc(),
+        command: command(),
         groups: args.group.clone(),
         speed_m_per_s: args.speed,
         methods: args.methods,
@@ -66,8 +104,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         seed: args.seed,
     };
     let bar = Bar::new(options, "reporting");
-    let (page, warnings) =
-        report(&args.database, &database, &args.scenarios, &[], &settings, |step| bar.step(step))?;
+    let (page, warnings) = report(&databases, &scenarios, &[], &settings, |step| bar.step(step))?;
     drop(bar);
     let outcome = Outcome::warned_if(warnings > 0);
     if to_stdout {

@@ -7,10 +7,13 @@ use std::path::PathBuf;
 
 use crate::assess::choose::{NextRun, Purpose, Selection, next_run};
 use crate::assess::subsets::{OverSubsets, subsets};
-use crate::assess::validate::{GroupReport, MOST_SPEEDS, Report, add_nested, validate_speeds};
+use crate::assess::validate::{
+    GroupReport, MOST_SPEEDS, Report, acceptance, add_nested, validate_speeds,
+};
 use crate::curve::Case;
 use crate::database::Database;
 use crate::dataset::{TrainingSet, is_same_speed};
+use crate::rating::acceptance::{ACCEPTANCE, Acceptance, STANDARD};
 use crate::surrogate::ModelKind;
 use crate::surrogate::band::{Band, LeftOutSpeeds, POWER_OF_GAP};
 use crate::surrogate::leave_one_out::{
@@ -29,7 +32,7 @@ use super::{CommandResult, GlobalOptions, Outcome, usage};
   crumple validate curves.h5
   crumple validate curves.h5 --group lead-car-wall --next
   crumple validate curves.h5 --json
-Without --verbose, only mean errors, choice and bands are printed.
+Without --verbose, only mean errors, choice, acceptance and bands are printed.
 Columns: force is sum|p-r|/sum|r| along FE's crush; energy and crush are prediction over FE (the
 means show crush by each rule, with the model's own marked); peaks are the first two of FE's curve
 (force and position); velocity and acceleration (CFC 60; unfiltered in brackets) are those of a
@@ -193,7 +196,8 @@ fn print_speeds(out: &mut dyn Write, validation: &Validation) -> io::Result<()> 
             .column("acceleration", |row| {
                 acceleration(row.acceleration_l1, row.acceleration_unfiltered_l1)
             })
-            .column("in band", |row| row.coverage.map_or("-".into(), percent));
+            .column("in band", |row| row.coverage.map_or("-".into(), percent))
+            .column("within 10 %", |row| if acceptance(row).passes { "yes" } else { "no" });
         for floor in validation.floors.iter().filter(|floor| floor.inner == inner) {
             let unfiltered = floor.acceleration_unfiltered_l1;
             table = table.row(&[
@@ -267,6 +271,7 @@ fn print_summary(out: &mut dyn Write, validation: &Validation) -> io::Result<()>
         output::table(out, table)?;
     }
     writeln!(out, "{} chosen (*): {}", validation.chosen, validation.reason)?;
+    print_acceptance(out, validation, "")?;
     for (force, band) in bands(validation) {
         let span = km_per_h(band.span_m_per_s);
         let place = match band.left_out {
@@ -284,6 +289,23 @@ fn print_summary(out: &mut dyn Write, validation: &Validation) -> io::Result<()>
         )?;
     }
     Ok(())
+}
+
+/// The chosen model at the inner speeds by the acceptance rule.
+fn print_acceptance(out: &mut dyn Write, validation: &Validation, prefix: &str) -> io::Result<()> {
+    let rows = validation.rows.iter().filter(|row| row.inner && row.model == validation.chosen);
+    let all: Vec<Acceptance> = rows.map(acceptance).collect();
+    if all.is_empty() {
+        return Ok(());
+    }
+    let passed = all.iter().filter(|acceptance| acceptance.passes).count();
+    let worst = all.iter().map(Acceptance::worst).fold(0.0, f64::max);
+    writeln!(
+        out,
+        "{prefix}{passed} of {} left-out speeds pass the acceptance rule (largest error {}): {ACCEPTANCE} ({STANDARD})",
+        all.len(),
+        percent(worst)
+    )
 }
 
 fn acceleration(filtered: f64, unfiltered: f64) -> String {
@@ -354,6 +376,7 @@ fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
         output::table(out, table)?;
     }
     writeln!(out, "{group}: {} chosen (*): {}", validation.chosen, validation.reason)?;
+    print_acceptance(out, validation, &format!("{group}: "))?;
     for model in &validation.unsuited {
         writeln!(out, "{group}: without {model}")?;
     }

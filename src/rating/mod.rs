@@ -12,6 +12,7 @@
 //! within 1e-12 are equal here. Of a reference of zeros it gives NaN. No public program computes CORA (pyisomme 1.1 has ISO/TS
 //! 18571 only, through the same package); the tests compute it a second way.
 
+pub(crate) mod acceptance;
 pub(crate) mod differences;
 pub(crate) mod iso18571;
 mod signal;

@@ -5,6 +5,9 @@ use serde_json::{Value, json};
 
 use crate::plot::{Axis, Chart, Panel, PanelPlace, Shown, SvgFor};
 
+/// Width of a picture on a narrow screen, such as a telephone's, in pixels.
+const NARROW: f64 = 360.0;
+
 /// A chart in the page.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Figure {
@@ -12,6 +15,8 @@ pub(crate) struct Figure {
     caption: String,
     notes: Vec<String>,
     svg: String,
+    /// The same for a narrow screen, where the first would be too small to read.
+    narrow_svg: String,
     #[serde(skip)]
     data: Value,
     /// How many looks it needs.
@@ -30,11 +35,19 @@ impl Figure {
         drawing.title.clone_from(&caption);
         let places = chart.panels.iter().zip(&drawing.panels);
         let panels: Vec<Value> = places.map(|(panel, place)| panel_data(panel, place)).collect();
-        let data =
-            json!({ "panels": panels, "legend": drawing.legend_top, "width": drawing.width });
+        let mut narrow = Chart { width: NARROW, ..chart.clone() }.drawing();
+        narrow.title.clone_from(&caption);
+        let data = json!({
+            "panels": panels, "legend": drawing.legend_top, "width": drawing.width,
+            "narrow": {
+                "legend": narrow.legend_top, "width": narrow.width,
+                "panels": chart.panels.iter().zip(&narrow.panels).map(|(p, place)| place_data(p, place)).collect::<Vec<_>>(),
+            },
+        });
         let series = chart.panels.iter().flat_map(|panel| &panel.series);
         let looks = series.map(|s| s.look + 1).max().unwrap_or_default();
-        Self { id, caption, notes, svg: drawing.svg_for(SvgFor::Page), data, looks }
+        let (svg, narrow_svg) = (drawing.svg_for(SvgFor::Page), narrow.svg_for(SvgFor::Page));
+        Self { id, caption, notes, svg, narrow_svg, data, looks }
     }
 
     pub(super) fn id(&self) -> &str {
@@ -94,10 +107,18 @@ fn panel_data(panel: &Panel, place: &PanelPlace) -> Value {
             })
         })
         .collect();
+    let mut data = place_data(panel, place);
+    for (key, values) in [("xs", json!(xs)), ("series", json!(series)), ("bands", json!(bands))] {
+        data[key] = values;
+    }
+    data
+}
+
+/// Where a panel is, and what its axes span.
+fn place_data(panel: &Panel, place: &PanelPlace) -> Value {
     json!({
         "area": place.area.map(|v| (v * 10.0).round() / 10.0),
         "x": axis(&panel.x, place.x_span), "y": axis(&panel.y, place.y_span),
-        "xs": xs, "series": series, "bands": bands,
     })
 }
 

@@ -1,36 +1,34 @@
-//! The report on a group (its runs, the accuracy of predictions, a prediction, the methods), and on a train.
-
-use std::path::Path;
+//! The report on a group: its runs, the accuracy of predictions, a prediction, the methods.
 
 use super::figure::Figure;
 use super::{
-    Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, energy, file_name, force,
+    Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, ToDo, Verdict, energy, force,
     mass, metres, percent, signed_percent,
 };
 use crate::assess::choose::{Purpose, Selection, next_run};
 use crate::assess::compare::{Comparison, compare, inner_speeds, mean};
-use crate::assess::train::{TrainComparison, compare_train};
-use crate::assess::validate::{Choice, train_chosen, validate};
+use crate::assess::validate::{Choice, acceptance, train_chosen, validate};
 use crate::assess::{ComparisonSettings, Row};
-use crate::charts::{self, Motion, Quantity, train_speeds};
+use crate::charts;
 use crate::curve::{Case, ForceKind};
 use crate::dataset::TrainingSet;
 use crate::error::Error;
 use crate::plural::counted;
-use crate::scenario::{self, Limits, Summary};
-use crate::surrogate::leave_one_out::{LeftOut, Validation};
+use crate::rating::acceptance::{ACCEPTANCE, Acceptance, STANDARD};
+use crate::surrogate::leave_one_out::{LeftOut, Means, Validation};
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
 use crate::table::{Cell, Table};
 use crate::unit::km_per_h;
 
-/// Adds the section of a group.
+/// Adds the section of a group under a title; gives the curve predicted for it.
 pub(super) fn add(
     content: &mut Content,
+    title: &str,
     group: &str,
     cases: &[Case],
     models: &[Model],
     settings: &ReportSettings,
-) -> Result<(), Error> {
+) -> Result<Option<Design>, Error> {
     let number = content.sections.len() + 1;
     let own = cases.first().map_or(ForceKind::Contact, |case| case.curves.force_kind);
     let mut parts = vec![
@@ -40,23 +38,57 @@ pub(super) fn add(
         )),
         Part::table(format!("FE runs of {group}"), runs(cases)),
     ];
-    for case in cases {
-        for warning in &case.quality.warnings {
-            content.warn(format!("{group}, {}: {warning}", case.id.name));
-        }
+    for (warning, names) in by_warning(cases) {
+        let runs = match &names[..] {
+            [one] => (*one).to_string(),
+            several => format!("{} runs ({})", several.len(), several.join(", ")),
+        };
+        content.warn(ToDo::CheckRuns, format!("{title}, {runs}: {warning}"));
     }
+    let mut design = None;
     match known_or_new(group, cases, models, settings) {
         Ok(validation) => {
-            let validated = Validated { group, cases, validation, number };
+            let validated = Validated { title, group, cases, validation, number };
             validated.add_validation(content, &mut parts, settings);
-            validated.add_prediction(content, &mut parts, settings)?;
+            let curve = validated.add_prediction(content, &mut parts, settings)?;
             validated.add_methods(&mut parts, settings)?;
+            design = curve.map(|curve| Design {
+                title: title.into(),
+                runs: cases.len(),
+                chosen: validated.validation.chosen_means().cloned(),
+                curve,
+            });
         }
-        Err(error) => content.warn(format!("{group} cannot be validated: {error}")),
+        Err(error) => {
+            content.warn(ToDo::CheckRuns, format!("{title} cannot be validated: {error}"))
+        }
     }
     let id = format!("group-{number}");
-    content.sections.push(Section { id, title: group.into(), parts });
-    Ok(())
+    content.sections.push(Section { id, title: title.into(), parts });
+    Ok(design)
+}
+
+/// What of a group is compared with other groups.
+pub(super) struct Design {
+    pub title: String,
+    pub runs: usize,
+    /// Errors of the chosen model at left-out speeds.
+    pub chosen: Option<Means>,
+    pub curve: PredictedCurve,
+}
+
+/// Each warning of the runs once, with the names of the runs that have it.
+fn by_warning(cases: &[Case]) -> Vec<(&str, Vec<&str>)> {
+    let mut all: Vec<(&str, Vec<&str>)> = Vec::new();
+    for case in cases {
+        for warning in &case.quality.warnings {
+            match all.iter_mut().find(|(known, _)| known == warning) {
+                Some((_, names)) => names.push(&case.id.name),
+                None => all.push((warning, vec![&case.id.name])),
+            }
+        }
+    }
+    all
 }
 
 /// The validation that a model of these cases carries, or a new one.
@@ -110,6 +142,7 @@ fn masses(case: &Case) -> String {
 
 /// A group with the errors of its models at left-out speeds.
 struct Validated<'a> {
+    title: &'a str,
     group: &'a str,
     cases: &'a [Case],
     validation: Validation,
@@ -128,12 +161,22 @@ impl Validated<'_> {
         parts: &mut Vec<Part>,
         settings: &ReportSettings,
     ) {
-        let Self { group, cases, validation, .. } = self;
+        let Self { title, group, cases, validation, .. } = self;
         parts.push(Part::Heading("Accuracy of predictions".into()));
-        let chosen = validation.means.iter().find(|means| means.model == validation.chosen);
-        if let Some(means) = chosen {
+        if let Some(means) = validation.chosen_means() {
             let value = percent(means.velocity_l1);
-            content.figures.push(KeyFigure { value, name: format!("velocity error, {group}") });
+            content.figures.push(KeyFigure { value, name: format!("velocity error, {title}") });
+            content.verdict(Verdict::known(
+                title,
+                format!(
+                    "predictions by {} err by {} in force, {} in velocity, {} in maximum crush (means over {}, each left out in turn)",
+                    means.model,
+                    percent(means.force_l1),
+                    percent(means.velocity_l1),
+                    percent(means.max_crush_error),
+                    counted(means.speeds, "inner speed")
+                ),
+            ));
         }
         if !validation.means.is_empty() {
             let speeds = validation.means.first().map_or(0, |means| means.speeds);
@@ -144,6 +187,17 @@ impl Validated<'_> {
             parts.push(Part::table(caption, self.models()));
         }
         parts.push(Part::Text(format!("Chosen: {} ({}).", validation.chosen, validation.reason)));
+        let rows = validation.rows.iter().filter(|r| r.inner && r.model == validation.chosen);
+        let accepted: Vec<Acceptance> = rows.map(acceptance).collect();
+        if !accepted.is_empty() {
+            let passed = accepted.iter().filter(|of| of.passes).count();
+            let worst = accepted.iter().map(Acceptance::worst).fold(0.0, f64::max);
+            parts.push(Part::Text(format!(
+                "Acceptance rule for numerical crash models ({STANDARD}): {ACCEPTANCE}, the whole crush as one stage. {passed} of {} left-out speeds pass; the largest error is {}.",
+                accepted.len(),
+                percent(worst)
+            )));
+        }
         if let Some(scatter) = &validation.scatter {
             parts.push(Part::Text(format!(
                 "Repeated runs differ by {} in force and {} in velocity: no model can remove this part of its errors.",
@@ -153,7 +207,7 @@ impl Validated<'_> {
         }
         parts.extend(validation.unsuited.iter().map(|of| Part::Text(format!("Without {of}."))));
         for note in &validation.notes {
-            content.warn(format!("{group}: {note}"));
+            content.warn(ToDo::AddRuns, format!("{title}: {note}"));
         }
         let Some(worst) = self.worst() else { return };
         let mut kinds = ModelKind::all(settings.seed).into_iter();
@@ -167,7 +221,10 @@ impl Validated<'_> {
                 )));
                 parts.push(Part::Figure(Figure::new(self.id("left-out"), chart)));
             }
-            Err(error) => content.warn(format!("{group}: no picture of a left-out speed: {error}")),
+            Err(error) => {
+                let text = format!("{title}: no picture of a left-out speed: {error}");
+                content.warn(ToDo::AddRuns, text);
+            }
         }
     }
 
@@ -195,22 +252,26 @@ impl Validated<'_> {
         content: &mut Content,
         parts: &mut Vec<Part>,
         settings: &ReportSettings,
-    ) -> Result<(), Error> {
-        let Self { group, cases, validation, .. } = self;
+    ) -> Result<Option<PredictedCurve>, Error> {
+        let Self { title, group, cases, validation, .. } = self;
         let model = train_chosen(group, cases, &ModelKind::all(settings.seed), validation.clone())?;
         let Some(speed) = settings.speed_m_per_s.or_else(|| middle_of_widest_gap(cases)) else {
-            return Ok(());
+            return Ok(None);
         };
+        let mut predicted = None;
         parts.push(Part::Heading(format!("Predicted curve at {}", km_per_h(speed))));
         match predict(&model, &Query::at(speed)) {
             Ok(curve) => {
                 self.add_curve(parts, &model, &curve);
                 for warning in &curve.warnings {
-                    content.warn(format!("{group}, prediction at {}: {warning}", km_per_h(speed)));
+                    let text = format!("{title}, prediction at {}: {warning}", km_per_h(speed));
+                    content.warn(ToDo::AddRuns, text);
                 }
+                predicted = Some(curve);
             }
             Err(error) => {
-                content.warn(format!("{group}: no curve at {}: {error}", km_per_h(speed)));
+                let text = format!("{title}: no curve at {}: {error}", km_per_h(speed));
+                content.warn(ToDo::AddRuns, text);
             }
         }
         if let Ok(set) = TrainingSet::new(group, *cases)
@@ -219,7 +280,7 @@ impl Validated<'_> {
             let advice = format!("Next FE run: {}: {}.", km_per_h(next.speed_m_per_s), next.reason);
             parts.push(Part::Text(advice));
         }
-        Ok(())
+        Ok(predicted)
     }
 
     fn add_curve(&self, parts: &mut Vec<Part>, model: &Model, curve: &PredictedCurve) {
@@ -283,6 +344,11 @@ impl Validated<'_> {
             .column("acceleration (CFC 60)", |row| percent(mean(row, |r| r.acceleration_l1)))
             .column("maximum crush", |row| {
                 signed_percent(mean(row, |r| r.max_crush_m) / crush_m - 1.0)
+            })
+            .column("within 10 %", |row| {
+                let all = comparisons.iter().flat_map(|c| &c.rows);
+                let passed = all.filter(|r| r.method == row.method && r.acceptance.passes).count();
+                format!("{passed} of {}", comparisons.len())
             })
             .chosen(|row| row.method == "best");
         let left_out = left_out_speeds(&speeds);
@@ -350,125 +416,4 @@ pub(super) fn add_sources<'a>(content: &mut Content, cases: impl Iterator<Item =
         let parts = vec![Part::table("Files that the curves were made from", table)];
         content.sections.push(Section { id: "sources".into(), title: "Sources".into(), parts });
     }
-}
-
-/// Runs a scenario and adds its section; with FE's run as reference also the comparison of methods.
-pub(super) fn add_train(
-    content: &mut Content,
-    path: &Path,
-    settings: &ReportSettings,
-) -> Result<(), Error> {
-    let read = scenario::read(path)?;
-    let prepared = scenario::load(path)?;
-    let run = prepared.run()?;
-    let number = content.sections.len() + 1;
-    let name = file_name(path);
-    let runs = [(name.clone(), Motion::of_run(&prepared, &run, Vec::new()))];
-    let mut parts = Vec::new();
-    for (quantity, what) in [
-        (Quantity::Velocity, "speeds"),
-        (Quantity::Crush, "force over crush at each interface"),
-        (Quantity::Energy, "energy"),
-    ] {
-        let chart =
-            charts::motion(&format!("{name}: {what}"), &runs, quantity, &[], charts::USUAL_CLASS)?;
-        let id = format!("s{number}-{}", what.split(' ').next().unwrap_or_default());
-        parts.push(Part::Figure(Figure::new(id, chart)));
-    }
-    let summary = prepared.summary(&run);
-    parts.push(Part::table("Vehicles", vehicles(&summary)));
-    parts.push(Part::table("Interfaces", interfaces(&summary)));
-    parts.extend(summary.limits.as_ref().map(|of| Part::Text(limits(of))));
-    let crush = run.interfaces.iter().map(|i| i.max_deflection_m).fold(0.0, f64::max);
-    content
-        .figures
-        .push(KeyFigure { value: metres(crush), name: format!("maximum crush, {name}") });
-    for warning in prepared.warnings.iter().chain(&run.all_warnings()) {
-        content.warn(format!("{name}: {warning}"));
-    }
-    if read.reference.is_some() && settings.methods != MethodSpeeds::None {
-        let (seed, nsdm_seeds) = (settings.seed, settings.nsdm_seeds);
-        let asked = ComparisonSettings { seed, nsdm_seeds, ..ComparisonSettings::default() };
-        let comparison = compare_train(path, &read, &asked)?;
-        parts.push(Part::Heading("Comparison with FE's run of the whole train".into()));
-        let chart = train_speeds(&format!("{name}: speeds by FE and by the methods"), &comparison);
-        parts.push(Part::Figure(Figure::new(format!("s{number}-train"), chart)));
-        let caption =
-            format!("Velocity errors up to {:.0} ms, Σ|p − r|/Σ|r|", 1e3 * comparison.until_s);
-        parts.push(Part::table(caption, methods(&comparison)));
-    }
-    content.sections.push(Section {
-        id: format!("scenario-{number}"),
-        title: format!("Scenario {name}"),
-        parts,
-    });
-    Ok(())
-}
-
-/// Masses, speeds and decelerations.
-fn vehicles(summary: &Summary<'_>) -> impl Into<Table> {
-    Table::of(summary.bodies.iter().filter(|body| !body.is_crush_zone))
-        .column("vehicle", |body| body.name)
-        .column("mass", |body| mass(body.mass_kg))
-        .column("speed before", |body| format!("{:.2} m/s", body.initial_v_m_per_s))
-        .column("speed at the end", |body| format!("{:.2} m/s", body.final_v_m_per_s))
-        .column("mean deceleration", |body| {
-            let so_far = if body.still_loaded_at_end { " so far" } else { "" };
-            format!("{:.2} g{so_far}", body.mean_deceleration_g)
-        })
-        .column("largest over 120 ms", |body| {
-            body.moving_mean_deceleration_g.map_or("–".into(), |a| format!("{a:.2} g"))
-        })
-        .column("secondary impact after 0.6 m", |body| {
-            body.secondary_impact_m_per_s.map_or("–".into(), |v| format!("{v:.1} m/s"))
-        })
-        .column("occupant load", |body| {
-            body.occupant_load_g.map_or("–".into(), |a| format!("{a:.1} g"))
-        })
-}
-
-/// Crush and energy of each interface.
-fn interfaces(summary: &Summary<'_>) -> impl Into<Table> {
-    Table::of(&summary.interfaces)
-        .column("interface", |of| of.name)
-        .column("peak force", |of| force(of.history.peak_force_n))
-        .column("maximum crush", |of| metres(of.history.max_deflection_m))
-        .column("at", |of| format!("{:.1} ms", 1e3 * of.history.max_deflection_time_s))
-        .column("energy lost", |of| {
-            energy(of.history.dissipated_at_end_j + of.history.damped_j.unwrap_or(0.0))
-        })
-        .column("energy stored", |of| energy(of.history.stored_at_end_j))
-        .column("share of energy", |of| of.energy_share.map_or("–".into(), percent))
-        .column("curve", |of| &of.used.curve)
-        .column("force", |of| of.used.force.unwrap_or("unknown"))
-        .column("curve for", |of| of.used.speed_m_per_s.map_or("–".into(), km_per_h))
-}
-
-/// How the mean decelerations stand to the scenario's limits.
-fn limits(limits: &Limits<'_>) -> String {
-    let over = if !limits.beyond_data.is_empty() {
-        let beyond = limits.beyond_data.join(", ");
-        format!("unknown, because {beyond} went beyond the data of its curve")
-    } else if limits.over.is_empty() {
-        "no vehicle".into()
-    } else {
-        limits.over.join(", ")
-    };
-    let occupants: String =
-        limits.occupants.iter().map(|of| format!(" Occupants, {}.", of.text())).collect();
-    format!(
-        "Mean deceleration over {} g ({}:{}): {over}.{occupants} These values come from a one-dimensional model, say nothing about survival space, and are not evidence of conformity.",
-        limits.mean_deceleration_limit_g, limits.standard, limits.edition
-    )
-}
-
-/// Errors of each method in the whole train.
-fn methods(comparison: &TrainComparison) -> impl Into<Table> {
-    let table = Table::of(&comparison.rows)
-        .column("method", |row| &row.method)
-        .column("driven by", |row| &row.driven_by)
-        .column("mean", |row| percent(row.mean_velocity_l1));
-    comparison.fe.keys().enumerate().fold(table, |table, (k, vehicle)| {
-        table.column(vehicle, |row| percent(row.vehicles[k].velocity_l1))
-    })
 }

@@ -6,6 +6,8 @@
 
 mod figure;
 mod group;
+mod side_by_side;
+mod train;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,6 +16,7 @@ use minijinja::value::{Serde, Value};
 use minijinja::{Environment, context};
 use serde::Serialize;
 
+use crate::curve::Case;
 use crate::database::Database;
 use crate::error::Error;
 use crate::plot::looks_for_pages;
@@ -25,8 +28,14 @@ use figure::Figure;
 /// What a report is about.
 #[derive(Clone, Debug)]
 pub(crate) struct ReportSettings {
-    /// Title of the page; the database's name if absent.
+    /// Title of the page; the first file's name if absent.
     pub title: Option<String>,
+    /// Who answers for it, if stated.
+    pub author: Option<String>,
+    /// When it was made, in ISO 8601.
+    pub made_at: String,
+    /// The command that made it.
+    pub command: String,
     /// Groups of the database; all if empty.
     pub groups: Vec<String>,
     /// Speed in m/s of the predicted curves; the middle of each group's widest gap if absent.
@@ -86,66 +95,173 @@ pub(crate) struct Section {
     parts: Vec<Part>,
 }
 
+/// What came out, in a sentence.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Verdict {
+    /// `over` or `kept` of a limit, `unknown`, or `known`: what is no matter of limits.
+    state: &'static str,
+    about: String,
+    text: String,
+}
+
+impl Verdict {
+    fn known(about: &str, text: String) -> Self {
+        Self { state: "known", about: about.into(), text }
+    }
+}
+
+/// What the reader can do about a warning.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum ToDo {
+    CheckRuns,
+    AddRuns,
+    CheckScenario,
+}
+
+impl ToDo {
+    fn text(self) -> &'static str {
+        match self {
+            Self::CheckRuns => {
+                "About FE runs: check the record, or set the key of the study that is named"
+            }
+            Self::AddRuns => "About predictions: further FE runs, or another speed",
+            Self::CheckScenario => "About scenarios: the curve or the key that is named",
+        }
+    }
+}
+
+/// Warnings that the reader can do the same about.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Warnings {
+    what_to_do: &'static str,
+    texts: Vec<String>,
+}
+
 /// All that the page shows.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct Content {
     title: String,
-    subtitle: String,
+    /// Date, author, command, versions and files, a line each.
+    about: Vec<String>,
     figures: Vec<KeyFigure>,
-    warnings: Vec<String>,
+    /// Breaches first.
+    verdicts: Vec<Verdict>,
+    warnings: Vec<Warnings>,
     sections: Vec<Section>,
 }
 
 impl Content {
     /// A warning, once.
-    fn warn(&mut self, warning: String) {
-        if !self.warnings.contains(&warning) {
-            self.warnings.push(warning);
+    fn warn(&mut self, what: ToDo, warning: String) {
+        let what_to_do = what.text();
+        let group = match self.warnings.iter_mut().find(|of| of.what_to_do == what_to_do) {
+            Some(group) => group,
+            None => {
+                self.warnings.push(Warnings { what_to_do, texts: Vec::new() });
+                self.warnings.last_mut().expect("it was just added")
+            }
+        };
+        if !group.texts.contains(&warning) {
+            group.texts.push(warning);
         }
+    }
+
+    fn verdict(&mut self, verdict: Verdict) {
+        self.verdicts.push(verdict);
     }
 }
 
-/// The page about a database and scenarios, and how many warnings it shows.
+/// The page about databases and scenarios, and how many warnings it shows.
 ///
 /// Of `models`, those that `auto` chose for these very cases spare their validation; `step` receives the current step.
 pub(crate) fn report(
-    path: &Path,
-    database: &Database,
+    databases: &[(PathBuf, Database)],
     scenarios: &[PathBuf],
     models: &[Model],
     settings: &ReportSettings,
     mut step: impl FnMut(&str),
 ) -> Result<(String, usize), Error> {
+    let files: Vec<&Path> =
+        databases.iter().map(|(path, _)| &**path).chain(scenarios.iter().map(|p| &**p)).collect();
+    let first = files.first().map(|path| file_name(path)).unwrap_or_default();
     let mut content = Content {
-        title: settings.title.clone().unwrap_or_else(|| file_name(path)),
-        subtitle: format!(
-            "Curve database {}, crumple {}",
-            path.display(),
-            env!("CARGO_PKG_VERSION")
-        ),
+        title: settings.title.clone().unwrap_or(first),
+        about: about(&files, settings),
         ..Content::default()
     };
-    let mut groups: Vec<&str> = Vec::new();
-    for group in &settings.groups {
-        database.group(path, group)?;
-        groups.push(group);
+    let groups = groups(databases, settings)?;
+    let cases: usize = groups.iter().map(|(_, _, cases)| cases.len()).sum();
+    if !databases.is_empty() {
+        content.figures.push(KeyFigure { value: cases.to_string(), name: "FE runs".into() });
     }
-    if groups.is_empty() {
-        groups.extend(database.groups());
+    let mut designs = Vec::new();
+    for (title, group, cases) in &groups {
+        step(&format!("reporting {title}"));
+        designs.extend(group::add(&mut content, title, group, cases, models, settings)?);
     }
-    let cases: usize = groups.iter().map(|group| database.cases(group).len()).sum();
-    content.figures.push(KeyFigure { value: cases.to_string(), name: "FE runs".into() });
-    for group in &groups {
-        step(&format!("reporting {group}"));
-        group::add(&mut content, group, database.cases(group), models, settings)?;
-    }
+    let mut ran = Vec::new();
     for scenario in scenarios {
         step(&format!("running {}", scenario.display()));
-        group::add_train(&mut content, scenario, settings)?;
+        ran.push(train::add(&mut content, scenario, settings)?);
     }
-    group::add_sources(&mut content, groups.iter().flat_map(|group| database.cases(group)));
-    let warnings = content.warnings.len();
+    if databases.len() > 1 {
+        side_by_side::add_designs(&mut content, &designs);
+    }
+    side_by_side::add_scenarios(&mut content, ran)?;
+    group::add_sources(&mut content, groups.iter().flat_map(|(_, _, cases)| *cases));
+    // Breaches first, then what is not known.
+    let urgency = |verdict: &Verdict| match verdict.state {
+        "over" => 0,
+        "unknown" => 1,
+        "kept" => 2,
+        _ => 3,
+    };
+    content.verdicts.sort_by_key(urgency);
+    let warnings = content.warnings.iter().map(|of| of.texts.len()).sum();
     Ok((html(&content), warnings))
+}
+
+/// Date, author, command and versions, and the files.
+fn about(files: &[&Path], settings: &ReportSettings) -> Vec<String> {
+    let author = settings.author.iter().map(|author| format!(", {author}"));
+    let author: String = author.collect();
+    let day = settings.made_at.split('T').next().unwrap_or_default();
+    let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    vec![
+        format!("{day}{author}"),
+        format!("Files: {}", files.join(", ")),
+        format!("Made by crumple {}: {}", env!("CARGO_PKG_VERSION"), settings.command),
+    ]
+}
+
+type Group<'a> = (String, &'a str, &'a [Case]);
+
+/// The groups that are shown, with titles that tell those of different databases apart.
+fn groups<'a>(
+    databases: &'a [(PathBuf, Database)],
+    settings: &ReportSettings,
+) -> Result<Vec<Group<'a>>, Error> {
+    let mut groups = Vec::new();
+    for (path, database) in databases {
+        for group in database.groups() {
+            let is_shown = settings.groups.is_empty() || settings.groups.iter().any(|g| g == group);
+            let title = match databases {
+                [_] => group.into(),
+                _ => format!("{group}, {}", file_name(path)),
+            };
+            if is_shown {
+                groups.push((title, group, database.cases(group)));
+            }
+        }
+    }
+    for wanted in &settings.groups {
+        if let Some((path, database)) = databases.first()
+            && groups.iter().all(|(_, group, _)| group != wanted)
+        {
+            database.group(path, wanted)?;
+        }
+    }
+    Ok(groups)
 }
 
 const TEMPLATE: &str = include_str!("page.html");
@@ -245,9 +361,10 @@ mod tests {
         let figure = super::figure::Figure::new("f1".into(), chart);
         let content = Content {
             title: name.into(),
-            subtitle: name.into(),
+            about: vec![name.into()],
             figures: vec![KeyFigure { value: name.into(), name: name.into() }],
-            warnings: vec![name.into()],
+            verdicts: vec![Verdict { state: "over", about: name.into(), text: name.into() }],
+            warnings: vec![Warnings { what_to_do: "", texts: vec![name.into()] }],
             sections: vec![Section {
                 id: "s1".into(),
                 title: name.into(),

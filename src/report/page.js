@@ -149,27 +149,35 @@
       this.span = span ?? this.whole;
       this.draw();
     }
-    // The sample of each visible series nearest to a place: by x on each way there or back, then by height.
+    // Of each visible series the sample nearest to a place: by x on each way there or back, then by height. Of parts of
+    // a sum their width.
     nearest([x, y], hidden) {
       const [px, py] = this.place(x, y);
-      return this.data.series.flatMap((series, k) => {
+      const parts = this.data.bands.flatMap((band, k) => {
+        if (!band.is_stacked || hidden.has(band.name)) return [];
+        const offs = band.x.map((bx) => Math.abs(this.place(bx, 0)[0] - px)), i = offs.indexOf(Math.min(...offs));
+        const [low, high] = [band.low[i], band.high[i]];
+        return [{ name: band.name, look: band.look, x: band.x[i], y: high - low, k: `b${k}`, at: this.place(band.x[i], high) }];
+      }).reverse();
+      const samples = this.data.series.flatMap((series, k) => {
         if (hidden.has(series.name)) return [];
         let best = null;
         series.x.forEach((sx, i) => {
           if (sx === null || series.y[i] === null) return;
           const [qx, qy] = this.place(sx, series.y[i]);
           const off = Math.abs(qx - px) + 0.02 * Math.abs(qy - py);
-          if (!best || off < best.off) best = { off, i, k, series, at: [qx, qy] };
+          if (!best || off < best.off) best = { off, name: series.name, look: series.look, x: sx, y: series.y[i], k, at: [qx, qy] };
         });
         return best && Math.abs(best.at[0] - px) < 12 ? [best] : [];
       });
+      return [...samples, ...parts];
     }
   }
 
   class Figure {
-    constructor(element, data) {
+    constructor(element, id, data) {
       this.element = element;
-      this.id = `clip-${element.dataset.figure}`;
+      this.id = `clip-${id}`;
       this.svg = element.querySelector("svg");
       this.hidden = new Set();
       this.svg.setAttribute("viewBox", `0 0 ${data.width} ${data.legend}`);
@@ -214,7 +222,7 @@
       const look = looks[entry.look % looks.length], colour = `s${entry.look % 8}`;
       const svg = make("svg", { viewBox: "0 0 34 14", "aria-hidden": "true" });
       if (!("shown" in entry)) {
-        make("rect", { width: 34, height: 14, "fill-opacity": 0.22, class: `f-${colour}` }, svg);
+        make("rect", { width: 34, height: 14, "fill-opacity": entry.is_stacked ? 0.6 : 0.22, class: `f-${colour}` }, svg);
         return svg;
       }
       if (entry.shown !== 2) {
@@ -250,11 +258,12 @@
       const found = panel.nearest(panel.values(place), this.hidden);
       if (!found.length) return;
       const { x, y } = panel.data, unit = (axis) => (axis.unit ? ` ${axis.unit}` : "");
-      this.values.replaceChildren(...found.map(({ series, i, k, at }) => {
-        make("circle", { cx: at[0], cy: at[1], r: 4, fill: "none", "stroke-width": 2, class: `l-s${series.look % 8}` }, panel.dots);
+      this.values.replaceChildren(...found.map((sample) => {
+        const { name, look, k, at } = sample;
+        make("circle", { cx: at[0], cy: at[1], r: 4, fill: "none", "stroke-width": 2, class: `l-s${look % 8}` }, panel.dots);
         const line = document.createElement("div");
         line.dataset.series = `${panel.number}.${k}`;
-        line.textContent = `${series.name}: ${written(series.y[i])}${unit(y)} at ${written(series.x[i])}${unit(x)}`;
+        line.textContent = `${name}: ${written(sample.y)}${unit(y)} at ${written(sample.x)}${unit(x)}`;
         return line;
       }));
       const box = this.svg.getBoundingClientRect(), own = this.element.getBoundingClientRect();
@@ -322,6 +331,9 @@
   }
 
   for (const element of document.querySelectorAll("figure[data-figure]")) {
-    new Figure(element, figures[element.dataset.figure]);
+    const id = element.dataset.figure, data = figures[id], [wide, narrow] = element.querySelectorAll(".view");
+    const panels = data.panels.map((panel, k) => ({ ...structuredClone(panel), ...data.narrow.panels[k] }));
+    new Figure(narrow, `${id}-narrow`, { ...data.narrow, panels });
+    new Figure(wide, id, data);
   }
 })();

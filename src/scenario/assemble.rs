@@ -361,11 +361,7 @@ impl<'a> Builder<'a> {
         })?;
         Ok((
             interface,
-            CurveInUse {
-                curve: PLATES.into(),
-                force: Some("contact"),
-                ..CurveInUse::default()
-            },
+            CurveInUse { curve: PLATES.into(), force: Some("contact"), ..CurveInUse::default() },
         ))
     }
 

@@ -86,6 +86,13 @@ pub struct Floor {
     pub acceleration_unfiltered_l1: f64,
 }
 
+impl Validation {
+    /// The means of the model that was chosen, if any speed was left out.
+    pub(crate) fn chosen_means(&self) -> Option<&Means> {
+        self.means.iter().find(|means| means.model == self.chosen)
+    }
+}
+
 /// Means of one model over the inner speeds; of magnitudes where errors have signs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Means {

@@ -1,12 +1,14 @@
-"""Shows a report in chromium and says as JSON what it did: arguments are the page, the caption of a chart, a
-series with the place and value of one of its samples, and where to write a screenshot."""
+"""Shows a report in chromium and says as JSON what it did, with what axe-core finds: arguments are the page, the caption
+of a chart, a series with the place and value of one of its samples, and where to write a screenshot."""
 
 import json
 import re
 import shutil
 import sys
 import zlib
+from pathlib import Path
 
+import axe_playwright_python
 from playwright.sync_api import sync_playwright
 
 PAGE, CAPTION, SERIES, X, Y, PICTURE = sys.argv[1:]
@@ -38,11 +40,11 @@ def looked_at(browser, scheme):
     page.on("request", lambda request: requests.append(request.url))
     page.goto(f"file://{PAGE}")
     figure = page.locator("figure", has_text=CAPTION).first
-    svg = figure.locator(".picture svg")
+    svg = figure.locator(".wide-view .picture svg")
     svg.scroll_into_view_if_needed()
     x, y = figure.evaluate(PLACE, [SERIES, float(X), float(Y)])
     page.mouse.move(x, y)
-    hover = [line for line in figure.locator(".values").inner_text().split("\n") if line.startswith(f"{SERIES}:")]
+    hover = [line for line in figure.locator(".wide-view .values").inner_text().split("\n") if line.startswith(f"{SERIES}:")]
 
     def axes():
         return [t.text_content() for t in svg.locator("text").all() if t.is_visible()]
@@ -58,8 +60,8 @@ def looked_at(browser, scheme):
     reset = axes()
     svg.focus()
     page.keyboard.press("ArrowRight")
-    keyboard = bool(figure.locator(".values").inner_text())
-    button = figure.locator(".legend button").first
+    keyboard = bool(figure.locator(".wide-view .values").inner_text())
+    button = figure.locator(".wide-view .legend button").first
     button.focus()
     page.keyboard.press("Space")
     line = svg.locator('[data-series="0.0"]').first
@@ -111,6 +113,35 @@ def pages(pdf):
     return len(re.findall(rb"/Type\s*/Page\b(?!s)", plain))
 
 
+# Height of the smallest text of all pictures that are shown, on the screen.
+SMALLEST = """() => Math.min(...[...document.querySelectorAll('.picture svg text')].filter((t) => t.getClientRects().length).map((t) => {
+  const svg = t.ownerSVGElement;
+  return parseFloat(getComputedStyle(t).fontSize) * svg.getBoundingClientRect().width / svg.viewBox.baseVal.width;
+}))"""
+
+
+def of_sizes(browser):
+    """What axe-core finds, and whether everything can be read, on a desk and on a telephone."""
+    axe = (Path(axe_playwright_python.__file__).parent / "axe.min.js").read_text()
+    seen = {}
+    for width in (1280, 400):
+        for scheme in ("light", "dark"):
+            # The page's own policy lets no other script in.
+            context = browser.new_context(color_scheme=scheme, viewport={"width": width, "height": 900}, bypass_csp=True)
+            page = context.new_page()
+            page.goto(f"file://{PAGE}")
+            page.evaluate(axe)
+            found = page.evaluate("axe.run()")["violations"]
+            seen[f"{width} {scheme}"] = {
+                "faults": [f"{v['id']}: {v['nodes'][0]['html']}" for v in found if v["impact"] in ("serious", "critical")],
+                "smallest_text_px": page.evaluate(SMALLEST),
+                "is_wider_than_screen": page.evaluate(f"document.documentElement.scrollWidth > {width}"),
+                "texts_overlap": page.evaluate(OVERLAPS),
+            }
+            context.close()
+    return seen
+
+
 def without_script(browser):
     page = browser.new_context(java_script_enabled=False).new_page()
     page.goto(f"file://{PAGE}")
@@ -124,4 +155,4 @@ with sync_playwright() as playwright:
     browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=["--no-sandbox"])
     light, dark = looked_at(browser, "light"), looked_at(browser, "dark")
     printed = dark.pop("print")
-    print(json.dumps({"light": light, "dark": dark, "print": printed, "without_script": without_script(browser)}))
+    print(json.dumps({"light": light, "dark": dark, "print": printed, "without_script": without_script(browser), "sizes": of_sizes(browser)}))

@@ -1,0 +1,226 @@
+//! The acceptance rule for numerical crash models that rail practice quotes from EN 15227: the same sequence, dissipated
+//! energy within 10 % of the initial energy, displacement and mean force of each stage within 10 %.
+
+use schemars::JsonSchema;
+use serde::Serialize;
+
+/// The edition in force; its text is not public, so the rule is stated here as practice quotes it.
+pub(crate) const STANDARD: &str = "EN 15227:2020+A1:2024, as rail practice quotes it";
+/// What it asks of a prediction of one stage.
+pub(crate) const ACCEPTANCE: &str =
+    "dissipated energy within 10 % of the initial energy, displacement and mean force within 10 %";
+/// Largest error that passes.
+pub(crate) const LIMIT: f64 = 0.1;
+
+/// A prediction's errors by the rule. Errors are prediction over reference minus 1, but for the energy.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct Acceptance {
+    /// Difference of the dissipated energies over the initial energy.
+    pub energy_error: f64,
+    /// Of the largest displacement.
+    pub displacement_error: f64,
+    /// Of the mean force until there.
+    pub mean_force_error: f64,
+    /// Whether all three are within 10 %.
+    pub passes: bool,
+}
+
+impl Acceptance {
+    pub(crate) fn of(energy_error: f64, displacement_error: f64, mean_force_error: f64) -> Self {
+        let errors = [energy_error, displacement_error, mean_force_error];
+        let passes = errors.iter().all(|error| error.abs() <= LIMIT);
+        Self { energy_error, displacement_error, mean_force_error, passes }
+    }
+
+    /// The error that is largest in magnitude.
+    pub(crate) fn worst(&self) -> f64 {
+        let errors = [self.energy_error, self.displacement_error, self.mean_force_error];
+        errors.into_iter().fold(0.0, |worst, error| worst.max(error.abs()))
+    }
+}
+
+/// Force over deflection at one place of a run, over time.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StageRecord<'a> {
+    pub name: &'a str,
+    pub time_s: &'a [f64],
+    pub deflection_m: &'a [f64],
+    pub force_n: &'a [f64],
+}
+
+/// What a stage came to.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct StageResult {
+    /// Until the end of the record: what came back is not in it.
+    #[serde(rename = "dissipated_J")]
+    pub dissipated_j: f64,
+    pub displacement_m: f64,
+    /// Until the largest displacement.
+    #[serde(rename = "mean_force_N")]
+    pub mean_force_n: f64,
+    /// When it first had a force.
+    pub begin_s: Option<f64>,
+}
+
+impl StageRecord<'_> {
+    fn result(&self) -> StageResult {
+        let (d, f) = (self.deflection_m, self.force_n);
+        let last = d.len().min(f.len()).saturating_sub(1);
+        let top = (0..=last).filter(|k| *k < d.len()).max_by(|a, b| d[*a].total_cmp(&d[*b]));
+        let top = top.unwrap_or_default();
+        // Below 0 a gap is open, and the force is 0 there.
+        let work = |to: usize| -> f64 {
+            (1..=to).map(|k| 0.5 * (f[k] + f[k - 1]) * (d[k] - d[k - 1])).sum()
+        };
+        let displacement_m = d.get(top).copied().unwrap_or_default().max(0.0);
+        let until_top = work(top);
+        let begin = f.iter().position(|force| *force != 0.0);
+        StageResult {
+            dissipated_j: work(last),
+            displacement_m,
+            mean_force_n: if displacement_m > 0.0 { until_top / displacement_m } else { 0.0 },
+            begin_s: begin.and_then(|k| self.time_s.get(k.saturating_sub(1))).copied(),
+        }
+    }
+}
+
+/// One stage of both runs.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct StageAcceptance {
+    pub stage: String,
+    pub reference: StageResult,
+    pub prediction: StageResult,
+    #[serde(flatten)]
+    pub acceptance: Acceptance,
+    /// Whether it counts: it takes at least 1 % of the reference's energy.
+    pub counts: bool,
+}
+
+/// Two runs by the rule.
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+pub(crate) struct RunAcceptance {
+    pub standard: &'static str,
+    pub limit: f64,
+    /// What energies are compared with.
+    #[serde(rename = "initial_energy_J")]
+    pub initial_energy_j: f64,
+    /// Difference of the energies of all stages over the initial energy.
+    pub energy_error: f64,
+    pub stages: Vec<StageAcceptance>,
+    /// Stages that count, in the order in which they begin in the reference and in the prediction.
+    pub sequences: [Vec<String>; 2],
+    pub same_sequence: bool,
+    pub passes: bool,
+}
+
+/// Share of the reference's energy below which a stage does not count.
+const LEAST_SHARE: f64 = 0.01;
+
+/// Rates the stages that both runs have, by name. Energies are compared with `initial_j`; without it with the energy that
+/// the reference's stages take at most, which is less and so stricter. `None` if they have no stage in common.
+///
+/// Stages that begin within `tie_s` of each other have no order.
+pub(crate) fn accept(
+    reference: &[StageRecord<'_>],
+    prediction: &[StageRecord<'_>],
+    initial_j: Option<f64>,
+    tie_s: f64,
+) -> Option<RunAcceptance> {
+    let pairs: Vec<(&str, StageResult, StageResult)> = reference
+        .iter()
+        .filter_map(|r| {
+            let p = prediction.iter().find(|p| p.name == r.name)?;
+            Some((r.name, r.result(), p.result()))
+        })
+        .collect();
+    let most_j: f64 = pairs.iter().map(|(_, r, _)| r.mean_force_n * r.displacement_m).sum();
+    let initial_energy_j = initial_j.unwrap_or(most_j);
+    if pairs.is_empty() || initial_energy_j <= 0.0 {
+        return None;
+    }
+    let stages: Vec<StageAcceptance> = pairs
+        .iter()
+        .map(|(name, r, p)| StageAcceptance {
+            stage: (*name).into(),
+            reference: *r,
+            prediction: *p,
+            acceptance: Acceptance::of(
+                (p.dissipated_j - r.dissipated_j) / initial_energy_j,
+                p.displacement_m / r.displacement_m - 1.0,
+                p.mean_force_n / r.mean_force_n - 1.0,
+            ),
+            counts: r.dissipated_j >= LEAST_SHARE * most_j,
+        })
+        .collect();
+    let sum = |of: fn(&StageAcceptance) -> f64| stages.iter().map(of).sum::<f64>();
+    let energy_error =
+        (sum(|s| s.prediction.dissipated_j) - sum(|s| s.reference.dissipated_j)) / initial_energy_j;
+    let counting: Vec<&StageAcceptance> = stages.iter().filter(|stage| stage.counts).collect();
+    let same_sequence = counting.iter().all(|a| {
+        counting.iter().all(|b| {
+            let before = |of: fn(&StageAcceptance) -> Option<f64>| {
+                Some(of(b)? - of(a)?).filter(|gap| gap.abs() > tie_s).map(|gap| gap > 0.0)
+            };
+            let (r, p) = (before(|s| s.reference.begin_s), before(|s| s.prediction.begin_s));
+            r.is_none() || p.is_none() || r == p
+        })
+    });
+    let order = |begin: fn(&StageAcceptance) -> Option<f64>| {
+        let mut order = counting.clone();
+        let time = |stage: &StageAcceptance| begin(stage).unwrap_or(f64::INFINITY);
+        order.sort_by(|a, b| time(a).total_cmp(&time(b)));
+        order.into_iter().map(|stage| stage.stage.clone()).collect::<Vec<String>>()
+    };
+    let sequences = [order(|s| s.reference.begin_s), order(|s| s.prediction.begin_s)];
+    let passes = same_sequence
+        && energy_error.abs() <= LIMIT
+        && counting.iter().all(|stage| stage.acceptance.passes);
+    Some(RunAcceptance {
+        standard: STANDARD,
+        limit: LIMIT,
+        initial_energy_j,
+        energy_error,
+        sequences,
+        same_sequence,
+        passes,
+        stages,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TIMES: [f64; 4] = [0.0, 0.1, 0.2, 0.3];
+
+    fn stage<'a>(name: &'a str, d: &'a [f64], f: &'a [f64]) -> StageRecord<'a> {
+        StageRecord { name, time_s: &TIMES, deflection_m: d, force_n: f }
+    }
+
+    /// By hand: a triangle up to 1 m and 2 N, elastic back to half of it.
+    #[test]
+    fn energies_displacements_and_sequences() {
+        let (d, f) = ([-0.5, 0.0, 1.0, 0.5], [0.0, 0.0, 2.0, 0.0]);
+        let one = stage("a", &d, &f).result();
+        assert_eq!((one.dissipated_j, one.displacement_m, one.mean_force_n), (0.5, 1.0, 1.0));
+        assert_eq!(one.begin_s, Some(0.1));
+        // 8 % further, 8 % weaker: the energies until there are nearly the same.
+        let (d2, f2) = ([-0.5, 0.0, 1.08, 0.54], [0.0, 0.0, 1.84, 0.0]);
+        let later = ([0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]);
+        let first = ([0.0, 1.0, 1.0, 1.0], [0.5, 1.0, 1.0, 1.0]);
+        let reference = [stage("a", &d, &f), stage("b", &later.0, &later.1)];
+        let close = [stage("a", &d2, &f2), stage("b", &later.0, &later.1)];
+        let found = accept(&reference, &close, None, 0.01).unwrap();
+        assert!(found.passes && found.same_sequence, "{found:?}");
+        assert_eq!(found.initial_energy_j, 1.5);
+        assert!((found.stages[0].acceptance.displacement_error - 0.08).abs() < 1e-12);
+        assert!((found.stages[0].acceptance.mean_force_error + 0.08).abs() < 1e-12);
+        let turned = [stage("b", &first.0, &first.1), stage("a", &d2, &f2)];
+        let found = accept(&reference, &turned, None, 0.01).unwrap();
+        assert!(!found.same_sequence && !found.passes);
+        assert_eq!(found.sequences[1], ["b", "a"]);
+        assert!(accept(&reference, &[], None, 0.01).is_none());
+        // At the bound, and beyond.
+        assert!(Acceptance::of(0.1, -0.1, 0.1).passes && !Acceptance::of(0.0, 0.0, 0.1001).passes);
+    }
+}

@@ -1,0 +1,326 @@
+//! The report on a scenario: what drives it, what came of it, and how far that can be trusted.
+
+use std::path::Path;
+
+use super::figure::Figure;
+use super::{
+    Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, ToDo, Verdict, energy,
+    file_name, mass, metres, percent,
+};
+use crate::assess::ComparisonSettings;
+use crate::assess::train::{TrainComparison, compare_train};
+use crate::charts::{self, Motion, Quantity, train_speeds};
+use crate::error::Error;
+use crate::multibody::{Body, Ledger, Method, Run};
+use crate::scenario::{self, CurveOrigin, Limits, Prepared, Summary};
+use crate::table::Table;
+use crate::unit::{Shown, km_per_h};
+
+/// A scenario that was run.
+pub(super) struct Ran {
+    pub name: String,
+    pub motion: Motion,
+    /// By vehicle: mean and largest filtered deceleration, in g, and what its occupants meet.
+    pub vehicles: Vec<(String, [Option<f64>; 4])>,
+    /// By interface: largest crush in m and energy in J.
+    pub interfaces: Vec<(String, [Option<f64>; 2])>,
+}
+
+/// Histories that a page shows.
+const SHOWN: [(Quantity, &str); 5] = [
+    (Quantity::Velocity, "speeds"),
+    (Quantity::Acceleration, "accelerations"),
+    (Quantity::Force, "forces over time"),
+    (Quantity::Crush, "force over crush at each interface"),
+    (Quantity::Energy, "energy taken by each interface, and still kinetic"),
+];
+
+/// Runs a scenario and adds its section; with FE's run as reference also the comparison of methods.
+pub(super) fn add(
+    content: &mut Content,
+    path: &Path,
+    settings: &ReportSettings,
+) -> Result<Ran, Error> {
+    let read = scenario::read(path)?;
+    let (prepared, origins) = scenario::load_with_origins(path)?;
+    let run = prepared.run()?;
+    let number = content.sections.len() + 1;
+    let name = file_name(path);
+    let summary = prepared.summary(&run);
+    add_verdicts(content, &name, &summary);
+    let mut parts = vec![
+        Part::Text(conditions(&prepared, &read.run.duration.0, &run)),
+        Part::table("Vehicles", vehicles(&summary)),
+    ];
+    parts.extend(summary.limits.as_ref().map(|of| Part::Text(sentence(&of.statement))));
+    parts.push(Part::table("Interfaces", interfaces(&summary)));
+    parts.push(Part::Text(ledger(&run.ledger)));
+    parts.push(Part::table("What drives the interfaces", curves(&origins)));
+    parts.push(Part::table("Sequence", sequence(&summary)));
+    if let Some(time_s) = summary.common_speed_time_s {
+        let what = if prepared.chain.bodies().len() > prepared.meeting + 1 {
+            "The trains have a common speed"
+        } else {
+            "The train stands"
+        };
+        parts.push(Part::Text(format!("{what} at {:.1} ms.", 1e3 * time_s)));
+    }
+    let runs = [(name.clone(), Motion::of_run(&prepared, &run, Vec::new()))];
+    for (k, (quantity, what)) in SHOWN.into_iter().enumerate() {
+        let title = format!("{name}: {what}");
+        let chart = charts::motion(&title, &runs, quantity, &[], charts::USUAL_CLASS)?;
+        parts.push(Part::Figure(Figure::new(format!("s{number}-{k}"), chart)));
+    }
+    let crush = run.interfaces.iter().map(|i| i.max_deflection_m).fold(0.0, f64::max);
+    let key = KeyFigure { value: metres(crush), name: format!("maximum crush, {name}") };
+    content.figures.push(key);
+    for warning in &prepared.warnings {
+        content.warn(ToDo::CheckScenario, format!("{name}: {warning}"));
+    }
+    for warning in run.all_warnings() {
+        content.warn(ToDo::CheckScenario, format!("{name}: {warning}"));
+    }
+    if read.reference.is_some() && settings.methods != MethodSpeeds::None {
+        let (seed, nsdm_seeds) = (settings.seed, settings.nsdm_seeds);
+        let asked = ComparisonSettings { seed, nsdm_seeds, ..ComparisonSettings::default() };
+        let comparison = compare_train(path, &read, &asked)?;
+        parts.push(Part::Heading("Comparison with FE's run of the whole train".into()));
+        let chart = train_speeds(&format!("{name}: speeds by FE and by the methods"), &comparison);
+        parts.push(Part::Figure(Figure::new(format!("s{number}-train"), chart)));
+        let caption =
+            format!("Velocity errors up to {:.0} ms, Σ|p − r|/Σ|r|", 1e3 * comparison.until_s);
+        parts.push(Part::table(caption, methods(&comparison)));
+    }
+    let ran = Ran {
+        vehicles: of_vehicles(&summary),
+        interfaces: summary
+            .interfaces
+            .iter()
+            .map(|of| (of.name.into(), [Some(of.history.max_deflection_m), of.energy_j]))
+            .collect(),
+        motion: runs.into_iter().next().map(|(_, motion)| motion).expect("there is one"),
+        name: name.clone(),
+    };
+    let (id, title) = (format!("scenario-{number}"), format!("Scenario {name}"));
+    content.sections.push(Section { id, title, parts });
+    Ok(ran)
+}
+
+fn of_vehicles(summary: &Summary<'_>) -> Vec<(String, [Option<f64>; 4])> {
+    let vehicles = summary.bodies.iter().filter(|body| !body.is_crush_zone);
+    let numbers = vehicles.map(|body| {
+        let of = [
+            Some(body.mean_deceleration_g),
+            body.peak_deceleration_g,
+            body.secondary_impact_m_per_s,
+            body.occupant_load_g,
+        ];
+        (body.name.into(), of)
+    });
+    numbers.collect()
+}
+
+/// What is over a limit, what is not known, and where most of the energy goes.
+fn add_verdicts(content: &mut Content, name: &str, summary: &Summary<'_>) {
+    if let Some(limits) = &summary.limits {
+        add_limits(content, name, summary, limits);
+    } else {
+        let text = "no limits are stated ([limits] in the scenario)".into();
+        content.verdict(Verdict::known(name, text));
+    }
+    let most = summary.interfaces.iter().filter(|of| of.energy_j.is_some());
+    let most = most.max_by(|a, b| a.energy_j.unwrap_or(0.0).total_cmp(&b.energy_j.unwrap_or(0.0)));
+    if let Some(of) = most
+        && let Some((energy_j, share)) = of.energy_j.zip(of.energy_share)
+    {
+        let text = format!(
+            "most energy is taken at {}: {} ({})",
+            of.name,
+            energy(energy_j),
+            percent(share)
+        );
+        content.verdict(Verdict::known(name, text));
+    }
+    let beyond =
+        summary.interfaces.iter().filter(|of| of.history.max_deflection_m > of.history.data_end_m);
+    let beyond: Vec<&str> = beyond.map(|of| of.name).collect();
+    if !beyond.is_empty() {
+        let text = format!(
+            "crushed beyond the data of its curve, where the force is an assumption: {}",
+            beyond.join(", ")
+        );
+        content.verdict(Verdict { state: "unknown", about: name.into(), text });
+    }
+}
+
+fn add_limits(content: &mut Content, name: &str, summary: &Summary<'_>, limits: &Limits<'_>) {
+    let what = format!(
+        "mean deceleration over {} g ({}:{})",
+        limits.mean_deceleration_limit_g, limits.standard, limits.edition
+    );
+    let mut verdict = |state, text| content.verdict(Verdict { state, about: name.into(), text });
+    let over: Vec<String> = summary
+        .bodies
+        .iter()
+        .filter(|body| limits.over.contains(&body.name))
+        .map(|body| format!("{} ({})", body.name, body.mean_text()))
+        .collect();
+    if !limits.beyond_data.is_empty() {
+        let beyond = limits.beyond_data.join(", ");
+        verdict(
+            "unknown",
+            format!("{what}: not known, because {beyond} went beyond the data of its curve"),
+        );
+    } else if over.is_empty() {
+        verdict("kept", format!("{what}: no vehicle"));
+    } else {
+        verdict("over", format!("{what}: {}", over.join(", ")));
+    }
+    for of in &limits.occupants {
+        let state =
+            match (of.over.is_empty(), of.unknown.is_empty() && limits.beyond_data.is_empty()) {
+                (false, _) => "over",
+                (true, true) => "kept",
+                (true, false) => "unknown",
+            };
+        verdict(state, format!("occupants, {}", of.text()));
+    }
+}
+
+/// Trains, speeds, and how the motion was integrated.
+fn conditions(prepared: &Prepared, duration_s: &f64, run: &Run) -> String {
+    let bodies = prepared.chain.bodies();
+    let (first, second) = bodies.split_at(prepared.meeting + 1);
+    let of = |bodies: &[Body]| {
+        let total_kg = bodies.iter().map(|body| body.mass_kg).sum();
+        let speed = bodies.first().map_or(0.0, |body| body.speed_m_per_s);
+        (mass(total_kg), km_per_h(speed))
+    };
+    let (first_mass, first_speed) = of(first);
+    let against = if second.is_empty() {
+        "against a wall".into()
+    } else {
+        let (mass, speed) = of(second);
+        format!("against {mass} at {speed}")
+    };
+    let method = match prepared.settings.method {
+        Method::Verlet => "velocity Verlet",
+        Method::FourthOrder => "a method of order 4",
+        Method::Reference => "the reference method",
+    };
+    format!(
+        "{first_mass} at {first_speed} {against}; {} in a row over {:.0} ms, by {}, in steps of {:.3} ms. Speeds are positive in the direction of the first train.",
+        if bodies.len() == 1 { "1 body".into() } else { format!("{} bodies", bodies.len()) },
+        1e3 * duration_s,
+        method,
+        1e3 * run.step_s
+    )
+}
+
+fn ledger(ledger: &Ledger) -> String {
+    let shown = Shown::energy(ledger.initial_kinetic_j);
+    let energy = |energy_j: f64| shown.text(energy_j);
+    let further = [
+        ("taken by dampers, rates and stopped mass", ledger.damped_j),
+        ("by resistance", ledger.resisted_j),
+    ];
+    let further = further.into_iter().filter(|(_, energy_j)| *energy_j != 0.0);
+    let further: String =
+        further.map(|(what, energy_j)| format!(", {} {what}", energy(energy_j))).collect();
+    format!(
+        "Of {} at first, {} are still kinetic at the end, {} stored, {} dissipated{further}; the balance closes within {:.0e} of it.",
+        energy(ledger.initial_kinetic_j),
+        energy(ledger.kinetic_j),
+        energy(ledger.stored_j),
+        energy(ledger.dissipated_j),
+        ledger.max_energy_error
+    )
+}
+
+/// With a capital and a full stop.
+fn sentence(text: &str) -> String {
+    let mut letters = text.chars();
+    let first: String = letters.next().map(|c| c.to_uppercase().collect()).unwrap_or_default();
+    format!("{first}{}.", letters.as_str())
+}
+
+/// Masses, speeds and decelerations.
+fn vehicles(summary: &Summary<'_>) -> impl Into<Table> {
+    let missing = || "–".to_string();
+    Table::of(summary.bodies.iter().filter(|body| !body.is_crush_zone))
+        .column("vehicle", |body| body.name)
+        .column("mass", |body| mass(body.mass_kg))
+        .column("speed", |body| {
+            format!("{:.2} to {:.2} m/s", body.initial_v_m_per_s, body.final_v_m_per_s)
+        })
+        .column("peak (CFC 60)", |body| body.peak_text().unwrap_or_else(missing))
+        .column("mean deceleration", |body| body.mean_text())
+        .column("over 120 ms", |body| {
+            body.moving_mean_deceleration_g.map_or_else(missing, |a| format!("{a:.2} g"))
+        })
+        .column("secondary impact", |body| {
+            body.secondary_impact_m_per_s.map_or_else(missing, |v| format!("{v:.1} m/s"))
+        })
+        .column("occupant load", |body| {
+            body.occupant_load_g.map_or_else(missing, |a| format!("{a:.1} g"))
+        })
+}
+
+/// Crush and energy of each interface.
+fn interfaces(summary: &Summary<'_>) -> impl Into<Table> {
+    let largest_n = summary.interfaces.iter().map(|of| of.history.peak_force_n).fold(0.0, f64::max);
+    let largest_j = summary.interfaces.iter().filter_map(|of| of.energy_j).fold(0.0, f64::max);
+    let (force, energy) = (Shown::force(largest_n), Shown::energy(largest_j));
+    Table::of(&summary.interfaces)
+        .column("interface", |of| of.name)
+        .column("peak force", move |of| force.text(of.history.peak_force_n))
+        .column("maximum crush", |of| metres(of.history.max_deflection_m))
+        .column("at", |of| format!("{:.1} ms", 1e3 * of.history.max_deflection_time_s))
+        .column("energy lost", |of| {
+            energy.text(of.history.dissipated_at_end_j + of.history.damped_j.unwrap_or(0.0))
+        })
+        .column("energy stored", |of| energy.text(of.history.stored_at_end_j))
+        .column("share of energy", |of| of.energy_share.map_or("–".into(), percent))
+        .column("curve", |of| &of.used.curve)
+        .column("force", |of| of.used.force.unwrap_or("unknown"))
+        .column("curve for", |of| of.used.speed_m_per_s.map_or("–".into(), km_per_h))
+}
+
+/// Where each curve comes from, and how wrong its model was at speeds that it did not know.
+fn curves(origins: &[CurveOrigin]) -> impl Into<Table> {
+    let left_out = |of: &CurveOrigin, error: fn(&crate::surrogate::leave_one_out::Means) -> f64| {
+        of.left_out.as_ref().map_or("–".into(), |means| percent(error(means)))
+    };
+    Table::of(origins)
+        .column("curve", |of| &of.curve)
+        .column("from", |of| &of.from)
+        .column("what", |of| &of.what)
+        .column("FE runs", |of| match of.speeds_m_per_s {
+            Some((low, high)) if of.runs > 1 => {
+                format!("{}, {} to {}", of.runs, km_per_h(low), km_per_h(high))
+            }
+            Some((speed, _)) => km_per_h(speed),
+            None => "–".into(),
+        })
+        .column("left-out force error", |of| left_out(of, |means| means.force_l1))
+        .column("velocity", |of| left_out(of, |means| means.velocity_l1))
+        .column("as stated", |of| if of.stated.is_empty() { "–" } else { &of.stated })
+}
+
+fn sequence(summary: &Summary<'_>) -> impl Into<Table> {
+    Table::of(&summary.sequence)
+        .column("at", |event| format!("{:.1} ms", 1e3 * event.time_s))
+        .column("interface", |event| event.interface)
+        .column("event", |event| event.what.text())
+}
+
+/// Errors of each method in the whole train.
+fn methods(comparison: &TrainComparison) -> impl Into<Table> {
+    let table = Table::of(&comparison.rows)
+        .column("method", |row| &row.method)
+        .column("driven by", |row| &row.driven_by)
+        .column("mean", |row| percent(row.mean_velocity_l1));
+    comparison.fe.keys().enumerate().fold(table, |table, (k, vehicle)| {
+        table.column(vehicle, |row| percent(row.vehicles[k].velocity_l1))
+    })
+}

@@ -1,0 +1,125 @@
+//! What happened when in a run: contacts, stages, the ends of curves, the largest crush.
+
+use serde::Serialize;
+
+use super::{PLATES, Prepared};
+use crate::multibody::{InterfaceHistory, Run};
+
+/// Something that happened at an interface.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Event<'a> {
+    pub(crate) time_s: f64,
+    pub(crate) interface: &'a str,
+    #[serde(flatten)]
+    pub(crate) what: Happening,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub(crate) enum Happening {
+    Contact,
+    /// A stage of the curve begins, named as in the scenario.
+    Stage {
+        name: String,
+    },
+    /// From here the force is an assumption.
+    BeyondData,
+    LargestCrush,
+    Opened,
+    /// After it had opened.
+    ContactAgain,
+}
+
+impl Happening {
+    /// In words.
+    pub(crate) fn text(&self) -> String {
+        match self {
+            Self::Contact => "contact".into(),
+            Self::Stage { name } => format!("{name} begins"),
+            Self::BeyondData => "crushed beyond the data of its curve".into(),
+            Self::LargestCrush => "largest crush".into(),
+            Self::Opened => "open again".into(),
+            Self::ContactAgain => "contact again".into(),
+        }
+    }
+}
+
+/// A gap or a crush below this, in m, is none: outputs round.
+const LEAST_M: f64 = 1e-6;
+/// A contact is open again after so much time without force, in s: shorter ones are rattle.
+const OPEN_S: f64 = 0.01;
+
+/// In order of time; between outputs by linear interpolation.
+pub(super) fn sequence<'a>(prepared: &'a Prepared, run: &Run) -> Vec<Event<'a>> {
+    let mut events = Vec::new();
+    let interfaces = prepared.chain.interfaces().iter().zip(&run.interfaces).zip(&prepared.used);
+    for ((interface, history), used) in interfaces {
+        // Plates belong to the ends that they stand between, but tell when these meet.
+        let is_plates = used.curve == PLATES;
+        let mut add = |time_s, what| {
+            events.push(Event { time_s, interface: &*interface.name, what });
+        };
+        let crossing = |level_m| crossing_s(&run.time_s, &history.largest_deflection_m, level_m);
+        let Some(contact_s) = crossing(LEAST_M) else { continue };
+        add(contact_s, Happening::Contact);
+        contacts(&run.time_s, history).into_iter().for_each(|(time_s, what)| add(time_s, what));
+        if is_plates {
+            continue;
+        }
+        for (begin_m, name) in used.stages.iter() {
+            let name = name.clone();
+            if let Some(time_s) = crossing(*begin_m) {
+                add(time_s, Happening::Stage { name });
+            }
+        }
+        if let Some(time_s) = crossing(history.data_end_m) {
+            add(time_s, Happening::BeyondData);
+        }
+        add(history.max_deflection_time_s, Happening::LargestCrush);
+    }
+    events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    events
+}
+
+/// When a rising history first passes a level.
+fn crossing_s(time_s: &[f64], values: &[f64], level: f64) -> Option<f64> {
+    let k = values.iter().position(|value| *value > level)?;
+    let Some(before) = k.checked_sub(1) else { return Some(time_s[0]) };
+    let share = (level - values[before]) / (values[k] - values[before]);
+    Some(time_s[before] + share * (time_s[k] - time_s[before]))
+}
+
+/// Where the force ends for longer than a rattle, and where it then begins again.
+fn contacts(time_s: &[f64], history: &InterfaceHistory) -> Vec<(f64, Happening)> {
+    let mut events = Vec::new();
+    let is_loaded = |k: usize| history.force_n[k] != 0.0;
+    let Some(mut at) = (0..time_s.len()).find(|k| is_loaded(*k)) else { return events };
+    while let Some(open) = (at..time_s.len()).find(|k| !is_loaded(*k)) {
+        let again = (open..time_s.len()).find(|k| is_loaded(*k));
+        let end = again.unwrap_or(time_s.len() - 1);
+        if time_s[end] - time_s[open] >= OPEN_S {
+            events.push((time_s[open], Happening::Opened));
+            events.extend(again.map(|k| (time_s[k - 1], Happening::ContactAgain)));
+        }
+        let Some(again) = again else { break };
+        at = again;
+    }
+    events
+}
+
+/// When the mean speed of the first train no longer exceeds that of the second, or 0 against a wall.
+pub(super) fn common_speed_time_s(prepared: &Prepared, run: &Run) -> Option<f64> {
+    let bodies = prepared.chain.bodies();
+    let (first, second) = bodies.split_at(prepared.meeting + 1);
+    let mean = |from: usize, of: &[crate::multibody::Body], t: usize| {
+        let mass_kg: f64 = of.iter().map(|body| body.mass_kg).sum();
+        let pairs = of.iter().zip(&run.bodies[from..]);
+        let momentum: f64 = pairs.map(|(body, h)| body.mass_kg * h.v_m_per_s[t]).sum();
+        if mass_kg > 0.0 { momentum / mass_kg } else { 0.0 }
+    };
+    // Falls to 0; the sign is turned, so that it rises.
+    let closing: Vec<f64> =
+        (0..run.time_s.len()).map(|t| mean(first.len(), second, t) - mean(0, first, t)).collect();
+    let is_closing = closing.first().is_some_and(|first| *first < 0.0);
+    is_closing.then(|| crossing_s(&run.time_s, &closing, 0.0)).flatten()
+}

@@ -1,0 +1,249 @@
+//! A run in numbers: bodies, interfaces, what happened when, limits.
+
+use serde::Serialize;
+
+use super::sequence::{Event, common_speed_time_s, sequence};
+use super::{CurveInUse, LimitsTable, Prepared};
+use crate::multibody::{Interface, InterfaceHistory, Run, STANDARD_GRAVITY_M_PER_S2};
+use crate::signal::cfc;
+
+/// A run in numbers.
+#[derive(Serialize)]
+pub(crate) struct Summary<'a> {
+    /// In the order of the scenario.
+    pub(crate) bodies: Vec<BodySummary<'a>>,
+    pub(crate) interfaces: Vec<InterfaceSummary<'a>>,
+    /// When what happened, in order of time.
+    pub(crate) sequence: Vec<Event<'a>>,
+    /// When the centres of mass of both trains first have one speed, or that of the train has none against a wall.
+    pub(crate) common_speed_time_s: Option<f64>,
+    pub(crate) step_s: f64,
+    /// Time of the last output, which the final speeds are for.
+    pub(crate) end_s: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) limits: Option<Limits<'a>>,
+}
+
+#[derive(Serialize)]
+pub(crate) struct BodySummary<'a> {
+    pub(crate) name: &'a str,
+    #[serde(skip)]
+    pub(crate) mass_kg: f64,
+    #[serde(skip)]
+    pub(crate) initial_v_m_per_s: f64,
+    pub(crate) final_v_m_per_s: f64,
+    mean_deceleration_m_per_s2: f64,
+    pub(crate) mean_deceleration_g: f64,
+    /// From when until when it is the mean; null for a body without contact.
+    pub(crate) mean_deceleration_span_s: Option<(f64, f64)>,
+    /// Largest in magnitude of the deceleration filtered with CFC 60 (SAE J211-1), and its time; null where the outputs
+    /// are too coarse for the filter.
+    pub(crate) peak_deceleration_g: Option<f64>,
+    pub(crate) peak_deceleration_time_s: Option<f64>,
+    /// Whether it is the crush zone of a vehicle's end, which stops at once: its decelerations are
+    /// no vehicle's.
+    pub(crate) is_crush_zone: bool,
+    /// The run ended before the contact of that mean did: it is the mean of a part.
+    pub(crate) still_loaded_at_end: bool,
+    /// Over the 120 ms in which it is largest in magnitude; null in a shorter run.
+    pub(crate) moving_mean_deceleration_g: Option<f64>,
+    /// Speed at which an unrestrained occupant meets the interior after 0.6 m; null for a crush zone, and if the run
+    /// ends before.
+    pub(crate) secondary_impact_m_per_s: Option<f64>,
+    /// Occupant load criterion: 65 mm of slack, then stopped within 235 mm; null as above.
+    pub(crate) occupant_load_g: Option<f64>,
+}
+
+impl BodySummary<'_> {
+    /// The mean deceleration and over which time it is the mean.
+    pub(crate) fn mean_text(&self) -> String {
+        let span = match self.mean_deceleration_span_s {
+            Some((from_s, _)) if self.still_loaded_at_end => {
+                format!(" so far, from {:.0} ms", 1e3 * from_s)
+            }
+            Some((from_s, to_s)) => format!(", {:.0} to {:.0} ms", 1e3 * from_s, 1e3 * to_s),
+            None => String::new(),
+        };
+        format!("{:.2} g{span}", self.mean_deceleration_g)
+    }
+
+    /// The largest filtered deceleration and when it is.
+    pub(crate) fn peak_text(&self) -> Option<String> {
+        let (g, time_s) = self.peak_deceleration_g.zip(self.peak_deceleration_time_s)?;
+        Some(format!("{g:.1} g, {:.0} ms", 1e3 * time_s))
+    }
+}
+
+#[derive(Serialize)]
+pub(crate) struct InterfaceSummary<'a> {
+    pub(crate) name: &'a str,
+    #[serde(flatten)]
+    pub(crate) history: &'a InterfaceHistory,
+    /// Stored, dissipated and damped until the end; null if the last is not known.
+    #[serde(rename = "energy_J")]
+    pub(crate) energy_j: Option<f64>,
+    /// Its share of what all interfaces have taken.
+    pub(crate) energy_share: Option<f64>,
+    #[serde(flatten)]
+    pub(crate) used: &'a CurveInUse,
+}
+
+/// Mean decelerations against a limit.
+#[derive(Serialize)]
+pub(crate) struct Limits<'a> {
+    pub(crate) standard: &'a str,
+    pub(crate) edition: &'a str,
+    pub(crate) mean_deceleration_limit_g: f64,
+    /// Trains that it is for; null for all.
+    pub(crate) trains: &'a Option<Vec<String>>,
+    /// Bodies whose mean deceleration is over it.
+    pub(crate) over: Vec<&'a str>,
+    /// Limits on what occupants meet.
+    pub(crate) occupants: Vec<OccupantLimit<'a>>,
+    /// Interfaces that were crushed beyond the data of their curves: then nothing here is a verdict.
+    pub(crate) beyond_data: Vec<&'a str>,
+    pub(crate) statement: String,
+}
+
+impl Limits<'_> {
+    /// Whether a vehicle is over any of them; `None` if that is not known.
+    pub(crate) fn are_broken(&self) -> Option<bool> {
+        let is_broken =
+            !self.over.is_empty() || self.occupants.iter().any(|of| !of.over.is_empty());
+        let is_known = is_broken || self.occupants.iter().all(|of| of.unknown.is_empty());
+        (is_known && self.beyond_data.is_empty()).then_some(is_broken)
+    }
+}
+
+/// What occupants meet against a limit.
+#[derive(Serialize)]
+pub(crate) struct OccupantLimit<'a> {
+    /// `secondary_impact_m_per_s` or `occupant_load_g`.
+    pub(crate) what: &'static str,
+    pub(crate) limit: f64,
+    pub(crate) over: Vec<&'a str>,
+    /// Bodies whose run ended before it was known.
+    pub(crate) unknown: Vec<&'a str>,
+}
+
+impl OccupantLimit<'_> {
+    /// In words.
+    pub(crate) fn text(&self) -> String {
+        let (what, unit) = match self.what {
+            "occupant_load_g" => ("occupant load", "g"),
+            _ => ("secondary impact", "m/s"),
+        };
+        let known = match (&*self.over, &*self.unknown) {
+            ([], []) => "no vehicle".into(),
+            ([], _) => "no vehicle of which it is known".into(),
+            (over, _) => over.join(", "),
+        };
+        let unknown = match &*self.unknown {
+            [] => String::new(),
+            names => format!("; the run ended before it is known of {}", names.join(", ")),
+        };
+        format!("{what} over {} {unit}: {known}{unknown}", self.limit)
+    }
+}
+
+impl Prepared {
+    /// What `run`, a run of this scenario, comes to.
+    pub(crate) fn summary<'a>(&'a self, run: &'a Run) -> Summary<'a> {
+        let (bodies, interfaces) = (self.chain.bodies(), self.chain.interfaces());
+        let is_crush_zone = |i: usize| !self.vehicles.contains(&i);
+        let of_body = |&i: &usize| {
+            let (body, history) = (&bodies[i], &run.bodies[i]);
+            let in_g = |a_m_per_s2: f64| a_m_per_s2 / STANDARD_GRAVITY_M_PER_S2;
+            let peak = peak_deceleration(&run.time_s, &history.a_m_per_s2);
+            BodySummary {
+                name: &body.name,
+                mass_kg: body.mass_kg,
+                initial_v_m_per_s: body.speed_m_per_s,
+                final_v_m_per_s: history.final_v_m_per_s,
+                mean_deceleration_m_per_s2: history.mean_deceleration_m_per_s2,
+                mean_deceleration_g: in_g(history.mean_deceleration_m_per_s2),
+                mean_deceleration_span_s: history.loaded_s,
+                peak_deceleration_g: peak.map(|(_, a)| in_g(a)),
+                peak_deceleration_time_s: peak.map(|(time_s, _)| time_s),
+                is_crush_zone: is_crush_zone(i),
+                still_loaded_at_end: history.is_loaded_at_end,
+                moving_mean_deceleration_g: history.moving_mean_deceleration_m_per_s2.map(in_g),
+                secondary_impact_m_per_s: history
+                    .secondary_impact_m_per_s
+                    .filter(|_| !is_crush_zone(i)),
+                occupant_load_g: history
+                    .occupant_load_m_per_s2
+                    .filter(|_| !is_crush_zone(i))
+                    .map(in_g),
+            }
+        };
+        let bodies: Vec<BodySummary<'a>> = self.order.iter().map(of_body).collect();
+        let judged = || {
+            let all = self.order.iter().zip(&bodies).filter(|(i, _)| self.limited.contains(i));
+            all.map(|(_, body)| body)
+        };
+        let occupants = |limits: &LimitsTable| {
+            type Met<'a> = fn(&BodySummary<'a>) -> Option<f64>;
+            let speed = limits.secondary_impact.as_ref().map(|speed| speed.0);
+            let of: [(_, _, Met<'a>); 2] = [
+                ("secondary_impact_m_per_s", speed, |body| body.secondary_impact_m_per_s),
+                ("occupant_load_g", limits.occupant_load_g, |body| body.occupant_load_g),
+            ];
+            let asked = of.into_iter().filter_map(|(what, limit, met)| Some((what, limit?, met)));
+            let judged = |(what, limit, met): (_, f64, Met<'a>)| OccupantLimit {
+                what,
+                limit,
+                over: judged()
+                    .filter(|body| met(body).is_some_and(|met| met.abs() > limit))
+                    .map(|body| body.name)
+                    .collect(),
+                unknown: judged().filter(|b| met(b).is_none()).map(|body| body.name).collect(),
+            };
+            asked.map(judged).collect()
+        };
+        let limits = self.limits.as_ref().map(|limits| Limits {
+            standard: &limits.standard,
+            edition: &limits.edition,
+            mean_deceleration_limit_g: limits.mean_deceleration_g,
+            trains: &limits.trains,
+            over: judged()
+                .filter(|body| body.mean_deceleration_g.abs() > limits.mean_deceleration_g)
+                .map(|body| body.name)
+                .collect(),
+            occupants: occupants(limits),
+            beyond_data: run.beyond_data().map(|k| &*interfaces[k].name).collect(),
+            statement: format!(
+                "these values come from a one-dimensional model and say nothing about survival space; they are not evidence of conformity with {}:{}",
+                limits.standard, limits.edition
+            ),
+        });
+        let energy_j = InterfaceHistory::energy_at_end_j;
+        let all_j: Option<f64> = run.interfaces.iter().map(energy_j).sum();
+        let of_interface = |((of, history), used): ((&'a Interface, &'a InterfaceHistory), _)| {
+            let energy_j = energy_j(history);
+            let share = |(energy_j, all_j): (f64, f64)| energy_j / all_j;
+            let energy_share = energy_j.zip(all_j.filter(|all_j| *all_j > 0.0)).map(share);
+            InterfaceSummary { name: &of.name, history, energy_j, energy_share, used }
+        };
+        let interfaces = interfaces.iter().zip(&run.interfaces).zip(&self.used);
+        Summary {
+            bodies,
+            interfaces: interfaces.map(of_interface).collect(),
+            sequence: sequence(self, run),
+            common_speed_time_s: common_speed_time_s(self, run),
+            step_s: run.step_s,
+            end_s: run.time_s.last().copied().unwrap_or_default(),
+            limits,
+        }
+    }
+}
+
+/// Class of the filter for decelerations of vehicles.
+const CLASS: u32 = 60;
+
+/// Time in s, and largest filtered deceleration in m/s², in magnitude.
+fn peak_deceleration(time_s: &[f64], a_m_per_s2: &[f64]) -> Option<(f64, f64)> {
+    let filtered = cfc::filter(CLASS, time_s, a_m_per_s2).ok()?.values;
+    let pairs = time_s.iter().zip(&filtered);
+    pairs.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).map(|(time_s, a)| (*time_s, -a))
+}
