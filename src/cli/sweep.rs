@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use crate::plan::OVER_LIMITS;
-use crate::sweep::{self, Report, Shard, Sweep, WriteOptions, share_interval};
+use crate::sweep::{self, Precision, Report, Shard, Sweep, WriteOptions, share_interval};
 use crate::table::Table;
 
 use super::output::{self, Bar};
@@ -33,6 +33,7 @@ use super::{
   crumple sweep scenario.toml -o results.csv
   crumple sweep scenario.toml --plan plan.toml -o results.h5
   crumple sweep scenario.toml --shard 2/3 -o part2.csv
+  crumple sweep scenario.toml --until over_limits=0.02 -o results.csv      # the share within ±2 %
   crumple sweep merge -o results.csv part1.csv part2.csv part3.csv"
 )]
 pub(super) struct Args {
@@ -50,6 +51,10 @@ pub(super) struct Args {
     /// Run block I of N blocks of the items
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<Shard>,
+    /// Stop as soon as the mean of a result is known within ± this much, with 95 % confidence: by its column, in its unit;
+    /// of over_limits the share. Needs variables that are all drawn at random; the plan's samples are the most
+    #[arg(long, value_name = "COLUMN=HALFWIDTH", value_parser = precision, conflicts_with_all = ["shard", "dry_run"])]
+    until: Option<Precision>,
     /// Start from the beginning and discard the results of an earlier run
     #[arg(long)]
     restart: bool,
@@ -84,6 +89,16 @@ fn shard(text: &str) -> Result<Shard, String> {
     })
 }
 
+/// A precision: `over_limits=0.02`.
+fn precision(text: &str) -> Result<Precision, String> {
+    let parsed = text.rsplit_once('=').and_then(|(column, half_width)| {
+        let half_width = half_width.parse::<f64>().ok()?;
+        let is_sound = half_width > 0.0 && half_width.is_finite() && !column.is_empty();
+        is_sound.then(|| Precision { column: column.into(), half_width })
+    });
+    parsed.ok_or_else(|| format!("\"{text}\" is not a precision: write for example over_limits=0.02, or max_deflection_m[A1|wall]=0.005"))
+}
+
 /// Rows that a dry run shows.
 const SHOWN: u64 = 5;
 
@@ -109,7 +124,7 @@ pub(super) fn run(args: &Args, global: GlobalOptions) -> CommandResult {
         global.on_stdout([output])?;
     }
     let begun = Instant::now();
-    let sweep = Sweep::load(scenario, args.plan.as_deref())?;
+    let mut sweep = Sweep::load(scenario, args.plan.as_deref())?;
     global.warn_all(sweep.warnings());
     let shard = args.shard.unwrap_or(Shard::WHOLE);
     let output = match &args.output {
@@ -117,14 +132,18 @@ pub(super) fn run(args: &Args, global: GlobalOptions) -> CommandResult {
         _ => return dry_run(&sweep, shard, global),
     };
     let options = WriteOptions { shard, restart: args.restart, ..WriteOptions::default() };
-    let report = write(&sweep, output, &options, global)?;
+    let (report, reached) = match &args.until {
+        Some(precision) => until(&mut sweep, output, precision, &options, global)?,
+        None => (write(&sweep, output, &options, global)?, None),
+    };
     if !report.is_complete() {
         let Report { done, rows, .. } = report;
         let message =
             format!("stopped after {done} of {rows} rows; the same command resumes there");
         return Err(failed(message));
     }
-    say(&report, sweep.is_random(), begun, output, global)
+    let design = Design { is_random: sweep.is_random(), is_grid: sweep.is_grid() };
+    say(&report, design, reached.as_deref(), begun, output, global)
 }
 
 fn is_hdf5(output: &Path) -> bool {
@@ -201,13 +220,22 @@ fn merge(shards: &[PathBuf], output: &Path, global: GlobalOptions) -> CommandRes
         keep_input(input, output)?;
     }
     let begun = Instant::now();
-    say(&sweep::merge(shards, output)?, false, begun, output, global)
+    let design = Design { is_random: false, is_grid: false };
+    say(&sweep::merge(shards, output)?, design, None, begun, output, global)
 }
 
-/// Prints what was done; `is_random`: whether the items are known to be a random sample.
+/// What is known about the items: whether they are a random sample, or a grid alone.
+#[derive(Clone, Copy)]
+struct Design {
+    is_random: bool,
+    is_grid: bool,
+}
+
+/// Prints what was done, with what was reached of a stated precision.
 fn say(
     report: &Report,
-    is_random: bool,
+    Design { is_random, is_grid }: Design,
+    reached: Option<&str>,
     begun: Instant,
     output: &Path,
     global: GlobalOptions,
@@ -224,10 +252,16 @@ fn say(
         global.warn(&text);
     }
     if report.warned > 0 {
-        global.warn(&format!(
-            "{} of {} items have warnings in their rows",
-            report.warned, report.rows
-        ));
+        let mut reasons: Vec<&(String, u64)> = report.reasons.iter().collect();
+        reasons.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+        let shown =
+            reasons.iter().take(SHOWN_REASONS).map(|(text, count)| format!("{count} × {text}"));
+        let mut shown: Vec<String> = shown.collect();
+        if reasons.len() > SHOWN_REASONS {
+            shown.push(format!("{} further kinds", reasons.len() - SHOWN_REASONS));
+        }
+        let (warned, rows, reasons) = (report.warned, report.rows, shown.join("; "));
+        global.warn(&format!("{warned} of {rows} items have warnings in their rows: {reasons}"));
     }
     let outcome = Outcome::warned_if(report.failed + report.warned > 0);
     if is_stdout(output) {
@@ -235,7 +269,7 @@ fn say(
     }
     let document = document! { #[serde(flatten)] report: report, seconds: seconds, output: output };
     global.show(&document, |out| {
-        output::table(out, statistics(report))?;
+        output::table(out, statistics(report, is_grid))?;
         if let Some(least) = varied(report).and(report.sensitivities.iter().map(|s| s.rows).min()) {
             let chance = match is_random {
                 true => format!("; below {:.2} it may be chance", 2.0 / (least as f64).sqrt()),
@@ -244,6 +278,9 @@ fn say(
             writeln!(out, "rank corr.: Spearman's rank correlation{chance}")?;
         }
         print_share_over_limits(out, report, is_random)?;
+        if let Some(reached) = reached {
+            writeln!(out, "{reached}")?;
+        }
         let resumed = match report.resumed {
             0 => String::new(),
             n if n == report.rows => ", all from an earlier run".into(),
@@ -260,16 +297,54 @@ fn say(
     Ok(outcome)
 }
 
-fn statistics(report: &Report) -> impl Into<Table> {
+/// Reasons of warnings that are printed.
+const SHOWN_REASONS: usize = 3;
+
+/// Runs samples until the precision is reached; the report, and a sentence about it.
+fn until(
+    sweep: &mut Sweep,
+    output: &Path,
+    precision: &Precision,
+    options: &WriteOptions,
+    global: GlobalOptions,
+) -> Result<(Report, Option<String>), Failure> {
+    let bar = Bar::over(global, sweep.items());
+    let mut is_first = true;
+    let stop = stop_flag();
+    let (report, half_width) = sweep::write_until(sweep, output, precision, options, |done| {
+        bar.set(done, std::mem::take(&mut is_first));
+        match stop.load(Ordering::Relaxed) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    })?;
+    let Precision { column, half_width: wanted } = precision;
+    let mean = report.columns.iter().find(|of| of.column == *column).and_then(|of| of.mean);
+    let known = match mean.zip(half_width) {
+        Some((mean, half_width)) => {
+            let is_reached = half_width <= *wanted;
+            let verdict = if is_reached { "reached" } else { "not reached: state more samples" };
+            format!("{} ± {} (95 %); ± {wanted} {verdict}", digits(mean), digits(half_width))
+        }
+        None => "not known".into(),
+    };
+    let text = format!("{column} after {}: {known}", counted(report.rows, "run"));
+    Ok((report, Some(text)))
+}
+
+/// Percentiles are those of a distribution: a grid has none.
+fn statistics(report: &Report, is_grid: bool) -> impl Into<Table> {
     let number = |value: Option<f64>| value.map_or("-".into(), digits);
-    let table = Table::of(&report.columns)
-        .column("column", |c| &c.column)
-        .column("min", |c| number(c.min))
-        .column("5 %", |c| number(c.p5))
-        .column("median", |c| number(c.median))
-        .column("95 %", |c| number(c.p95))
-        .column("max", |c| number(c.max))
-        .column("mean", |c| number(c.mean));
+    let table =
+        Table::of(&report.columns).column("column", |c| &c.column).column("min", |c| number(c.min));
+    let table = match is_grid {
+        true => table,
+        false => table
+            .column("5 %", |c| number(c.p5))
+            .column("median", |c| number(c.median))
+            .column("95 %", |c| number(c.p95)),
+    };
+    let table = table.column("max", |c| number(c.max)).column("mean", |c| number(c.mean));
     let sensitivities = &report.sensitivities;
     varied(report).unwrap_or_default().into_iter().fold(table, |table, varied| {
         table.column(format!("rank corr. {varied}"), move |column| {
@@ -315,14 +390,14 @@ fn print_share_over_limits(
     writeln!(out, ")")
 }
 
-/// Six digits.
+/// Three digits, as many as curves that are some per cent off deserve.
 fn digits(value: f64) -> String {
     let magnitude = value.abs();
     if value == 0.0 || (1e-3..1e7).contains(&magnitude) {
         let before = if value == 0.0 { 1 } else { magnitude.log10().floor() as i32 + 1 };
-        format!("{value:.*}", (6 - before.max(0)).max(0) as usize)
+        format!("{value:.*}", (3 - before).clamp(0, 6) as usize)
     } else {
-        format!("{value:.5e}")
+        format!("{value:.2e}")
     }
 }
 

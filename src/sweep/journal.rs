@@ -33,7 +33,7 @@ impl Default for WriteOptions {
     }
 }
 
-fn beside(path: &Path, suffix: &str) -> PathBuf {
+pub(super) fn beside(path: &Path, suffix: &str) -> PathBuf {
     let mut name = OsString::from(path.file_name().unwrap_or_default());
     name.push(suffix);
     path.with_file_name(name)
@@ -142,7 +142,7 @@ fn failed(path: &Path) -> impl Fn(io::Error) -> Error + '_ {
 
 /// The checksum of a row as a line of its own: a digit that a bad block or an editor has changed is run
 /// again, not taken for a result.
-fn sum(line: &[u8]) -> String {
+pub(super) fn sum(line: &[u8]) -> String {
     format!("{}\n", &blake3::hash(line).to_hex()[..SUM - 1])
 }
 

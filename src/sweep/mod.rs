@@ -25,6 +25,7 @@ mod row;
 mod run;
 mod statistics;
 mod to_hdf5;
+mod until;
 mod variables;
 
 use std::path::{Path, PathBuf};
@@ -41,6 +42,7 @@ pub(crate) use results::ResultColumn;
 pub use results::SweepColumns;
 pub use run::Chunk;
 pub(crate) use statistics::{ColumnStatistics, Sensitivity, share_interval};
+pub use until::{Precision, write_until};
 use variables::Variable;
 pub use variables::VariableSummary;
 
@@ -113,6 +115,8 @@ pub struct Report {
     pub warned: u64,
     /// The first few messages of rows that failed, by item.
     pub messages: Vec<(u64, String)>,
+    /// What warnings say, the first of each kind, and how many rows say so.
+    pub reasons: Vec<(String, u64)>,
     /// Statistics of the columns of numbers.
     pub(crate) columns: Vec<ColumnStatistics>,
     /// How the results follow what is varied.
@@ -129,6 +133,10 @@ impl Report {
 /// A scenario with a plan, checked, its files read.
 pub struct Sweep {
     path: PathBuf,
+    /// Text of the scenario, and the file and table of the plan: they decide the hash.
+    text: String,
+    plan_path: PathBuf,
+    plan: Plan,
     scenario: CheckedScenario<'static>,
     sources: Sources,
     design: Design,
@@ -167,9 +175,30 @@ impl Sweep {
         let results = results(&plan, scenario.limits.is_some()).map_err(invalid)?;
         let sources = Sources::read(path, &scenario)?;
         let base = scenario::assemble(path, &scenario, &sources)?;
-        let hash = hash(path, &text, plan_path, &scenario)?;
-        let path = path.to_path_buf();
-        Ok(Self { path, scenario, sources, design, variables, results, base, hash })
+        let hash = hash(path, &text, plan_path, &scenario, None)?;
+        let (path, plan_path) = (path.to_path_buf(), plan_path.to_path_buf());
+        Ok(Self {
+            path,
+            text,
+            plan_path,
+            plan,
+            scenario,
+            sources,
+            design,
+            variables,
+            results,
+            base,
+            hash,
+        })
+    }
+
+    /// Makes it the sweep of the same plan with another number of samples.
+    fn set_samples(&mut self, samples: u64) -> Result<(), Error> {
+        let plan = Plan { samples: Some(samples), ..self.plan.clone() };
+        (self.variables, self.design) = variables::bind(&plan, &self.scenario)?;
+        let (path, plan_path) = (&self.path, &self.plan_path);
+        self.hash = hash(path, &self.text, plan_path, &self.scenario, Some(samples))?;
+        Ok(())
     }
 
     /// Items of the whole sweep.
@@ -210,6 +239,11 @@ impl Sweep {
     /// Whether its items are a random sample, so that their shares estimate probabilities.
     pub(crate) fn is_random(&self) -> bool {
         self.design.is_random()
+    }
+
+    /// Whether nothing is drawn: a grid has no distribution.
+    pub(crate) fn is_grid(&self) -> bool {
+        !self.design.spreads.iter().any(|spread| matches!(spread, Spread::Drawn(_)))
     }
 
     /// The varied values of an item, as they are in its row.
@@ -267,12 +301,24 @@ fn result_columns(results: &[ResultName], base: &Prepared) -> Vec<String> {
 }
 
 /// BLAKE3 of everything that decides the rows. Comments and order of keys do not.
-fn hash(path: &Path, text: &str, plan_path: &Path, scenario: &Scenario) -> Result<String, Error> {
+///
+/// `samples` take the place of those that the plan states.
+fn hash(
+    path: &Path,
+    text: &str,
+    plan_path: &Path,
+    scenario: &Scenario,
+    samples: Option<u64>,
+) -> Result<String, Error> {
     let mut table: toml::Table = manifest::parse(path, text)?;
     if plan_path != path
         && let Some(plan) = manifest::load::<toml::Table>(plan_path)?.remove("sweep")
     {
         table.insert("sweep".into(), plan);
+    }
+    if let (Some(samples), Some(toml::Value::Table(plan))) = (samples, table.get_mut("sweep")) {
+        let samples = i64::try_from(samples).unwrap_or(i64::MAX);
+        plan.insert("samples".into(), toml::Value::Integer(samples));
     }
     let mut hasher = blake3::Hasher::new();
     // Each part with its length, so that no two lists of parts run together to the same bytes.

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::Report;
 use super::row::{Line, Row, ShardHeader, Status};
-use crate::plan::{RESULTS, ResultName};
+use crate::plan::{OVER_LIMITS, RESULTS, ResultName};
 use crate::stream::mix;
 
 /// Quantiles come from all rows of a sweep up to this size; of a larger one from about as many
@@ -19,6 +19,8 @@ pub(crate) struct ColumnStatistics {
     pub count: u64,
     pub min: Option<f64>,
     pub mean: Option<f64>,
+    /// Standard deviation of one row; of two rows and more.
+    pub sd: Option<f64>,
     pub max: Option<f64>,
     /// 5 %, by linear interpolation between order statistics.
     pub p5: Option<f64>,
@@ -32,6 +34,8 @@ struct Column {
     name: String,
     count: u64,
     sum: f64,
+    /// Mean so far and sum of the squares about it (Welford, Technometrics 4, 1962).
+    about: (f64, f64),
     min: f64,
     max: f64,
     /// Of the rows in the sample, NaN where there is no number.
@@ -55,6 +59,7 @@ impl Column {
             count: self.count,
             min: some(self.min),
             mean: some(self.sum / self.count as f64),
+            sd: (self.count > 1).then(|| (self.about.1 / (self.count - 1) as f64).sqrt()),
             max: some(self.max),
             p5,
             median,
@@ -157,9 +162,23 @@ fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
     (xx > 0.0 && yy > 0.0).then(|| xy / (xx * yy).sqrt())
 }
 
+/// Quantile of the normal distribution that leaves out 2.5 %.
+const Z: f64 = 1.959_963_985;
+
+impl ColumnStatistics {
+    /// Half the width of the interval that holds the mean of all possible rows with 95 % probability, if these are drawn
+    /// at random; of [`OVER_LIMITS`] that of the share.
+    pub(crate) fn half_width(&self) -> Option<f64> {
+        if self.column == OVER_LIMITS {
+            let (low, high) = share_interval(self.mean?, self.count);
+            return Some(0.5 * (high - low));
+        }
+        Some(Z * self.sd? / (self.count as f64).sqrt())
+    }
+}
+
 /// A share of `count` runs with the interval that holds it with 95 % probability (Wilson, JASA 22, 1927).
 pub(crate) fn share_interval(share: f64, count: u64) -> (f64, f64) {
-    const Z: f64 = 1.959_963_985;
     let n = count as f64;
     let centre = share + Z * Z / (2.0 * n);
     let half = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
@@ -167,16 +186,26 @@ pub(crate) fn share_interval(share: f64, count: u64) -> (f64, f64) {
     ((centre - half).max(0.0) / scale, (centre + half) / scale)
 }
 
+/// What a warning says without its numbers.
+fn kind(message: &str) -> String {
+    let is_of_a_number = |c: &char| c.is_ascii_digit() || ['.', '-', 'e'].contains(c);
+    message.chars().filter(|c| !is_of_a_number(c)).collect()
+}
+
 /// A report, row by row.
 pub(super) struct Tally {
     head: ShardHeader,
     pub report: Report,
     columns: Vec<Column>,
+    /// Of the reasons of warnings, in their order.
+    kinds: Vec<String>,
     /// An item is in the sample if its hash is not above this.
     threshold: u64,
 }
 
 const MESSAGES: usize = 3;
+/// Different reasons of warnings that are counted.
+const REASONS: usize = 50;
 
 impl Tally {
     pub(crate) fn new(head: &ShardHeader) -> Self {
@@ -185,6 +214,7 @@ impl Tally {
             name: head.columns[c].clone(),
             count: 0,
             sum: 0.0,
+            about: (0.0, 0.0),
             min: f64::INFINITY,
             max: f64::NEG_INFINITY,
             sample: Vec::new(),
@@ -200,10 +230,12 @@ impl Tally {
                 failed: 0,
                 warned: 0,
                 messages: Vec::new(),
+                reasons: Vec::new(),
                 columns: Vec::new(),
                 sensitivities: Vec::new(),
             },
             columns: head.number_columns().map(column).collect(),
+            kinds: Vec::new(),
             head: head.clone(),
             threshold,
         }
@@ -227,12 +259,26 @@ impl Tally {
             }
             column.count += 1;
             column.sum += value;
+            let off = value - column.about.0;
+            column.about.0 += off / column.count as f64;
+            column.about.1 += off * (value - column.about.0);
             column.min = column.min.min(value);
             column.max = column.max.max(value);
         }
         let report = &mut self.report;
         report.done += 1;
         report.warned += u64::from(status == Status::Warned);
+        if status == Status::Warned {
+            let kind = kind(message);
+            match self.kinds.iter().position(|known| *known == kind) {
+                Some(k) => report.reasons[k].1 += 1,
+                None if self.kinds.len() < REASONS => {
+                    self.kinds.push(kind);
+                    report.reasons.push((message.into(), 1));
+                }
+                None => {}
+            }
+        }
         report.failed += u64::from(status == Status::Failed);
         if status == Status::Failed && report.messages.len() < MESSAGES {
             report.messages.push((item, message.into()));
@@ -285,6 +331,7 @@ mod tests {
             name: name.to_string(),
             count: 0,
             sum: 0.0,
+            about: (0.0, 0.0),
             min: 0.0,
             max: 0.0,
             sample: (0..rows).map(of).collect(),
