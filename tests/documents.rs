@@ -143,6 +143,11 @@ fn documents_are_those_of_the_schemas() {
     let zeros = ["rate", "zero.csv", "zero.csv", "--quantity", "acceleration"];
     add(rating, "zeros", printed(here, &zeros));
 
+    let result = "time_s,deflection_m[a|b],force_N[a|b]\n0,0,0\n0.1,1,2e6\n0.2,0.9,0\n";
+    std::fs::write(here.join("result.csv"), result).unwrap();
+    let runs = ["rate", "result.csv", "result.csv"];
+    add("acceptance.schema.json", "runs", printed(here, &runs));
+
     // What users write.
     let read = |path: &Path| -> Value {
         let table: toml::Table = std::fs::read_to_string(path).unwrap().parse().unwrap();

@@ -45,7 +45,7 @@ const MAY_NAME: [(&str, &str); 37] = [
     ("sweep", "guess scenario plan multibody hdf5 stream manifest file unit"),
     ("init", "guess scenario surrogate study solver curve signal history file unit"),
     ("assess", "guess plural manifest scenario nsdm rating multibody surrogate dataset database solver curve signal history file unit"),
-    ("charts", "guess sweep scenario assess multibody surrogate dataset curve signal history plot unit"),
+    ("charts", "guess rating sweep scenario assess multibody surrogate dataset curve signal history plot unit"),
     ("report", "plural table rating charts assess scenario multibody surrogate dataset database curve plot unit"),
     ("failure", "report charts sweep assess scenario import init curate nsdm formats multibody surrogate dataset build study database history_hdf5 rating solver manifest plot file"),
 ];
@@ -194,7 +194,7 @@ fn no_unwrap_outside_tests() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 74501), ("files", 287), ("public types", 180), ("error types", 9)];
+    [("lines", 76909), ("files", 296), ("public types", 183), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {

@@ -1064,7 +1064,12 @@ fn validate_prints_and_tells_what_to_run_next() {
         "{text}"
     );
     assert_eq!(lines.iter().filter(|line| line.starts_with("band of the ")).count(), 4, "{text}");
-    assert!(lines.len() == 17 && lines[15].starts_with("next run: "), "{text}");
+    assert!(
+        lines.len() == 18
+            && lines[10].starts_with("5 of 5 left-out speeds pass")
+            && lines[16].starts_with("next run: "),
+        "{text}"
+    );
     let found: Value =
         serde_json::from_str(&crumple_ok(here, &[&arguments[..], &["--json"]].concat())).unwrap();
     let group = &found["groups"][0];

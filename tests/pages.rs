@@ -270,7 +270,7 @@ curve = \"nose\"
 
 [limits]
 standard = \"EN 15227\"
-edition = \"2020\"
+edition = \"2020+A1:2024\"
 mean_deceleration_g = 5.0
 secondary_impact = \"8m/s\"
 occupant_load_g = 8.0

@@ -198,7 +198,7 @@ fn every_kind_of_file_is_drawn() {
         ("lead50.json", &["lead-car-wall at 50 km/h: contact force by the model crush-law"]),
         ("lead50.json --force body", &["lead-car-wall at 50 km/h: body force by the model crush-law"]),
         ("scenario.toml --quantity energy", &["kinetic", "A1|wall", "energy [MJ]", "time [ms]"]),
-        ("scenario.toml --quantity acceleration --cfc 180", &["scenario: acceleration, CFC 180", "acceleration [g]", "Curve nose: lead.model: crush-law of lead-car-wall, 7 FE runs, 12 km/h to 72 km/h."]),
+        ("scenario.toml --quantity acceleration", &["scenario: acceleration, CFC 60", "acceleration [g]", "Curve nose: lead.model: crush-law of lead-car-wall, 7 FE runs, 12 km/h to 72 km/h."]),
         ("result.csv --quantity crush", &["A1|wall", "deflection [m]"]),
         ("result.csv slower.csv", &["A1, result", "A1, slower", "speed [m/s]"]),
         // Small multiples beyond six, and what is chosen in one panel.

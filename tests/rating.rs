@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use crate::common::{crumple_fails, crumple_in, crumple_ok, fixture, says};
+use crate::common::{crumple_fails, crumple_in, crumple_ok, demo_folder, fixture, says};
 use serde_json::Value;
 
 /// Writes a table of `time` and `value` over samples of 1 ms.
@@ -44,6 +44,60 @@ fn assert_close(value: &Value, expected: f64, tolerance: f64) {
 }
 
 /// What ends in the pulse has the mean of a part of it.
+/// Two results by the acceptance rule: the same run passes; a slower one, whose noses are crushed far less, does not.
+#[test]
+fn runs_are_rated_by_the_acceptance_rule() {
+    let folder = demo_folder();
+    let folder = folder.path();
+    let text = std::fs::read_to_string(folder.join("two-sets.toml")).unwrap();
+    crumple_ok(folder, "simulate two-sets.toml -o one.csv");
+    for (name, speed) in [("near", "35.5km/h"), ("slower", "30km/h")] {
+        std::fs::write(folder.join(format!("{name}.toml")), text.replace("36km/h", speed)).unwrap();
+        crumple_ok(folder, &format!("simulate {name}.toml -o {name}.csv"));
+    }
+    let rate = |other: &str| -> serde_json::Value {
+        serde_json::from_str(&crumple_ok(folder, &format!("rate one.csv {other}.csv --json")))
+            .unwrap()
+    };
+    let same = rate("one");
+    assert_eq!((&same["passes"], &same["same_sequence"]), (&true.into(), &true.into()));
+    assert_eq!(same["sequences"][0][0], "A1|B1");
+    assert_eq!(rate("near")["passes"], true);
+    let slower = rate("slower");
+    assert_eq!(slower["passes"], false);
+    // Against the summaries of both runs, which know extremes of every step.
+    let summary = |name: &str| -> serde_json::Value {
+        serde_json::from_str(&crumple_ok(folder, &format!("simulate {name}.toml --json -q")))
+            .unwrap()
+    };
+    let (one, other) = (summary("two-sets"), summary("slower"));
+    let of = |run: &serde_json::Value, name: &str, key: &str| {
+        let all = run["summary"]["interfaces"].as_array().unwrap();
+        all.iter().find(|i| i["name"] == name).unwrap()[key].as_f64().unwrap()
+    };
+    for stage in slower["stages"].as_array().unwrap() {
+        let name = stage["stage"].as_str().unwrap();
+        let expected =
+            of(&other, name, "max_deflection_m") / of(&one, name, "max_deflection_m") - 1.0;
+        assert!((stage["displacement_error"].as_f64().unwrap() - expected).abs() < 2e-3, "{name}");
+        let lost = |run| of(run, name, "dissipated_at_end_J") + of(run, name, "stored_at_end_J");
+        let expected = lost(&other) - lost(&one);
+        let found =
+            stage["energy_error"].as_f64().unwrap() * slower["initial_energy_J"].as_f64().unwrap();
+        assert!((found - expected).abs() < 3e-3 * lost(&one), "{name}: {found} and {expected}");
+    }
+    let said = crumple_ok(folder, "rate one.csv slower.csv");
+    assert!(
+        said.contains("fails: dissipated energy within 10 %")
+            && said.contains("EN 15227:2020+A1:2024"),
+        "{said}"
+    );
+    std::fs::write(folder.join("none.csv"), "time_s,deflection_m[x],force_N[x]\n0,0,0\n0.1,1,1\n")
+        .unwrap();
+    let error = crumple_fails(folder, 2, &["rate", "one.csv", "none.csv"]);
+    assert!(error.contains("have no interface in common"), "{error}");
+}
+
 #[test]
 fn signals_that_end_while_decelerated_are_said() {
     let folder = folder();

@@ -578,6 +578,81 @@ fn items_that_fail_are_rows_with_their_reason() {
     says(&text, "beyond the end of its curve's data at 0.6000 m");
 }
 
+/// A sweep ends with as many draws as a stated precision needs: the bytes are those of a plan with so many samples, also
+/// after an interruption, and whatever was run before is kept.
+#[test]
+fn a_stated_precision_ends_a_sweep() {
+    let plan = SPEEDS.replace("samples = 40", "samples = 4000");
+    let folder = Folder::new(&plan);
+    let column = "max_deflection_m[A1|B1]";
+    let asked = |half_width: f64| {
+        format!("sweep s.toml -o out.csv --until {column}={half_width} --json -q")
+    };
+    let report = |half_width: f64| folder.json(&asked(half_width));
+    let width = |report: &Value| {
+        let columns = report["columns"].as_array().unwrap();
+        let of = columns.iter().find(|of| of["column"] == column).unwrap();
+        1.959_964 * of["sd"].as_f64().unwrap() / of["count"].as_f64().unwrap().sqrt()
+    };
+    let rough = report(0.02);
+    let rows = rough["rows"].as_u64().unwrap();
+    assert!(width(&rough) <= 0.02 && rows >= 100, "{rough}");
+    let fine = report(0.008);
+    let more = fine["rows"].as_u64().unwrap();
+    assert!(width(&fine) <= 0.008 && more > rows && more < 4000, "{rows} and {more}");
+    let out = folder.read("out.csv");
+    // Of the values themselves, by a second route.
+    let (header, lines) = self::rows(&String::from_utf8(out.clone()).unwrap());
+    let at = header.iter().position(|h| h == column).unwrap();
+    let values: Vec<f64> = lines.iter().map(|line| line[at].parse().unwrap()).collect();
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let sd =
+        (values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>() / (more - 1) as f64).sqrt();
+    assert!((1.959_964 * sd / (more as f64).sqrt() / width(&fine) - 1.0).abs() < 1e-9);
+    folder.put("s.toml", &format!("{SCENARIO}{}", plan.replace("4000", &more.to_string())));
+    folder.ok("sweep s.toml -o plain.csv -q");
+    assert_eq!(folder.read("plain.csv"), out, "the sweep of so many samples");
+    folder.put("s.toml", &format!("{SCENARIO}{plan}"));
+    // Asked for less again, nothing is run; what cannot be reached ends with the plan's samples, and says so.
+    assert_eq!(report(0.02)["resumed"], more);
+    let said = folder.ok(&asked(1e-4).replace(" --json -q", ""));
+    assert!(
+        said.contains("after 4000 runs") && said.contains("not reached: state more samples"),
+        "{said}"
+    );
+    for (arguments, says) in [
+        ("--until nothing=1 -o a.csv", "there is no result \"nothing\""),
+        ("--until x -o a.csv", "is not a precision"),
+        ("--until max_deflection_m[A1|B1]=-1 -o a.csv", "is not a precision"),
+        ("--until max_deflection_m[A1|B1]=1 -o a.h5", "--until writes one .csv file"),
+        ("--until max_deflection_m[A1|B1]=1 -o a.csv --plan grid.toml", "drawn at random"),
+    ] {
+        folder.put("grid.toml", GRID);
+        let all = format!("sweep s.toml {arguments}");
+        let code = if says == "is not a precision" { 2 } else { 1 };
+        let error = crumple_fails(folder.path(), code, &all.split(' ').collect::<Vec<_>>());
+        assert!(error.contains(says), "{arguments}: {error}");
+    }
+}
+
+/// Warnings of many rows are counted by what they say, and a grid has no percentiles.
+#[test]
+fn reasons_are_counted_and_grids_have_no_percentiles() {
+    let grid = "[sweep]\nvary = [ { what = \"speed\", train = \"A\", from = \"10m/s\", to = \"30m/s\", steps = 9 } ]\n";
+    let folder = Folder::new(grid);
+    let output = crumple_in(folder.path(), &["sweep", "s.toml", "-o", "out.csv"]);
+    let (said, table) =
+        (String::from_utf8_lossy(&output.stderr), String::from_utf8_lossy(&output.stdout));
+    let (_, rows) = rows(&folder.text("out.csv"));
+    let warned = rows.iter().filter(|row| row[row.len() - 2] == "warned").count();
+    assert!(warned > 1, "{said}");
+    assert!(said.contains(&format!("{warned} of 9 items have warnings in their rows: ")), "{said}");
+    assert!(said.contains(" × interface "), "{said}");
+    assert!(!table.contains("median") && table.contains("mean"), "{table}");
+    let drawn = Folder::new(SPEEDS);
+    says(&drawn.ok("sweep s.toml -o out.csv"), "median");
+}
+
 #[test]
 fn the_report_counts_and_summarises() {
     let folder = Folder::new(FAILING);

@@ -6,6 +6,7 @@ use crate::error::{Error, ErrorCode, error};
 use crate::guess::hint;
 use crate::multibody::{Run, STANDARD_GRAVITY_M_PER_S2};
 use crate::plot::{Axis, Band, Chart, Panel, Series, Shown};
+use crate::rating::acceptance::StageRecord;
 use crate::scenario::{PLATES, Prepared};
 use crate::signal::cfc;
 
@@ -208,10 +209,13 @@ impl Motion {
         }
     }
 
-    /// Times in s, and name, deflection in m and force in N of every interface.
-    pub(crate) fn interfaces(&self) -> (&[f64], impl Iterator<Item = (&str, &[f64], &[f64])>) {
-        let of = self.interfaces.iter().map(|i| (&*i.name, &*i.deflection_m, &*i.force_n));
-        (&self.time_s, of)
+    /// Every interface as a stage of the run.
+    pub(crate) fn stages(&self) -> Vec<StageRecord<'_>> {
+        let interfaces = self.interfaces.iter();
+        let stages = interfaces.map(|InterfaceMotion { name, deflection_m, force_n, .. }| {
+            StageRecord { name, time_s: &self.time_s, deflection_m, force_n }
+        });
+        stages.collect()
     }
 
     /// Bodies or interfaces by name, with whether each is drawn without being asked for.

@@ -290,7 +290,7 @@ fn arguments() -> Result<Cli, ExitCode> {
 }
 
 /// The JSON schemas of the files and documents, by their names in `schemas/`.
-pub fn schemas() -> [(&'static str, schemars::Schema); 7] {
+pub fn schemas() -> [(&'static str, schemars::Schema); 8] {
     [
         ("study.schema.json", schemars::schema_for!(crate::study::Manifest)),
         ("scenario.schema.json", schemars::schema_for!(crate::scenario::Scenario)),
@@ -298,6 +298,7 @@ pub fn schemas() -> [(&'static str, schemars::Schema); 7] {
         ("predicted_curve.schema.json", schemars::schema_for!(crate::surrogate::PredictedCurve)),
         ("validation.schema.json", schemars::schema_for!(crate::assess::Report)),
         ("rating.schema.json", schemars::schema_for!(crate::rating::Rating)),
+        ("acceptance.schema.json", schemars::schema_for!(crate::rating::acceptance::RunAcceptance)),
         ("error.schema.json", schemars::schema_for!(ErrorDocument)),
     ]
 }

@@ -1,6 +1,6 @@
 //! `crumple rate`: how far a prediction is from its reference, by every measure.
 
-use std::io::{self, Write};
+use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 use super::arguments::{FileKind, one_of};
@@ -10,9 +10,7 @@ use super::{
 };
 use crate::charts::Motion;
 use crate::error::Error;
-use crate::rating::acceptance::{
-    ACCEPTANCE, RunAcceptance, STANDARD, StageAcceptance, StageRecord, accept,
-};
+use crate::rating::acceptance::{ACCEPTANCE, RunAcceptance, STANDARD, StageAcceptance, accept};
 use crate::rating::differences::{Deceleration, MagnitudePhase};
 use crate::rating::iso18571::Iso18571;
 use crate::rating::{self, Quantity, Rating, RatingSettings, Signal};
@@ -240,13 +238,22 @@ impl Args {
             let is_result = address.within.is_none()
                 && !is_named
                 && address.path.exists()
-                && FileKind::of(&address.path)? == FileKind::Result;
+                && FileKind::of(&address.path)? == FileKind::Result
+                && has_deflections(&address.path);
             if !is_result {
                 return Ok(false);
             }
         }
         Ok(true)
     }
+}
+
+/// Whether a table has deflections of interfaces, as `crumple simulate -o` writes them.
+fn has_deflections(path: &Path) -> bool {
+    let mut header = String::new();
+    let read =
+        file::open(path).map(|f| BufReader::new(f).take(MAX_TABLE_BYTES).read_line(&mut header));
+    read.is_ok() && header.contains(",deflection_m[")
 }
 
 /// Interfaces that begin within so many s of each other have no order.
@@ -259,17 +266,7 @@ fn rate_runs(reference: &Path, prediction: &Path, options: GlobalOptions) -> Com
         Motion::of_csv(&text).map_err(|e| failed_at(path, e))
     };
     let (r, p) = (read(reference)?, read(prediction)?);
-    fn stages(motion: &Motion) -> Vec<StageRecord<'_>> {
-        let (time_s, interfaces) = motion.interfaces();
-        let of = interfaces.map(|(name, deflection_m, force_n)| StageRecord {
-            name,
-            time_s,
-            deflection_m,
-            force_n,
-        });
-        of.collect()
-    }
-    let Some(found) = accept(&stages(&r), &stages(&p), None, TIE_S) else {
+    let Some(found) = accept(&r.stages(), &p.stages(), None, TIE_S) else {
         return usage(format!(
             "{} and {} have no interface in common that takes energy: to rate one column, name it: {}:COLUMN",
             reference.display(),

@@ -50,28 +50,18 @@ pub(super) fn add_scenarios(content: &mut Content, ran: Vec<Ran>) -> Result<(), 
     let vehicles = names(ran.iter().flat_map(|of| &of.vehicles).map(|(name, _)| name));
     let interfaces = names(ran.iter().flat_map(|of| &of.interfaces).map(|(name, _)| name));
     let mut parts = Vec::new();
-    let of_vehicles: [(&str, fn(f64) -> String); 4] = [
-        ("Mean deceleration", |g| format!("{g:.2} g")),
-        ("Peak deceleration (CFC 60)", |g| format!("{g:.1} g")),
-        ("Secondary impact after 0.6 m", |v| format!("{v:.1} m/s")),
-        ("Occupant load", |g| format!("{g:.1} g")),
-    ];
-    for (k, (caption, text)) in of_vehicles.into_iter().enumerate() {
-        let rows = |of: &Ran, name: &str| {
-            let found = of.vehicles.iter().find(|(other, _)| other == name);
-            found.and_then(|(_, numbers)| numbers[k])
-        };
-        parts.push(Part::table(caption, beside("vehicle", &vehicles, &ran, rows, text)));
-    }
-    let of_interfaces: [(&str, fn(f64) -> String); 2] =
-        [("Maximum crush", metres), ("Energy taken", energy)];
-    for (k, (caption, text)) in of_interfaces.into_iter().enumerate() {
-        let rows = |of: &Ran, name: &str| {
-            let found = of.interfaces.iter().find(|(other, _)| other == name);
-            found.and_then(|(_, numbers)| numbers[k])
-        };
-        parts.push(Part::table(caption, beside("interface", &interfaces, &ran, rows, text)));
-    }
+    let g = |digits: usize| move |g: f64| format!("{g:.digits$} g");
+    let m_per_s = |v: f64| format!("{v:.1} m/s");
+    let of_vehicles = |k: usize| move |of: &Ran, name: &str| found(&of.vehicles, name)?[k];
+    let of_interfaces = |k: usize| move |of: &Ran, name: &str| found(&of.interfaces, name)?[k];
+    let vehicle = Beside { what: "vehicle", names: &vehicles, ran: &ran };
+    let interface = Beside { what: "interface", names: &interfaces, ran: &ran };
+    parts.push(vehicle.part("Mean deceleration", of_vehicles(0), g(2)));
+    parts.push(vehicle.part("Peak deceleration (CFC 60)", of_vehicles(1), g(1)));
+    parts.push(vehicle.part("Secondary impact after 0.6 m", of_vehicles(2), m_per_s));
+    parts.push(vehicle.part("Occupant load", of_vehicles(3), g(1)));
+    parts.push(interface.part("Maximum crush", of_interfaces(0), metres));
+    parts.push(interface.part("Energy taken", of_interfaces(1), energy));
     let runs: Vec<(String, Motion)> = ran.into_iter().map(|of| (of.name, of.motion)).collect();
     for (id, quantity, what) in [
         ("both-speeds", Quantity::Velocity, "Speeds"),
@@ -106,16 +96,33 @@ fn names<'a>(all: impl Iterator<Item = &'a String>) -> Vec<String> {
     names
 }
 
-/// A row for each name, a column for each scenario.
-fn beside(
-    what: &str,
-    names: &[String],
-    ran: &[Ran],
-    value: impl Fn(&Ran, &str) -> Option<f64>,
-    text: fn(f64) -> String,
-) -> impl Into<Table> {
-    let table = Table::of(names).column(what, |name| *name);
-    ran.iter().fold(table, |table, of| {
-        table.column(&*of.name, |name| value(of, name).map_or("–".into(), text))
-    })
+/// The numbers of a name.
+fn found<'a, const N: usize>(
+    all: &'a [(String, [Option<f64>; N])],
+    name: &str,
+) -> Option<&'a [Option<f64>; N]> {
+    all.iter().find(|(other, _)| other == name).map(|(_, numbers)| numbers)
+}
+
+/// Tables with a row for each name, a column for each scenario.
+struct Beside<'a> {
+    what: &'static str,
+    names: &'a [String],
+    ran: &'a [Ran],
+}
+
+impl Beside<'_> {
+    fn part(
+        &self,
+        caption: &str,
+        value: impl Fn(&Ran, &str) -> Option<f64>,
+        text: impl Fn(f64) -> String,
+    ) -> Part {
+        let table = Table::of(self.names).column(self.what, |name| *name);
+        let table = self.ran.iter().fold(table, |table, of| {
+            let cell = |name: &&String| value(of, name).map_or("–".into(), &text);
+            table.column(&*of.name, cell)
+        });
+        Part::table(caption, table)
+    }
 }

@@ -57,7 +57,7 @@ pub(super) fn sequence<'a>(prepared: &'a Prepared, run: &Run) -> Vec<Event<'a>> 
         // Plates belong to the ends that they stand between, but tell when these meet.
         let is_plates = used.curve == PLATES;
         let mut add = |time_s, what| {
-            events.push(Event { time_s, interface: &*interface.name, what });
+            events.push(Event { time_s, interface: &interface.name, what });
         };
         let crossing = |level_m| crossing_s(&run.time_s, &history.largest_deflection_m, level_m);
         let Some(contact_s) = crossing(LEAST_M) else { continue };

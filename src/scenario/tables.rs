@@ -43,7 +43,7 @@ pub struct Scenario {
 pub(crate) struct LimitsTable {
     /// Such as "EN 15227".
     pub(crate) standard: String,
-    /// Such as "2020".
+    /// Such as "2020+A1:2024".
     pub(crate) edition: String,
     /// Of the mean deceleration while the net contact force acts, in g.
     pub(crate) mean_deceleration_g: f64,
