@@ -37,10 +37,10 @@ fn the_demo_ends_with_a_small_page_that_needs_nothing() {
         "Predicted curve at",
         "Methods",
         "Scenario scenario.toml",
-        "mean deceleration over 5 g (EN 15227:2020+A1:2024",
+        "mean deceleration above 5 g (EN 15227:2020+A1:2024",
         "What drives the interfaces",
-        "most energy is taken at",
-        "energy lost",
+        "most energy is absorbed at",
+        "energy dissipated",
         "Next FE run:",
         "BLAKE3",
         // The template escapes the slash, too.

@@ -566,11 +566,11 @@ fn limits_on_occupants_are_judged() {
     let over: Vec<&str> =
         (0..3).filter(|&k| met[k] > limit).map(|k| ["A1", "A2", "A3"][k]).collect();
     assert_eq!(of[1]["over"], serde_json::json!(over));
-    says(&text, &format!("occupant load over {limit} g: {}", over.join(", ")));
+    says(&text, &format!("occupant load above {limit} g: {}", over.join(", ")));
     let (text, _) = judged(&limits, "15ms");
     says(
         &text,
-        "secondary impact over 0.1 m/s: no vehicle of which it is known; the run ended before it is known of A1, A2, A3",
+        "secondary impact above 0.1 m/s: no vehicle of which it is known; the run ended before it is known of A1, A2, A3",
     );
     let text = std::fs::read_to_string(here.join("limits.toml")).unwrap();
     let coarse = text.replace("output_interval = \"0.75ms\"", "output_interval = \"7.5ms\"");

@@ -43,7 +43,7 @@ pub(super) fn add(
             [one] => (*one).to_string(),
             several => format!("{} runs ({})", several.len(), several.join(", ")),
         };
-        content.warn(ToDo::CheckRuns, format!("{title}, {runs}: {warning}"));
+        content.warn(ToDo::CheckRuns, &format!("{title}, {runs}"), warning.into());
     }
     let mut design = None;
     match known_or_new(group, cases, models, settings) {
@@ -60,7 +60,7 @@ pub(super) fn add(
             });
         }
         Err(error) => {
-            content.warn(ToDo::CheckRuns, format!("{title} cannot be validated: {error}"))
+            content.warn(ToDo::CheckRuns, title, format!("it cannot be validated: {error}"));
         }
     }
     let id = format!("group-{number}");
@@ -169,7 +169,7 @@ impl Validated<'_> {
             content.verdict(Verdict::known(
                 title,
                 format!(
-                    "predictions by {} err by {} in force, {} in velocity, {} in maximum crush (means over {}, each left out in turn)",
+                    "errors of curves predicted by {}: {} in force, {} in velocity, {} in maximum crush (means over {}, each left out in turn)",
                     means.model,
                     percent(means.force_l1),
                     percent(means.velocity_l1),
@@ -193,7 +193,7 @@ impl Validated<'_> {
             let passed = accepted.iter().filter(|of| of.passes).count();
             let worst = accepted.iter().map(Acceptance::worst).fold(0.0, f64::max);
             parts.push(Part::Text(format!(
-                "Acceptance rule for numerical crash models ({STANDARD}): {ACCEPTANCE}, the whole crush as one stage. {passed} of {} left-out speeds pass; the largest error is {}.",
+                "Predictions against FE by the acceptance rule for numerical crash models ({STANDARD}): {ACCEPTANCE}, the whole crush as one stage. {passed} of {} left-out speeds pass; the largest of these errors is {}.",
                 accepted.len(),
                 percent(worst)
             )));
@@ -207,7 +207,7 @@ impl Validated<'_> {
         }
         parts.extend(validation.unsuited.iter().map(|of| Part::Text(format!("Without {of}."))));
         for note in &validation.notes {
-            content.warn(ToDo::AddRuns, format!("{title}: {note}"));
+            content.warn(ToDo::AddRuns, title, note.clone());
         }
         let Some(worst) = self.worst() else { return };
         let mut kinds = ModelKind::all(settings.seed).into_iter();
@@ -222,8 +222,8 @@ impl Validated<'_> {
                 parts.push(Part::Figure(Figure::new(self.id("left-out"), chart)));
             }
             Err(error) => {
-                let text = format!("{title}: no picture of a left-out speed: {error}");
-                content.warn(ToDo::AddRuns, text);
+                let text = format!("no picture of a left-out speed: {error}");
+                content.warn(ToDo::AddRuns, title, text);
             }
         }
     }
@@ -264,14 +264,14 @@ impl Validated<'_> {
             Ok(curve) => {
                 self.add_curve(parts, &model, &curve);
                 for warning in &curve.warnings {
-                    let text = format!("{title}, prediction at {}: {warning}", km_per_h(speed));
-                    content.warn(ToDo::AddRuns, text);
+                    let about = format!("{title}, prediction at {}", km_per_h(speed));
+                    content.warn(ToDo::AddRuns, &about, warning.to_string());
                 }
                 predicted = Some(curve);
             }
             Err(error) => {
-                let text = format!("{title}: no curve at {}: {error}", km_per_h(speed));
-                content.warn(ToDo::AddRuns, text);
+                let text = format!("no curve at {}: {error}", km_per_h(speed));
+                content.warn(ToDo::AddRuns, title, text);
             }
         }
         if let Ok(set) = TrainingSet::new(group, *cases)

@@ -83,7 +83,13 @@ pub(crate) enum Part {
 
 impl Part {
     fn table(caption: impl Into<String>, table: impl Into<Table>) -> Self {
-        Self::Table { caption: caption.into(), table: table.into() }
+        let mut table = table.into();
+        for cell in table.rows.iter_mut().flatten() {
+            if let Some(number) = cell.text.strip_prefix('-') {
+                cell.text = format!("−{number}");
+            }
+        }
+        Self::Table { caption: caption.into(), table }
     }
 }
 
@@ -134,7 +140,14 @@ impl ToDo {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Warnings {
     what_to_do: &'static str,
-    texts: Vec<String>,
+    texts: Vec<Warning>,
+}
+
+/// What is warned of, and what it is said of.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Warning {
+    about: Vec<String>,
+    text: String,
 }
 
 /// All that the page shows.
@@ -151,8 +164,8 @@ pub(crate) struct Content {
 }
 
 impl Content {
-    /// A warning, once.
-    fn warn(&mut self, what: ToDo, warning: String) {
+    /// A warning, once for all that it is said of.
+    fn warn(&mut self, what: ToDo, about: &str, text: String) {
         let what_to_do = what.text();
         let group = match self.warnings.iter_mut().find(|of| of.what_to_do == what_to_do) {
             Some(group) => group,
@@ -161,8 +174,11 @@ impl Content {
                 self.warnings.last_mut().expect("it was just added")
             }
         };
-        if !group.texts.contains(&warning) {
-            group.texts.push(warning);
+        let about = about.to_string();
+        match group.texts.iter_mut().find(|warning| warning.text == text) {
+            Some(warning) if warning.about.contains(&about) => {}
+            Some(warning) => warning.about.push(about),
+            None => group.texts.push(Warning { about: vec![about], text }),
         }
     }
 
@@ -209,6 +225,12 @@ pub(crate) fn report(
     }
     side_by_side::add_scenarios(&mut content, ran)?;
     group::add_sources(&mut content, groups.iter().flat_map(|(_, _, cases)| *cases));
+    if !scenarios.is_empty() {
+        content.verdict(Verdict::known(
+            "All scenarios",
+            "these values come from one-dimensional models, say nothing about survival space, and are not evidence of conformity".into(),
+        ));
+    }
     // Breaches first, then what is not known.
     let urgency = |verdict: &Verdict| match verdict.state {
         "over" => 0,
@@ -364,7 +386,10 @@ mod tests {
             about: vec![name.into()],
             figures: vec![KeyFigure { value: name.into(), name: name.into() }],
             verdicts: vec![Verdict { state: "over", about: name.into(), text: name.into() }],
-            warnings: vec![Warnings { what_to_do: "", texts: vec![name.into()] }],
+            warnings: vec![Warnings {
+                what_to_do: "",
+                texts: vec![Warning { about: vec![name.into()], text: name.into() }],
+            }],
             sections: vec![Section {
                 id: "s1".into(),
                 title: name.into(),

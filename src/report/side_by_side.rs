@@ -7,7 +7,7 @@ use super::{Content, Part, Section, energy, force, metres, percent};
 use crate::charts::{self, Motion, Quantity};
 use crate::error::Error;
 use crate::table::Table;
-use crate::unit::km_per_h;
+use crate::unit::{Shown, km_per_h};
 
 /// Adds a section at the front, if there are designs to compare.
 pub(super) fn add_designs(content: &mut Content, designs: &[Design]) {
@@ -42,6 +42,8 @@ pub(super) fn add_scenarios(content: &mut Content, ran: Vec<Ran>) -> Result<(), 
     let is_alike: Vec<bool> = (0..ran.len())
         .map(|k| (0..ran.len()).any(|other| other != k && are_alike(&ran[k], &ran[other])))
         .collect();
+    let apart: Vec<String> =
+        ran.iter().zip(&is_alike).filter(|(_, is)| !**is).map(|(of, _)| of.name.clone()).collect();
     let ran: Vec<Ran> =
         ran.into_iter().zip(is_alike).filter(|(_, is)| *is).map(|(r, _)| r).collect();
     if ran.len() < 2 {
@@ -49,19 +51,31 @@ pub(super) fn add_scenarios(content: &mut Content, ran: Vec<Ran>) -> Result<(), 
     }
     let vehicles = names(ran.iter().flat_map(|of| &of.vehicles).map(|(name, _)| name));
     let interfaces = names(ran.iter().flat_map(|of| &of.interfaces).map(|(name, _)| name));
-    let mut parts = Vec::new();
+    let conditions = Table::of(&ran)
+        .column("scenario", |of| &of.name)
+        .column("impact", |of| &of.impact)
+        .column("curves", |of| &of.curves);
+    let mut parts = vec![Part::table("What is compared", conditions)];
+    if !apart.is_empty() {
+        let apart = apart.join(", ");
+        parts.push(Part::Text(format!("Not compared, because the vehicles are others: {apart}.")));
+    }
     let g = |digits: usize| move |g: f64| format!("{g:.digits$} g");
     let m_per_s = |v: f64| format!("{v:.1} m/s");
     let of_vehicles = |k: usize| move |of: &Ran, name: &str| found(&of.vehicles, name)?[k];
     let of_interfaces = |k: usize| move |of: &Ran, name: &str| found(&of.interfaces, name)?[k];
     let vehicle = Beside { what: "vehicle", names: &vehicles, ran: &ran };
     let interface = Beside { what: "interface", names: &interfaces, ran: &ran };
-    parts.push(vehicle.part("Mean deceleration", of_vehicles(0), g(2)));
+    parts.push(vehicle.part("Mean deceleration, each over its own contact", of_vehicles(0), g(2)));
     parts.push(vehicle.part("Peak deceleration (CFC 60)", of_vehicles(1), g(1)));
-    parts.push(vehicle.part("Secondary impact after 0.6 m", of_vehicles(2), m_per_s));
-    parts.push(vehicle.part("Occupant load", of_vehicles(3), g(1)));
+    parts.push(vehicle.part("Largest 120 ms mean of the deceleration", of_vehicles(2), g(2)));
+    parts.push(vehicle.part("Secondary impact after 0.6 m", of_vehicles(3), m_per_s));
+    parts.push(vehicle.part("Occupant load", of_vehicles(4), g(1)));
     parts.push(interface.part("Maximum crush", of_interfaces(0), metres));
-    parts.push(interface.part("Energy taken", of_interfaces(1), energy));
+    let energies = ran.iter().flat_map(|of| &of.interfaces).filter_map(|(_, [_, energy])| *energy);
+    let shown = Shown::energy(energies.fold(0.0, f64::max));
+    parts
+        .push(interface.part("Energy absorbed", of_interfaces(1), |energy_j| shown.text(energy_j)));
     let runs: Vec<(String, Motion)> = ran.into_iter().map(|of| (of.name, of.motion)).collect();
     for (id, quantity, what) in [
         ("both-speeds", Quantity::Velocity, "Speeds"),

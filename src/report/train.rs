@@ -19,9 +19,13 @@ use crate::unit::{Shown, km_per_h};
 /// A scenario that was run.
 pub(super) struct Ran {
     pub name: String,
+    /// Trains and speeds.
+    pub impact: String,
+    /// Curve and source, of each curve.
+    pub curves: String,
     pub motion: Motion,
-    /// By vehicle: mean and largest filtered deceleration, in g, and what its occupants meet.
-    pub vehicles: Vec<(String, [Option<f64>; 4])>,
+    /// By vehicle: mean, largest filtered and largest 120 ms mean deceleration, in g, and what its occupants meet.
+    pub vehicles: Vec<(String, [Option<f64>; 5])>,
     /// By interface: largest crush in m and energy in J.
     pub interfaces: Vec<(String, [Option<f64>; 2])>,
 }
@@ -32,7 +36,7 @@ const SHOWN: [(Quantity, &str); 5] = [
     (Quantity::Acceleration, "accelerations"),
     (Quantity::Force, "forces over time"),
     (Quantity::Crush, "force over crush at each interface"),
-    (Quantity::Energy, "energy taken by each interface, and still kinetic"),
+    (Quantity::Energy, "energy absorbed at each interface, and remaining kinetic energy"),
 ];
 
 /// Runs a scenario and adds its section; with FE's run as reference also the comparison of methods.
@@ -47,19 +51,20 @@ pub(super) fn add(
     let number = content.sections.len() + 1;
     let name = file_name(path);
     let summary = prepared.summary(&run);
-    add_verdicts(content, &name, &summary);
+    let uncertainty = origins.iter().filter_map(|of| Some(of.left_out.as_ref()?.force_l1));
+    add_verdicts(content, &name, &summary, uncertainty.fold(0.0, f64::max));
     let mut parts = vec![
         Part::Text(conditions(&prepared, &read.run.duration.0, &run)),
         Part::table("Vehicles", vehicles(&summary)),
     ];
-    parts.extend(summary.limits.as_ref().map(|of| Part::Text(sentence(&of.statement))));
+    parts.push(Part::Text(VEHICLES.into()));
     parts.push(Part::table("Interfaces", interfaces(&summary)));
     parts.push(Part::Text(ledger(&run.ledger)));
     parts.push(Part::table("What drives the interfaces", curves(&origins)));
     parts.push(Part::table("Sequence", sequence(&summary)));
     if let Some(time_s) = summary.common_speed_time_s {
         let what = if prepared.chain.bodies().len() > prepared.meeting + 1 {
-            "The trains have a common speed"
+            "The centres of mass of both trains first have one speed"
         } else {
             "The train stands"
         };
@@ -75,10 +80,10 @@ pub(super) fn add(
     let key = KeyFigure { value: metres(crush), name: format!("maximum crush, {name}") };
     content.figures.push(key);
     for warning in &prepared.warnings {
-        content.warn(ToDo::CheckScenario, format!("{name}: {warning}"));
+        content.warn(ToDo::CheckScenario, &name, warning.clone());
     }
     for warning in run.all_warnings() {
-        content.warn(ToDo::CheckScenario, format!("{name}: {warning}"));
+        content.warn(ToDo::CheckScenario, &name, warning);
     }
     if read.reference.is_some() && settings.methods != MethodSpeeds::None {
         let (seed, nsdm_seeds) = (settings.seed, settings.nsdm_seeds);
@@ -99,6 +104,12 @@ pub(super) fn add(
             .map(|of| (of.name.into(), [Some(of.history.max_deflection_m), of.energy_j]))
             .collect(),
         motion: runs.into_iter().next().map(|(_, motion)| motion).expect("there is one"),
+        impact: impact(&prepared),
+        curves: origins
+            .iter()
+            .map(|of| format!("{}: {}", of.curve, of.what))
+            .collect::<Vec<String>>()
+            .join("; "),
         name: name.clone(),
     };
     let (id, title) = (format!("scenario-{number}"), format!("Scenario {name}"));
@@ -106,12 +117,13 @@ pub(super) fn add(
     Ok(ran)
 }
 
-fn of_vehicles(summary: &Summary<'_>) -> Vec<(String, [Option<f64>; 4])> {
+fn of_vehicles(summary: &Summary<'_>) -> Vec<(String, [Option<f64>; 5])> {
     let vehicles = summary.bodies.iter().filter(|body| !body.is_crush_zone);
     let numbers = vehicles.map(|body| {
         let of = [
             Some(body.mean_deceleration_g),
             body.peak_deceleration_g,
+            body.moving_mean_deceleration_g,
             body.secondary_impact_m_per_s,
             body.occupant_load_g,
         ];
@@ -121,9 +133,11 @@ fn of_vehicles(summary: &Summary<'_>) -> Vec<(String, [Option<f64>; 4])> {
 }
 
 /// What is over a limit, what is not known, and where most of the energy goes.
-fn add_verdicts(content: &mut Content, name: &str, summary: &Summary<'_>) {
+///
+/// `force_error` is the largest mean error of its curves at left-out speeds: what is nearer to a limit is too close to call.
+fn add_verdicts(content: &mut Content, name: &str, summary: &Summary<'_>, force_error: f64) {
     if let Some(limits) = &summary.limits {
-        add_limits(content, name, summary, limits);
+        add_limits(content, name, summary, limits, force_error);
     } else {
         let text = "no limits are stated ([limits] in the scenario)".into();
         content.verdict(Verdict::known(name, text));
@@ -134,7 +148,7 @@ fn add_verdicts(content: &mut Content, name: &str, summary: &Summary<'_>) {
         && let Some((energy_j, share)) = of.energy_j.zip(of.energy_share)
     {
         let text = format!(
-            "most energy is taken at {}: {} ({})",
+            "most energy is absorbed at {}: {}, {} of what all interfaces absorb",
             of.name,
             energy(energy_j),
             percent(share)
@@ -153,9 +167,15 @@ fn add_verdicts(content: &mut Content, name: &str, summary: &Summary<'_>) {
     }
 }
 
-fn add_limits(content: &mut Content, name: &str, summary: &Summary<'_>, limits: &Limits<'_>) {
+fn add_limits(
+    content: &mut Content,
+    name: &str,
+    summary: &Summary<'_>,
+    limits: &Limits<'_>,
+    force_error: f64,
+) {
     let what = format!(
-        "mean deceleration over {} g ({}:{})",
+        "mean deceleration above {} g ({}:{})",
         limits.mean_deceleration_limit_g, limits.standard, limits.edition
     );
     let mut verdict = |state, text| content.verdict(Verdict { state, about: name.into(), text });
@@ -176,6 +196,24 @@ fn add_limits(content: &mut Content, name: &str, summary: &Summary<'_>, limits: 
     } else {
         verdict("over", format!("{what}: {}", over.join(", ")));
     }
+    let limit_g = limits.mean_deceleration_limit_g;
+    let is_close = |g: f64| (g.abs() / limit_g - 1.0).abs() < force_error;
+    let close = summary
+        .bodies
+        .iter()
+        .filter(|body| !body.is_crush_zone && is_close(body.mean_deceleration_g));
+    let close: Vec<String> =
+        close.map(|body| format!("{} ({:.2} g)", body.name, body.mean_deceleration_g)).collect();
+    if !close.is_empty() && limits.beyond_data.is_empty() {
+        verdict(
+            "unknown",
+            format!(
+                "closer to the limit of {limit_g} g than the curves' own mean force error of {}: {}",
+                percent(force_error),
+                close.join(", ")
+            ),
+        );
+    }
     for of in &limits.occupants {
         let state =
             match (of.over.is_empty(), of.unknown.is_empty() && limits.beyond_data.is_empty()) {
@@ -187,32 +225,31 @@ fn add_limits(content: &mut Content, name: &str, summary: &Summary<'_>, limits: 
     }
 }
 
-/// Trains, speeds, and how the motion was integrated.
-fn conditions(prepared: &Prepared, duration_s: &f64, run: &Run) -> String {
-    let bodies = prepared.chain.bodies();
-    let (first, second) = bodies.split_at(prepared.meeting + 1);
+/// Masses and speeds of the trains.
+fn impact(prepared: &Prepared) -> String {
+    let (first, second) = prepared.chain.bodies().split_at(prepared.meeting + 1);
     let of = |bodies: &[Body]| {
         let total_kg = bodies.iter().map(|body| body.mass_kg).sum();
         let speed = bodies.first().map_or(0.0, |body| body.speed_m_per_s);
-        (mass(total_kg), km_per_h(speed))
+        format!("{} at {}", mass(total_kg), km_per_h(speed))
     };
-    let (first_mass, first_speed) = of(first);
-    let against = if second.is_empty() {
-        "against a wall".into()
-    } else {
-        let (mass, speed) = of(second);
-        format!("against {mass} at {speed}")
-    };
+    let against = if second.is_empty() { "a wall".into() } else { of(second) };
+    format!("{} against {against}", of(first))
+}
+
+/// The same, and how the motion was integrated.
+fn conditions(prepared: &Prepared, duration_s: &f64, run: &Run) -> String {
+    let count = prepared.chain.bodies().len();
     let method = match prepared.settings.method {
         Method::Verlet => "velocity Verlet",
         Method::FourthOrder => "a method of order 4",
         Method::Reference => "the reference method",
     };
     format!(
-        "{first_mass} at {first_speed} {against}; {} in a row over {:.0} ms, by {}, in steps of {:.3} ms. Speeds are positive in the direction of the first train.",
-        if bodies.len() == 1 { "1 body".into() } else { format!("{} bodies", bodies.len()) },
+        "{}: {} on one line, over {:.0} ms by {method} in steps of {:.3} ms. Speeds are positive in the direction of the first train.",
+        impact(prepared),
+        if count == 1 { "1 body".into() } else { format!("{count} bodies") },
         1e3 * duration_s,
-        method,
         1e3 * run.step_s
     )
 }
@@ -228,7 +265,7 @@ fn ledger(ledger: &Ledger) -> String {
     let further: String =
         further.map(|(what, energy_j)| format!(", {} {what}", energy(energy_j))).collect();
     format!(
-        "Of {} at first, {} are still kinetic at the end, {} stored, {} dissipated{further}; the balance closes within {:.0e} of it.",
+        "Energy: {} before the impact; at the end {} kinetic, {} stored, {} dissipated{further}; the balance closes within {:.0e} of it.",
         energy(ledger.initial_kinetic_j),
         energy(ledger.kinetic_j),
         energy(ledger.stored_j),
@@ -237,12 +274,8 @@ fn ledger(ledger: &Ledger) -> String {
     )
 }
 
-/// With a capital and a full stop.
-fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    let first: String = letters.next().map(|c| c.to_uppercase().collect()).unwrap_or_default();
-    format!("{first}{}.", letters.as_str())
-}
+/// What the columns of vehicles mean.
+const VEHICLES: &str = "Positive: slowed down in the direction of the first train. Mean deceleration: while the net contact force acts for the first time, until it ends or changes its sign. Secondary impact: speed of an unrestrained occupant against the interior after 0.6 m. Occupant load: deceleration that stops an occupant within 235 mm after 65 mm of slack.";
 
 /// Masses, speeds and decelerations.
 fn vehicles(summary: &Summary<'_>) -> impl Into<Table> {
@@ -255,7 +288,7 @@ fn vehicles(summary: &Summary<'_>) -> impl Into<Table> {
         })
         .column("peak (CFC 60)", |body| body.peak_text().unwrap_or_else(missing))
         .column("mean deceleration", |body| body.mean_text())
-        .column("over 120 ms", |body| {
+        .column("120 ms mean", |body| {
             body.moving_mean_deceleration_g.map_or_else(missing, |a| format!("{a:.2} g"))
         })
         .column("secondary impact", |body| {
@@ -275,15 +308,15 @@ fn interfaces(summary: &Summary<'_>) -> impl Into<Table> {
         .column("interface", |of| of.name)
         .column("peak force", move |of| force.text(of.history.peak_force_n))
         .column("maximum crush", |of| metres(of.history.max_deflection_m))
-        .column("at", |of| format!("{:.1} ms", 1e3 * of.history.max_deflection_time_s))
-        .column("energy lost", |of| {
+        .column("time of it", |of| format!("{:.1} ms", 1e3 * of.history.max_deflection_time_s))
+        .column("energy dissipated", |of| {
             energy.text(of.history.dissipated_at_end_j + of.history.damped_j.unwrap_or(0.0))
         })
         .column("energy stored", |of| energy.text(of.history.stored_at_end_j))
         .column("share of energy", |of| of.energy_share.map_or("–".into(), percent))
         .column("curve", |of| &of.used.curve)
-        .column("force", |of| of.used.force.unwrap_or("unknown"))
-        .column("curve for", |of| of.used.speed_m_per_s.map_or("–".into(), km_per_h))
+        .column("which force", |of| of.used.force.unwrap_or("unknown"))
+        .column("curve for a speed of", |of| of.used.speed_m_per_s.map_or("–".into(), km_per_h))
 }
 
 /// Where each curve comes from, and how wrong its model was at speeds that it did not know.
@@ -303,7 +336,7 @@ fn curves(origins: &[CurveOrigin]) -> impl Into<Table> {
             None => "–".into(),
         })
         .column("left-out force error", |of| left_out(of, |means| means.force_l1))
-        .column("velocity", |of| left_out(of, |means| means.velocity_l1))
+        .column("left-out velocity error", |of| left_out(of, |means| means.velocity_l1))
         .column("as stated", |of| if of.stated.is_empty() { "–" } else { &of.stated })
 }
 

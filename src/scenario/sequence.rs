@@ -38,7 +38,7 @@ impl Happening {
             Self::Stage { name } => format!("{name} begins"),
             Self::BeyondData => "crushed beyond the data of its curve".into(),
             Self::LargestCrush => "largest crush".into(),
-            Self::Opened => "open again".into(),
+            Self::Opened => "separation".into(),
             Self::ContactAgain => "contact again".into(),
         }
     }

@@ -142,7 +142,7 @@ impl OccupantLimit<'_> {
             [] => String::new(),
             names => format!("; the run ended before it is known of {}", names.join(", ")),
         };
-        format!("{what} over {} {unit}: {known}{unknown}", self.limit)
+        format!("{what} above {} {unit}: {known}{unknown}", self.limit)
     }
 }
 

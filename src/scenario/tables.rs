@@ -95,7 +95,7 @@ pub(crate) struct RunTable {
     /// How the motion is integrated.
     #[serde(default)]
     pub(crate) method: Method,
-    /// Which speed an interface's model curve is predicted for.
+    /// Which speed an interface's model curve is predicted for; `local` if absent.
     #[serde(default)]
     pub(crate) interface_speed: InterfaceSpeed,
 }
