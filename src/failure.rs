@@ -113,6 +113,11 @@ impl ErrorDocument {
     }
 }
 
+/// The document that `--json` prints for an error, as JSON.
+pub fn error_json(error: &(dyn Error + 'static)) -> String {
+    serde_json::to_string(&ErrorDocument::new(error)).unwrap_or_default()
+}
+
 /// The question of a message, as `guess` puts it, or the tip for a wrong command line.
 fn hint(message: &str) -> Option<String> {
     if let Some((_, tip)) = message.split_once("tip: ") {

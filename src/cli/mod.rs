@@ -32,6 +32,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 #[cfg(unix)]
 use std::sync::Arc;
+use std::sync::OnceLock;
 
 use crate::error::ErrorCode;
 use crate::failure::{self, DONE, DONE_WITH_WARNINGS, ErrorDocument, FAILED, USAGE};
@@ -263,12 +264,15 @@ fn survive_file_size_limit() {
 #[cfg(not(unix))]
 fn survive_file_size_limit() {}
 
-/// The command line; a wrong one, and what `--help` and `--version` ask for, ends the program here.
-fn arguments() -> Result<Cli, ExitCode> {
-    let arguments: Vec<OsString> = std::env::args_os().collect();
+/// The command line that was given, for what repeats it.
+static GIVEN: OnceLock<Vec<OsString>> = OnceLock::new();
+
+/// The command line; a wrong one, and what `--help` and `--version` ask for, ends the program here, with its exit code.
+fn parsed(arguments: Vec<OsString>) -> Result<Cli, u8> {
+    let _ = GIVEN.set(arguments.clone());
     if arguments.len() < 2 {
         output::eprint_line(&shell::short_help());
-        return Err(ExitCode::from(USAGE));
+        return Err(USAGE);
     }
     let wants_json =
         arguments.iter().take_while(|word| *word != "--").any(|word| *word == "--json");
@@ -285,7 +289,7 @@ fn arguments() -> Result<Cli, ExitCode> {
             // With standard error closed nobody would read it.
             let _ = error.print();
         }
-        ExitCode::from(if error.use_stderr() { USAGE } else { DONE })
+        if error.use_stderr() { USAGE } else { DONE }
     })
 }
 
@@ -311,14 +315,19 @@ fn print_document(document: &ErrorDocument) {
 }
 
 pub fn main() -> ExitCode {
+    ExitCode::from(run_program(std::env::args_os().collect()))
+}
+
+/// The program with these arguments, the first its own name; its exit code.
+pub fn run_program(arguments: Vec<OsString>) -> u8 {
     survive_file_size_limit();
-    let cli = match arguments() {
+    let cli = match parsed(arguments) {
         Ok(cli) => cli,
         Err(code) => return code,
     };
     let options = cli.options;
     file::accept_changed(options.accept_changed);
-    ExitCode::from(match run(cli.command, options) {
+    match run(cli.command, options) {
         Ok(Outcome::Clean) => DONE,
         Ok(Outcome::Warned) if options.strict => DONE_WITH_WARNINGS,
         Ok(Outcome::Warned) => DONE,
@@ -332,7 +341,7 @@ pub fn main() -> ExitCode {
             }
             if failure::code(&*error) == ErrorCode::Usage { USAGE } else { FAILED }
         }
-    })
+    }
 }
 
 fn run(command: Command, options: GlobalOptions) -> CommandResult {

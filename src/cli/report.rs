@@ -9,7 +9,9 @@ use crate::report::{MethodSpeeds, ReportSettings, report};
 
 use super::arguments::{self, FileKind, one_of};
 use super::output::{self, Bar};
-use super::{CommandResult, Failure, GlobalOptions, Outcome, keep_input, keep_inputs, usage};
+use super::{
+    CommandResult, Failure, GIVEN, GlobalOptions, Outcome, keep_input, keep_inputs, usage,
+};
 
 /// Write one self-contained HTML page: verdicts, curves, validation, predictions, methods, train results
 #[derive(clap::Args)]
@@ -63,7 +65,8 @@ fn command() -> String {
         true => argument,
         false => format!("'{}'", argument.replace('\'', r"'\''")),
     };
-    let arguments = std::env::args_os().skip(1).map(|a| quoted(a.to_string_lossy().into_owned()));
+    let given = GIVEN.get().into_iter().flatten().skip(1);
+    let arguments = given.map(|a| quoted(a.to_string_lossy().into_owned()));
     std::iter::once("crumple".to_string()).chain(arguments).collect::<Vec<_>>().join(" ")
 }
 

@@ -1,0 +1,340 @@
+"""Force-deflection curves for multi-body crash models, from the histories of FE runs.
+
+Values of databases, models and runs are SI: m, s, N, kg, J. Histories are in the units of their file.
+"""
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from crumple import _crumple
+from crumple._commands import Warned, build, init, rate, run, sweep, train, validate
+from crumple._errors import Error
+
+__version__ = _crumple.__version__
+__all__ = [
+    "Case", "Component", "Curve", "Database", "Error", "Group", "Histories", "Model", "Run", "Section", "Warned",
+    "build", "init", "rate", "read", "run", "simulate", "sweep", "train", "validate",
+]
+
+
+def _array(floats):
+    """The numbers, without a copy; they cannot be written to."""
+    return np.frombuffer(floats, dtype=np.float64)
+
+
+def _id(text):
+    """An id as users write it: a number where it is one."""
+    return int(text) if text is not None and text.lstrip("-").isdigit() else text
+
+
+class _Mapping(Mapping):
+    """A mapping over a dict, which says what there is if something is not."""
+
+    _what = "key"
+
+    def __init__(self, items):
+        self._items = items
+
+    def __getitem__(self, name):
+        try:
+            return self._items[name]
+        except KeyError:
+            known = ", ".join(map(str, self._items))
+            raise KeyError(f"there is no {self._what} {name!r}: expected one of {known}") from None
+
+    def __iter__(self):
+        return iter(self._items)
+
+    def __len__(self):
+        return len(self._items)
+
+    def __repr__(self):
+        return f"<{type(self).__name__}: {', '.join(map(str, self._items)) or 'empty'}>"
+
+
+class Component(_Mapping):
+    """One component of a section: an array per id, over time; `None` is the id of a global quantity.
+
+    `ids` and `titles` are lists, `time` has shape (states,), `array` (states, ids) in the file's units. NaN stands where
+    the file holds no number.
+    """
+
+    _what = "id"
+
+    def __contains__(self, entity):
+        return (entity if entity is None else _id(str(entity))) in self._items
+
+    def __init__(self, name, time, arrays, titles):
+        super().__init__(arrays)
+        self.name, self.time, self._titles = name, time, titles
+
+    @property
+    def ids(self):
+        return list(self._items)
+
+    @property
+    def titles(self):
+        return [self._titles.get(entity) for entity in self._items]
+
+    @property
+    def array(self):
+        """All ids beside one another, as a new array of shape (states, ids)."""
+        return np.column_stack(list(self._items.values()))
+
+    def __getitem__(self, entity):
+        """The values of an id, given as a number, as text ("3:surfa"), or None."""
+        return super().__getitem__(entity if entity is None else _id(str(entity)))
+
+
+class Section(_Mapping):
+    """A section of a file: components by name. `time` has shape (states,), in the file's unit.
+
+    `problems` says what is damaged or missing, `notes` what was done to the values.
+    """
+
+    _what = "component"
+
+    def __init__(self, name, title, solver, problems, notes, time, histories):
+        self.name, self.title, self.solver, self.problems, self.notes = name, title, solver, problems, notes
+        self.time = _array(time)
+        arrays, titles = {}, {}
+        for component, entity, entity_title, values in histories:
+            arrays.setdefault(component, {})[_id(entity)] = _array(values)
+            titles[_id(entity)] = entity_title
+        super().__init__({name: Component(name, self.time, of, titles) for name, of in arrays.items()})
+
+    def _columns(self):
+        for component in self.values():
+            for entity, values in component.items():
+                yield component.name, entity, values
+
+    def to_pandas(self):
+        """A DataFrame over time with columns (component, id)."""
+        import pandas as pd
+
+        columns = {(component, "" if entity is None else entity): values for component, entity, values in self._columns()}
+        frame = pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
+        frame.columns = pd.MultiIndex.from_tuples(frame.columns, names=["component", "id"])
+        return frame
+
+    def to_polars(self):
+        """A DataFrame with the column `time` and one for each history, named as by `crumple histories`."""
+        import polars as pl
+
+        columns = {c if e is None else f"{c}[{e}]": v for c, e, v in self._columns()}
+        return pl.DataFrame({"time": self.time, **columns})
+
+    def to_xarray(self):
+        """A Dataset with a variable for each component, over time and id; global quantities over time alone."""
+        import xarray as xr
+
+        variables = {}
+        for name, component in self.items():
+            is_global = component.ids == [None]
+            # Each component has its own ids where these differ.
+            dims = ("time",) if is_global else ("time", self._dimension(component))
+            variables[name] = (dims, component[None] if is_global else component.array)
+        coords = {"time": self.time}
+        for component in self.values():
+            if component.ids != [None]:
+                coords[self._dimension(component)] = component.ids
+        return xr.Dataset(variables, coords=coords, attrs={"title": self.title or ""})
+
+    def _dimension(self, component):
+        all_ids = [other.ids for other in self.values() if other.ids != [None]]
+        return "id" if all(ids == all_ids[0] for ids in all_ids) else f"id_{component.name}"
+
+
+class Histories(_Mapping):
+    """What a solver wrote: sections by name. A text file has one, named after its format."""
+
+    _what = "section"
+
+    def __init__(self, path, sections):
+        super().__init__({section.name: section for section in sections})
+        self.path = path
+
+    @property
+    def problems(self):
+        """What is damaged or missing, of all sections."""
+        return [problem for section in self.values() for problem in section.problems]
+
+    def only(self):
+        """The only section."""
+        if len(self) != 1:
+            raise ValueError(f"there are {len(self)} sections: choose one of {', '.join(self)}")
+        return next(iter(self.values()))
+
+    def to_pandas(self):
+        """Of the only section."""
+        return self.only().to_pandas()
+
+    def to_polars(self):
+        """Of the only section."""
+        return self.only().to_polars()
+
+    def to_xarray(self):
+        """Of the only section."""
+        return self.only().to_xarray()
+
+
+def read(path, ids=None, components=None, section=None, format=None):
+    """Read a solver's file: any that the program reads (nodout, rcforc, binout, T01, ...).
+
+    Only what is selected is parsed: `ids` (numbers, or texts such as "3:surfa"), `components` (named as in binout), a
+    `section` of a binout. Damage is no error: `problems` names it.
+
+    Raises `crumple.Error` if the file cannot be opened or read.
+    """
+    wanted = None if ids is None else [str(entity) for entity in ids]
+    sections = _crumple.read(os.fspath(path), wanted, components and list(components), section, format)
+    return Histories(Path(path), [Section(*of) for of in sections])
+
+
+class Case:
+    """One FE run of a database. Arrays have shape (states,), from contact on.
+
+    `time` in s, `deflection` in m, `force` in N (which one says `force_kind`), `closing_speed` in m/s; `speed` in m/s is
+    measured against what `speed_kind` says, masses are in kg.
+    """
+
+    def __init__(self, name, speed, masses, force_kind, curves, tags, warnings):
+        self.name, (self.speed, self.speed_kind) = name, speed
+        (self.mass, self.other_mass), self.force_kind = masses, force_kind
+        self.time, self.deflection, self.force, self.closing_speed = map(_array, curves)
+        self.tags, self.warnings = tags, warnings
+
+    def __repr__(self):
+        return f"<Case {self.name}: {self.speed * 3.6:.4g} km/h ({self.speed_kind})>"
+
+
+class Group(_Mapping):
+    """Cases by name, in order of speed."""
+
+    _what = "case"
+
+    def to_pandas(self):
+        """A DataFrame of all samples: case, speed, time, deflection, force."""
+        import pandas as pd
+
+        def frame(case):
+            columns = {"time": case.time, "deflection": case.deflection, "force": case.force}
+            return pd.DataFrame({"case": case.name, "speed": case.speed, **columns})
+
+        return pd.concat([frame(case) for case in self.values()], ignore_index=True)
+
+
+class Database(_Mapping):
+    """A curve database: groups by name."""
+
+    _what = "group"
+
+    def __init__(self, path):
+        self.path = Path(path)
+        groups = _crumple.database(os.fspath(path))
+        super().__init__({name: Group({of[0]: Case(*of) for of in cases}) for name, cases in groups})
+
+    def validate(self, group=None, **options):
+        """As `crumple.validate`."""
+        return validate(self.path, group, **options)
+
+    def train(self, output, group=None, **options):
+        """As `crumple.train`."""
+        return train(self.path, output, group, **options)
+
+    def _repr_svg_(self):
+        return _picture(self.path, "--group", next(iter(self))) if len(self) else None
+
+
+class Model:
+    """A trained model: curves at speeds that were never run."""
+
+    def __init__(self, path):
+        self.path = Path(path)
+        self._model = _crumple.TrainedModel(os.fspath(path))
+        self.group, self.name, self.range = self._model.facts()
+
+    def predict(self, speed, extrapolate=False):
+        """The curve at a speed in m/s.
+
+        Raises `crumple.Error` outside the speeds of the runs, unless `extrapolate`.
+        """
+        return Curve(json.loads(self._model.predict(float(speed), extrapolate)))
+
+    def __repr__(self):
+        low, high = (3.6 * speed for speed in self.range)
+        return f"<Model {self.name} of {self.group}, {low:.4g} to {high:.4g} km/h>"
+
+
+class Curve:
+    """A predicted curve. `deflection` in m, `force` and `body_force` in N, `band` a pair of arrays in N, or None.
+
+    `document` is what `crumple predict --json` prints.
+    """
+
+    def __init__(self, document):
+        def array(key):
+            return None if document.get(key) is None else np.array(document[key])
+
+        self.document = document
+        self.speed, self.max_deflection = document["speed_m_per_s"], document["max_deflection_m"]
+        self.deflection, self.force = array("deflection_m"), array("force_N")
+        self.body_force = array("body_force_N")
+        low, high = array("force_low_N"), array("force_high_N")
+        self.band = None if low is None or high is None else (low, high)
+        self.warnings = document.get("warnings", [])
+
+    def export(self, output, to=None, **options):
+        """Write the curve for another tool; the format is that of the extension, or `to`: lsdyna, modelica, fmi3, ...
+
+        Options are those of `crumple export`: `force="contact"`, `units="mm-t-s"`.
+        """
+        from crumple._commands import _options
+
+        with tempfile.TemporaryDirectory() as folder:
+            curve = Path(folder) / "curve.json"
+            curve.write_text(json.dumps(self.document))
+            return run("export", curve, "-o", output, *_options({"to": to, **options}))
+
+    def _repr_svg_(self):
+        with tempfile.TemporaryDirectory() as folder:
+            curve = Path(folder) / "curve.json"
+            curve.write_text(json.dumps(self.document))
+            return _picture(curve)
+
+    def __repr__(self):
+        return f"<Curve at {self.speed * 3.6:.4g} km/h up to {self.max_deflection:.3f} m>"
+
+
+class Run(_Mapping):
+    """A multi-body run: arrays over time by column, such as `v_m_per_s[A1]`; `summary` and `ledger` are dicts."""
+
+    _what = "column"
+
+    def __init__(self, document):
+        self.summary, self.ledger = document.pop("summary"), document.pop("ledger")
+        self.warnings = document.pop("warnings")
+        super().__init__({name: np.array(values) for name, values in document.items()})
+
+    def to_pandas(self):
+        """A DataFrame over time."""
+        import pandas as pd
+
+        return pd.DataFrame({name: values for name, values in self.items() if name != "time_s"}, index=pd.Index(self["time_s"], name="time_s"))
+
+
+def simulate(scenario):
+    """Run a scenario (TOML)."""
+    return Run(run("simulate", scenario))
+
+
+def _picture(path, *arguments):
+    with tempfile.TemporaryDirectory() as folder:
+        picture = Path(folder) / "picture.svg"
+        run("plot", path, *arguments, "-o", picture)
+        return picture.read_text()

@@ -1,0 +1,48 @@
+"""The compiled part; its functions give plain tuples and buffers."""
+
+from typing import final
+
+__all__ = ["__version__", "Floats", "TrainedModel", "Forest", "read", "database", "main"]
+
+__version__: str
+
+# A buffer of float64, for numpy.frombuffer.
+@final
+class Floats: ...
+
+type _History = tuple[str, str | None, str | None, Floats]
+type _Section = tuple[str, str | None, str | None, list[str], list[str], Floats, list[_History]]
+type _Case = tuple[str, tuple[float, str], tuple[float, float | None], str, list[Floats], list[str], list[str]]
+
+def read(
+    path: str, ids: list[str] | None, components: list[str] | None, section_name: str | None, format: str | None
+) -> list[_Section]: ...
+def database(path: str) -> list[tuple[str, list[_Case]]]: ...
+def main(arguments: list[str]) -> int: ...
+
+@final
+class TrainedModel:
+    def __new__(cls, path: str) -> TrainedModel: ...
+    def facts(self) -> tuple[str, str, tuple[float, float]]: ...
+    def predict(self, speed_m_per_s: float, extrapolate: bool) -> str: ...
+
+@final
+class Forest:
+    @staticmethod
+    def fit(
+        x: bytes,
+        features: int,
+        y: bytes,
+        trees: int,
+        seed: int,
+        max_depth: int | None,
+        min_samples_leaf: int,
+        max_features: int | None,
+        bootstrap: bool,
+        random_thresholds: bool,
+    ) -> Forest: ...
+    def predict(self, x: bytes, features: int) -> Floats: ...
+    def importance(self) -> Floats | None: ...
+    def to_json(self) -> str: ...
+    @staticmethod
+    def of_json(json: str) -> Forest: ...

@@ -1,0 +1,302 @@
+//! The Python module: histories, databases and predictions as arrays, and the program itself.
+//!
+//! Functions give plain tuples and buffers; `crumple/__init__.py` makes of them what a user meets.
+
+use std::ffi::{OsString, c_int};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use crumple::curve::Case;
+use crumple::database::Database;
+use crumple::failure::error_json;
+use crumple::forest::{
+    FeaturesPerSplit, ForestError, ForestParams, RegressionForest, Thresholds, Ties,
+};
+use crumple::solver::{self, Selection, SolverFile, WantedId};
+use crumple::surrogate::{Model, Query, predict};
+use linfa::prelude::*;
+use ndarray::{Array1, Array2};
+use pyo3::exceptions::{PyBufferError, PyValueError};
+use pyo3::ffi;
+use pyo3::prelude::*;
+use pyo3::types::PyModule;
+
+/// Numbers that NumPy shows without a copy.
+#[pyclass(frozen, module = "crumple._crumple")]
+struct Floats(Numbers);
+
+enum Numbers {
+    Own(Vec<f64>),
+    Shared(Arc<[f64]>),
+}
+
+impl Numbers {
+    fn get(&self) -> &[f64] {
+        match self {
+            Self::Own(values) => values,
+            Self::Shared(values) => values,
+        }
+    }
+}
+
+#[pymethods]
+impl Floats {
+    /// # Safety
+    /// `view` is Python's. The numbers never change and live as long as the object, which the view holds.
+    unsafe fn __getbuffer__(
+        slf: Bound<'_, Self>,
+        view: *mut ffi::Py_buffer,
+        flags: c_int,
+    ) -> PyResult<()> {
+        let values = slf.get().0.get();
+        let length = isize::try_from(size_of_val(values))
+            .map_err(|_| PyBufferError::new_err("too large for a buffer"))?;
+        let start = values.as_ptr().cast_mut().cast();
+        // SAFETY: see above; the last but one argument makes it read-only.
+        let code = unsafe { ffi::PyBuffer_FillInfo(view, slf.as_ptr(), start, length, 1, flags) };
+        if code == 0 { Ok(()) } else { Err(PyErr::fetch(slf.py())) }
+    }
+}
+
+fn floats(values: Vec<f64>) -> Floats {
+    Floats(Numbers::Own(values))
+}
+
+/// The error of the library with its document, as `crumple.Error`.
+fn failed(py: Python<'_>, error: &crumple::Error) -> PyErr {
+    let document = error_json(error);
+    match py.import("crumple._errors").and_then(|module| module.getattr("Error")) {
+        Ok(class) => match class.call_method1("of_document", (document,)) {
+            Ok(error) => PyErr::from_value(error),
+            Err(error) => error,
+        },
+        Err(error) => error,
+    }
+}
+
+/// Name of the section, title, solver with its version, damage, notes; times; and by history the component, the id, the
+/// title of the entity and the values.
+type Section = (
+    String,
+    Option<String>,
+    Option<String>,
+    Vec<String>,
+    Vec<String>,
+    Floats,
+    Vec<(String, Option<String>, Option<String>, Floats)>,
+);
+
+fn section(file: SolverFile) -> Section {
+    let titles = file.entities;
+    let histories = file.histories.into_iter().map(|history| {
+        let title = titles
+            .iter()
+            .find(|entity| Some(entity.id) == history.entity)
+            .and_then(|entity| entity.title.clone());
+        let id = history.entity.map(|entity| entity.to_string());
+        (history.component.to_string(), id, title, floats(history.values))
+    });
+    let histories = histories.collect();
+    let solver = [file.solver, file.version].into_iter().flatten().collect::<Vec<_>>().join(" ");
+    (
+        file.section,
+        file.title,
+        Some(solver).filter(|solver| !solver.is_empty()),
+        file.problems.iter().map(ToString::to_string).collect(),
+        file.notes,
+        Floats(Numbers::Shared(file.time)),
+        histories,
+    )
+}
+
+/// All sections of a solver's file.
+#[pyfunction]
+#[pyo3(signature = (path, ids, components, section_name, format))]
+fn read(
+    py: Python<'_>,
+    path: PathBuf,
+    ids: Option<Vec<String>>,
+    components: Option<Vec<String>>,
+    section_name: Option<String>,
+    format: Option<String>,
+) -> PyResult<Vec<Section>> {
+    let id = |text: String| {
+        text.parse::<WantedId>().map_err(|e| PyValueError::new_err(format!("{text}: {e}")))
+    };
+    let ids = ids.map(|ids| ids.into_iter().map(id).collect::<PyResult<Vec<_>>>()).transpose()?;
+    let is_narrowed = ids.is_some() || components.is_some();
+    let section_given = section_name.is_some();
+    let selection = Selection { ids, components, section: section_name, ..Selection::all() };
+    let read = py.detach(|| {
+        let sections = solver::read_sections(&path, format.as_deref(), &selection)?;
+        // A single section is read as the program does, which knows what is missing and what was meant.
+        if sections.len() == 1 && is_narrowed || sections.is_empty() && section_given {
+            return Ok(vec![solver::read(&path, format.as_deref(), &selection)?]);
+        }
+        Ok(sections)
+    });
+    let sections = read.map_err(|error: crumple::Error| failed(py, &error))?;
+    Ok(sections.into_iter().map(section).collect())
+}
+
+/// Name, speed in m/s and its kind, masses in kg, force's kind; times, deflections, forces and closing speeds; tags,
+/// warnings.
+type DatabaseCase = (
+    String,
+    (f64, &'static str),
+    (f64, Option<f64>),
+    &'static str,
+    [Floats; 4],
+    Vec<String>,
+    Vec<String>,
+);
+
+fn case(case: &Case) -> DatabaseCase {
+    let (curves, conditions) = (&case.curves, &case.conditions);
+    (
+        case.id.name.clone(),
+        (conditions.speed.m_per_s, conditions.speed.kind.name()),
+        (conditions.masses.body_kg, conditions.masses.other_kg),
+        curves.force_kind.name(),
+        [
+            floats(curves.sampled.time_s().to_vec()),
+            floats(curves.sampled.deflection_m().to_vec()),
+            floats(curves.sampled.force_n().to_vec()),
+            floats(curves.closing_speed_m_per_s.clone()),
+        ],
+        case.provenance.tags.clone(),
+        case.quality.warnings.clone(),
+    )
+}
+
+/// Groups of a database with their cases.
+#[pyfunction]
+fn database(py: Python<'_>, path: PathBuf) -> PyResult<Vec<(String, Vec<DatabaseCase>)>> {
+    let read = py.detach(|| Database::read(&path)).map_err(|error| failed(py, &error))?;
+    let groups =
+        read.groups().map(|group| (group.into(), read.cases(group).iter().map(case).collect()));
+    Ok(groups.collect())
+}
+
+/// A trained model.
+#[pyclass(frozen, module = "crumple._crumple")]
+struct TrainedModel(Model);
+
+#[pymethods]
+impl TrainedModel {
+    #[new]
+    fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        py.detach(|| Model::read(&path)).map(Self).map_err(|error| failed(py, &error))
+    }
+
+    /// Name of the group, of the model, and its slowest and fastest speed in m/s.
+    fn facts(&self) -> (String, &'static str, (f64, f64)) {
+        (self.0.group.clone(), self.0.kind.name(), self.0.range_m_per_s())
+    }
+
+    /// The curve at a speed in m/s, as the document of `predict --json`.
+    #[pyo3(signature = (speed_m_per_s, extrapolate))]
+    fn predict(&self, py: Python<'_>, speed_m_per_s: f64, extrapolate: bool) -> PyResult<String> {
+        if !(speed_m_per_s > 0.0 && speed_m_per_s.is_finite()) {
+            return Err(PyValueError::new_err(format!(
+                "speed of {speed_m_per_s} m/s: expected a number above 0"
+            )));
+        }
+        let query = Query { extrapolate, ..Query::at(speed_m_per_s) };
+        let curve = py.detach(|| predict(&self.0, &query)).map_err(|error| failed(py, &error))?;
+        serde_json::to_string(&curve).map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+}
+
+/// A fitted regression forest.
+#[pyclass(frozen, module = "crumple._crumple")]
+struct Forest(RegressionForest<f64>);
+
+/// Numbers of a C-contiguous array of float64, as its bytes.
+fn numbers(bytes: &[u8]) -> Vec<f64> {
+    bytes
+        .chunks_exact(8)
+        .map(|of| f64::from_ne_bytes(of.try_into().expect("eight bytes")))
+        .collect()
+}
+
+/// Records in rows of so many features.
+fn records(bytes: &[u8], features: usize) -> PyResult<Array2<f64>> {
+    let values = numbers(bytes);
+    let rows = values.len().checked_div(features).unwrap_or_default();
+    let wrong = |error: ndarray::ShapeError| PyValueError::new_err(error.to_string());
+    Array2::from_shape_vec((rows, features), values).map_err(wrong)
+}
+
+#[pymethods]
+impl Forest {
+    /// Fits `trees` trees to records and targets, as bytes of float64.
+    #[staticmethod]
+    #[allow(clippy::too_many_arguments)]
+    fn fit(
+        py: Python<'_>,
+        x: &[u8],
+        features: usize,
+        y: &[u8],
+        trees: usize,
+        seed: u64,
+        max_depth: Option<usize>,
+        min_samples_leaf: usize,
+        max_features: Option<usize>,
+        bootstrap: bool,
+        random_thresholds: bool,
+    ) -> PyResult<Self> {
+        let data = Dataset::new(records(x, features)?, Array1::from(numbers(y)));
+        let thresholds = if random_thresholds { Thresholds::Random } else { Thresholds::Midpoint };
+        let params = ForestParams::new(trees)
+            .seed(seed)
+            .max_depth(max_depth)
+            .min_samples_leaf(min_samples_leaf)
+            .features_per_split(max_features.map_or(FeaturesPerSplit::All, FeaturesPerSplit::Count))
+            .bootstrap(bootstrap)
+            .thresholds(thresholds)
+            .ties(Ties::Random);
+        let forest = py.detach(|| params.fit(&data));
+        forest.map(Self).map_err(|error: ForestError| PyValueError::new_err(error.to_string()))
+    }
+
+    fn predict(&self, py: Python<'_>, x: &[u8], features: usize) -> PyResult<Floats> {
+        let records = records(x, features)?;
+        let predicted: Array1<f64> = py.detach(|| self.0.predict(&records));
+        Ok(floats(predicted.to_vec()))
+    }
+
+    fn importance(&self) -> Option<Floats> {
+        self.0.feature_importance().map(|shares| floats(shares.to_vec()))
+    }
+
+    /// The whole forest, bit by bit.
+    fn to_json(&self) -> PyResult<String> {
+        serde_json::to_string(&self.0).map_err(|error| PyValueError::new_err(error.to_string()))
+    }
+
+    #[staticmethod]
+    fn of_json(json: &str) -> PyResult<Self> {
+        let wrong = |error: &dyn std::fmt::Display| PyValueError::new_err(error.to_string());
+        let forest: RegressionForest<f64> = serde_json::from_str(json).map_err(|e| wrong(&e))?;
+        forest.check().map_err(|e| wrong(&e))?;
+        Ok(Self(forest))
+    }
+}
+
+/// The program with these arguments, the first its own name; gives its exit code.
+#[pyfunction]
+fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+    py.detach(|| crumple::cli::run_program(arguments))
+}
+
+#[pymodule]
+fn _crumple(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<Floats>()?;
+    module.add_class::<TrainedModel>()?;
+    module.add_class::<Forest>()?;
+    module.add_function(wrap_pyfunction!(read, module)?)?;
+    module.add_function(wrap_pyfunction!(database, module)?)?;
+    module.add_function(wrap_pyfunction!(main, module)?)
+}

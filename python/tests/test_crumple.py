@@ -1,0 +1,170 @@
+"""The package as it was installed, on the demo's folder (CRUMPLE_DEMO): values, errors, commands, clients, pickles."""
+
+import json
+import math
+import os
+import pickle
+import re
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import polars as pl
+import pytest
+import xarray as xr
+
+import crumple
+
+DEMO = Path(os.environ["CRUMPLE_DEMO"])
+NODOUT = DEMO / "fe/lead-car-wall/36kmh/nodout"
+
+
+def test_histories_are_those_of_the_file():
+    histories = crumple.read(NODOUT)
+    section = histories.only()
+    velocity = section["x_velocity"]
+    assert velocity.ids == [900001] and velocity.titles == ["COG of the rigid trailing mass"]
+    # The rows of the file itself: node, then x velocity in the fifth column of numbers.
+    rows = [line for line in NODOUT.read_text().splitlines() if line.startswith("   900001") or line.lstrip().startswith("900001")]
+    numbers = [float(line[10 + 12 * 3 : 10 + 12 * 4]) for line in rows if len(line) > 100]
+    assert len(numbers) == 400 and np.array_equal(velocity[900001], numbers)
+    assert velocity[900001] is not None and not velocity[900001].flags.writeable
+    assert velocity.array.shape == (400, 1) and np.shares_memory(velocity[900001], velocity["900001"])
+    assert histories.problems == [] and len(section.time) == 400
+
+
+def test_only_what_is_selected():
+    histories = crumple.read(NODOUT, ids=[900001], components=["x_velocity"])
+    assert list(histories.only()) == ["x_velocity"]
+    with pytest.raises(crumple.Error, match="has no node 5: it has 900001") as raised:
+        crumple.read(NODOUT, ids=[5])
+    assert raised.value.code == "solver_file"
+    with pytest.raises(crumple.Error) as raised:
+        crumple.read(DEMO / "nothing")
+    assert raised.value.code == "io"
+    with pytest.raises(KeyError, match="there is no component 'speed': expected one of x_velocity"):
+        histories.only()["speed"]
+    with pytest.raises(ValueError):
+        crumple.read(NODOUT, ids=["three"])
+
+
+def test_damage_is_named(tmp_path):
+    cut = tmp_path / "nodout"
+    text = NODOUT.read_bytes()
+    cut.write_bytes(text[: len(text) // 2])
+    histories = crumple.read(cut)
+    assert histories.problems and 100 < len(histories.only().time) < 300
+
+
+def test_clients_have_the_same_values():
+    section = crumple.read(NODOUT).only()
+    values = section["x_velocity"][900001]
+    frame = section.to_pandas()
+    assert isinstance(frame, pd.DataFrame) and np.array_equal(frame["x_velocity", 900001], values)
+    polars = section.to_polars()
+    assert isinstance(polars, pl.DataFrame) and np.array_equal(polars["x_velocity[900001]"].to_numpy(), values)
+    data = section.to_xarray()
+    assert isinstance(data, xr.Dataset) and np.array_equal(data["x_velocity"].sel(id=900001), values)
+
+
+def test_databases_models_and_curves(tmp_path):
+    database = crumple.Database(DEMO / "curves.h5")
+    case = database["lead-car-wall"]["36kmh"]
+    assert math.isclose(case.speed, 10.0) and case.speed_kind == "wall" and case.mass == 24000.0
+    work = np.trapezoid(case.force[: case.deflection.argmax()], case.deflection[: case.deflection.argmax()])
+    assert 0.95 < work / (0.5 * case.mass * case.speed**2) < 1.06
+    assert set(database["lead-car-wall"].to_pandas()["case"]) == set(database["lead-car-wall"])
+    model = crumple.Model(DEMO / "lead.model")
+    curve = model.predict(50 / 3.6)
+    # What the command gives.
+    document = crumple.run("predict", DEMO / "lead.model", "--speed", "50km/h")
+    assert np.array_equal(curve.force, document["force_N"]) and curve.max_deflection == document["max_deflection_m"]
+    assert curve.band[0].shape == curve.force.shape and (curve.band[0] <= curve.force + 1e-6).all()
+    with pytest.raises(crumple.Error, match="above the highest training speed") as raised:
+        model.predict(30.0)
+    assert raised.value.code == "prediction"
+    with pytest.raises(ValueError):
+        model.predict(-1.0)
+    exported = curve.export(tmp_path / "curve.k", units="mm-t-s")
+    assert (tmp_path / "curve.k").stat().st_size == exported["bytes"]
+    assert curve._repr_svg_().startswith("<svg") and database._repr_svg_().startswith("<svg")
+    trained = database.train(tmp_path / "own.model", "lead-car-wall", model="linear")
+    assert trained.name == "linear" and trained.predict(50 / 3.6).force.shape == (trained.predict(50 / 3.6).deflection.shape)
+
+
+def test_commands_are_functions(tmp_path):
+    run = crumple.simulate(DEMO / "scenario.toml")
+    assert run["v_m_per_s[A1]"].shape == run["time_s"].shape
+    assert run.summary["interfaces"][0]["max_deflection_m"] > 0.5 and run.to_pandas().index.name == "time_s"
+    validation = crumple.validate(DEMO / "curves.h5", "lead-car-wall")
+    assert validation["groups"][0]["chosen"] == "crush-law"
+    bad = tmp_path / "bad.toml"
+    bad.write_text("[run]\nduration = 3\n")
+    with pytest.raises(crumple.Error, match="has no unit") as raised:
+        crumple.simulate(bad)
+    error = raised.value
+    assert (error.code, error.file, error.line, error.column) == ("toml", str(bad), 2, 12)
+    again = pickle.loads(pickle.dumps(error))
+    assert str(again) == str(error) and again.line == 2
+    with pytest.warns(crumple.Warned, match="beyond the end of its curve's data"):
+        crumple.simulate(DEMO / "train-set.toml")
+
+
+def test_the_program_comes_along():
+    program = shutil.which("crumple", path=Path(sys.executable).parent)
+    said = subprocess.run([program, "--version"], capture_output=True, text=True, check=True).stdout
+    assert said == f"crumple {crumple.__version__}\n"
+    wrong = subprocess.run([program, "predict", "--json"], capture_output=True, text=True)
+    assert wrong.returncode == 2 and json.loads(wrong.stdout)["error"]["code"] == "usage"
+
+
+def test_other_threads_run_meanwhile():
+    count, stop = 0, threading.Event()
+
+    def counting():
+        nonlocal count
+        while not stop.is_set():
+            count += 1
+            time.sleep(1e-4)
+
+    thread = threading.Thread(target=counting)
+    thread.start()
+    for _ in range(5):
+        crumple.Database(DEMO / "curves.h5")
+    stop.set()
+    thread.join()
+    assert count > 3
+
+
+def test_the_forest_is_an_estimator():
+    from sklearn.utils.estimator_checks import check_estimator
+
+    from crumple.sklearn import RegressionForest
+
+    results = check_estimator(RegressionForest(n_estimators=10, random_state=1), on_skip=None, on_fail="raise")
+    assert not [r for r in results if r["status"] in ("failed", "xfail")]
+    random = np.random.default_rng(0)
+    x = random.uniform(size=(300, 2))
+    y = np.sin(6 * x[:, 0]) + x[:, 1]
+    for frame in (pd.DataFrame(x, columns=["v", "d"]), pl.DataFrame({"v": x[:, 0], "d": x[:, 1]})):
+        forest = RegressionForest(random_state=3).fit(frame, y)
+        assert list(forest.feature_names_in_) == ["v", "d"]
+        assert forest.score(frame, y) > 0.97 and math.isclose(forest.feature_importances_.sum(), 1.0)
+        again = pickle.loads(pickle.dumps(forest))
+        assert np.array_equal(again.predict(frame), forest.predict(frame))
+
+
+def test_the_code_of_the_readme_runs(tmp_path, monkeypatch):
+    shutil.copytree(DEMO, tmp_path / "demo")
+    monkeypatch.chdir(tmp_path / "demo")
+    text = (Path(__file__).parent.parent / "README.md").read_text()
+    blocks = re.findall(r"```python\n(.*?)```", text, re.S)
+    assert len(blocks) == 5
+    names = {}
+    for block in blocks:
+        exec(block, names)
