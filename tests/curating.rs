@@ -124,6 +124,58 @@ fn what_cannot_be_chosen_is_said_with_what_is_there() {
     assert_eq!(entries(here), ["curves.h5"]);
 }
 
+/// What a database has gained, lost and changed: by group and name, in conditions and curves, not in tags.
+#[test]
+fn differences_of_two_databases_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let database = build_fixture(folder, WALL).display().to_string();
+    let cases = read(folder, &database).cases(WALL).to_vec();
+    let mut changed = Database::default();
+    for (k, case) in cases.iter().enumerate() {
+        let mut case = case.clone();
+        match k {
+            // The first is gone; of the second all forces are a tenth larger, the third has a tag.
+            0 => continue,
+            1 => {
+                let curve = &case.curves.sampled;
+                let larger = |curve: &crumple::curve::Curve| {
+                    let force = curve.force_n().iter().map(|f| 1.1 * f).collect();
+                    let (t, d) = (curve.time_s().to_vec(), curve.deflection_m().to_vec());
+                    crumple::curve::Curve::new(t, d, force).unwrap()
+                };
+                (case.curves.sampled, case.curves.original) =
+                    (larger(curve), larger(&case.curves.original));
+            }
+            2 => case.provenance.tags = vec!["reviewed".into()],
+            3 => case.id.name = "other".into(),
+            _ => {}
+        }
+        changed.put(case).unwrap();
+    }
+    changed.write(&folder.join("after.h5")).unwrap();
+    let found = ok_json(folder, &format!("db diff {database} after.h5 --accept-changed"));
+    let name = |k: usize| format!("{WALL}/{}", cases[k].id.name);
+    assert_eq!(found["removed"], serde_json::json!([name(0), name(3)]));
+    assert_eq!(found["added"], serde_json::json!([format!("{WALL}/other")]));
+    assert_eq!(found["unchanged"], cases.len() - 3);
+    let of = &found["changed"][0];
+    assert_eq!(
+        (of["case"].as_str(), found["changed"].as_array().unwrap().len()),
+        (Some(&*cases[1].id.name), 1)
+    );
+    for key in ["peak_force_difference", "force_l1"] {
+        assert!((of[key].as_f64().unwrap() - 0.1).abs() < 1e-9, "{key}: {of}");
+    }
+    let text = ok(folder, &format!("db diff {database} after.h5 --accept-changed"));
+    says(&text, "1 case added, 2 removed, 1 changed, ");
+    says(
+        &ok(folder, &format!("db diff {database} {database}")),
+        "0 cases added, 0 removed, 0 changed, ",
+    );
+    fails(folder, &format!("db diff {database} after.h5 --group nothing"), "nothing");
+}
+
 #[test]
 fn removing_names_what_it_did_and_a_dry_run_does_nothing() {
     let folder = two_groups();

@@ -1360,6 +1360,49 @@ fn what_drives_a_train_is_the_prediction() {
     }
 }
 
+/// A crush gives the speed that gives this crush, with the speeds of the model's own crush error; what no speed between the
+/// runs gives is refused.
+#[test]
+fn a_crush_gives_its_speed() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let predicted = |arguments: &[&str]| -> Value {
+        let all = [&["predict", "lead.model"], arguments, &["--json", "-q"]].concat();
+        serde_json::from_str(&crumple_ok(here, &all)).unwrap()
+    };
+    for speed in [14.0, 36.0, 50.0, 66.5] {
+        let crush =
+            predicted(&["--speed", &format!("{speed}km/h")])["max_deflection_m"].as_f64().unwrap();
+        let found = predicted(&["--crush", &format!("{crush}m")]);
+        let of = |key: &str| found["found_by_crush"][key].as_f64();
+        let speed_of = |key: &str| of(key).map(|v| v * 3.6);
+        assert!((speed_of("speed_m_per_s").unwrap() - speed).abs() < 1e-6, "{speed}: {found}");
+        assert!((found["max_deflection_m"].as_f64().unwrap() / crush - 1.0).abs() < 1e-9);
+        // The curve at the lower end has a crush as much smaller as the model errs.
+        let (low, high) = (speed_of("low_m_per_s").unwrap(), speed_of("high_m_per_s").unwrap());
+        assert!(low < speed && speed < high, "{speed}: {low} to {high}");
+        let at_low =
+            predicted(&["--speed", &format!("{low}km/h")])["max_deflection_m"].as_f64().unwrap();
+        assert!((at_low / crush - 1.0 + of("crush_error").unwrap()).abs() < 1e-6);
+    }
+    for (code, arguments, says) in [
+        (
+            1,
+            "--crush 3m",
+            "no speed gives a crush of 3 m: the model's crush goes from 0.111 m at 12 km/h",
+        ),
+        (1, "--crush 1mm", "no speed gives a crush"),
+        (2, "--crush 0.5", "has no unit"),
+        (2, "--crush 0.5m --speed 36km/h", "cannot be used with"),
+        (2, "", "--speed"),
+    ] {
+        let mut all = vec!["predict", "lead.model"];
+        all.extend(arguments.split_whitespace());
+        let error = crumple_fails(here, code, &all);
+        assert!(error.contains(says), "{arguments}: {error}");
+    }
+}
+
 /// The advice of `--next`, judged: of every two speeds that are not neighbours, both left out, one
 /// is requested. What is left is the error at the other one, trained with the one that was run.
 #[test]

@@ -13,11 +13,16 @@ use crate::formats::read::ReadOptions;
 use crate::import::Settings;
 use crate::solver::{Selection, WantedId};
 use crate::surrogate::max_crush::MaxCrushRule;
-use crate::unit::{MASS, SPEED, STIFFNESS, SpeedKind, UnitSystem};
+use crate::unit::{LENGTH, MASS, SPEED, STIFFNESS, SpeedKind, UnitSystem};
 
 /// A speed with its unit, in m/s.
 pub(super) fn speed(text: &str) -> Result<f64, String> {
     SPEED.parse_positive(text).map_err(|e| e.to_string())
+}
+
+/// A length with its unit, in m.
+pub(super) fn length(text: &str) -> Result<f64, String> {
+    LENGTH.parse_positive(text).map_err(|e| e.to_string())
 }
 
 /// A mass with its unit, in kg.

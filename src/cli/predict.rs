@@ -8,7 +8,7 @@ use crate::curve::{ForceKind, Parameter};
 use crate::file::write_all_whole;
 use crate::surrogate::band::{Band, LeftOutSpeeds};
 use crate::surrogate::max_crush::MaxCrushRule;
-use crate::surrogate::{Model, PredictedCurve, Query, predict};
+use crate::surrogate::{Model, PredictedCurve, Query, SpeedOfCrush, predict, speed_of_crush};
 use crate::unit::{Shown, km_per_h};
 
 use super::arguments::{self, FileKind, MAX_CRUSH_RULES, one_of};
@@ -19,13 +19,17 @@ use super::{CommandResult, GlobalOptions, is_stdout, keep_input, output, usage};
 #[command(after_help = "Examples:
   crumple predict lead.model --speed 50km/h
   crumple predict lead.model --speed 50km/h -o lead50.json -o lead50.csv -o lead50.k
+  crumple predict lead.model --crush 620mm      # the speed that gives this crush, and its curve
   crumple predict lead.model --speed 14m/s --max-crush energy --json")]
 pub(super) struct Args {
     /// Model file made by crumple train
     model: PathBuf,
     /// Impact speed with its unit, of the kind the model was trained on
-    #[arg(long, value_parser = arguments::speed, allow_hyphen_values = true)]
-    speed: f64,
+    #[arg(long, value_parser = arguments::speed, allow_hyphen_values = true, required_unless_present = "crush")]
+    speed: Option<f64>,
+    /// Maximum crush with its unit, in place of the speed: the speed between the runs that gives it is found
+    #[arg(long, value_parser = arguments::length, allow_hyphen_values = true, conflicts_with_all = ["speed", "extrapolate"])]
+    crush: Option<f64>,
     /// Mass of the body, or of each body of a pair, with its unit (default: the training runs')
     #[arg(long, value_parser = arguments::mass, allow_hyphen_values = true)]
     mass: Option<f64>,
@@ -64,12 +68,17 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     args.output.iter().try_for_each(|output| options.keep_others(output, FileKind::Curve))?;
     let model = Model::read(&args.model)?;
     let query = Query {
-        speed_m_per_s: args.speed,
+        speed_m_per_s: args.speed.unwrap_or_else(|| model.range_m_per_s().0),
         mass_kg: args.mass,
         rule,
         parameters: args.parameter.iter().cloned().collect(),
         energy_correct: args.energy_correct,
         extrapolate: args.extrapolate,
+    };
+    let found = args.crush.map(|crush_m| speed_of_crush(&model, &query, crush_m)).transpose()?;
+    let query = match &found {
+        Some(found) => Query { speed_m_per_s: found.speed_m_per_s, ..query },
+        None => query,
     };
     let curve = &predict(&model, &query)?;
     // All are encoded before the first is written.
@@ -97,13 +106,31 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         return Ok(outcome);
     }
     options.show(
-        &document! { #[serde(flatten)] curve: curve, exports if_any: &exports },
+        &document! { #[serde(flatten)] curve: curve, found_by_crush if_any: found, exports if_any: &exports },
         |out| {
+            if let Some(found) = &found {
+                print_found(out, found)?;
+            }
             print(out, curve)?;
             args.output.iter().try_for_each(|path| writeln!(out, "wrote {}", path.display()))
         },
     )?;
     Ok(outcome)
+}
+
+/// The speed of a crush, and how far it may be off.
+fn print_found(out: &mut dyn Write, found: &SpeedOfCrush) -> io::Result<()> {
+    write!(out, "crush of {} m: {}", found.crush_m, km_per_h(found.speed_m_per_s))?;
+    if let Some(error) = found.crush_error {
+        let end = |speed: Option<f64>| speed.map_or("beyond the runs".into(), km_per_h);
+        let (low, high) = (end(found.low_m_per_s), end(found.high_m_per_s));
+        let error = 100.0 * error;
+        write!(
+            out,
+            " ({low} to {high}: crush is off by {error:.1} % on average at left-out speeds)"
+        )?;
+    }
+    writeln!(out)
 }
 
 /// Where a band's curve lies, and what the band comes from.

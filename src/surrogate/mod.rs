@@ -46,11 +46,13 @@ pub use predict::{predict, predict_driving};
 pub use predicted::PredictedCurve;
 pub use predicted::{ForestQuantiles, Provenance, Rebound};
 pub use query::Query;
+pub(crate) use speed_of_crush::{SpeedOfCrush, speed_of_crush};
 pub use warning::{Warning, WarningCode};
 pub(crate) mod predicted;
 mod query;
 mod rate;
 pub(crate) mod recorded;
+mod speed_of_crush;
 mod spikes;
 pub(crate) mod warning;
 

@@ -2,6 +2,7 @@
 //! together.
 
 mod add;
+mod diff;
 mod join;
 mod list;
 mod rename;
@@ -17,7 +18,7 @@ use crate::database::check::{self, Checked};
 use crate::plural::counted;
 pub(super) use list::{case_columns, case_row};
 
-/// List, show, check, add, rename, join, tag and export cases of a curve database
+/// List, show, compare, check, add, rename, join, tag and export cases of a curve database
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   crumple db ls curves.h5
@@ -51,6 +52,14 @@ enum Command {
 Differences are relative to the first case. force L1 is sum|F-F0|/sum|F0| of the loading branches, in
 equal steps of deflection over their common range.")]
     Show(show::Args),
+    /// Say what another database has added, removed and changed
+    ///
+    /// Cases are compared by group and name: conditions and curves; tags, notes and the date of the build are not.
+    #[command(after_help = "Examples:
+  crumple db diff before.h5 curves.h5
+  crumple db diff before.h5 curves.h5 --group lead-car-wall --json
+Differences are relative to the case before. force L1 is sum|F-F0|/sum|F0| of the loading branches.")]
+    Diff(diff::Args),
     /// Check every stored value against what follows from the others
     ///
     /// Finds values that were changed, are not finite or out of order, gaps in
@@ -138,6 +147,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     match &args.command {
         Command::Ls(args) => list::run(args, options),
         Command::Show(args) => show::run(args, options),
+        Command::Diff(args) => diff::run(args, options),
         Command::Check { database } => check_values(database, options),
         Command::Add(args) => add::run(args, options),
         Command::Rm(args) => rename::remove(args, options),

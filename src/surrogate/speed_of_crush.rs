@@ -1,0 +1,71 @@
+//! The speed at which a model's maximum crush is a given one: what a measured crush says of the impact.
+
+use serde::Serialize;
+
+use super::{Model, Query, predict};
+use crate::error::{Error, error};
+use crate::unit::km_per_h;
+
+/// A speed that was found by its crush.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(crate) struct SpeedOfCrush {
+    pub(crate) crush_m: f64,
+    pub(crate) speed_m_per_s: f64,
+    /// Speeds of a crush as much smaller and larger as the model's is off on average at left-out speeds; null beyond the
+    /// model's speeds, and if no speed was left out.
+    pub(crate) low_m_per_s: Option<f64>,
+    pub(crate) high_m_per_s: Option<f64>,
+    /// That mean error, relative.
+    pub(crate) crush_error: Option<f64>,
+}
+
+/// Intervals that are looked into; crushes of real structures rise with the speed, so the first that holds it counts.
+const INTERVALS: usize = 32;
+/// Halvings of an interval.
+const HALVINGS: usize = 40;
+
+/// Finds the speed, between the slowest and the fastest run of the model, at which the curve of `query` ends at
+/// `crush_m`.
+///
+/// # Errors
+/// If no speed between the runs gives that crush; as [`predict`].
+pub(crate) fn speed_of_crush(
+    model: &Model,
+    query: &Query,
+    crush_m: f64,
+) -> Result<SpeedOfCrush, Error> {
+    let (low, high) = model.range_m_per_s();
+    let crush_at = |speed_m_per_s: f64| -> Result<f64, Error> {
+        let query = Query { speed_m_per_s, ..query.clone() };
+        Ok(predict(model, &query)?.max_deflection_m)
+    };
+    let at = |k: usize| low + (high - low) * k as f64 / INTERVALS as f64;
+    let crushes = (0..=INTERVALS).map(|k| crush_at(at(k))).collect::<Result<Vec<f64>, _>>()?;
+    let find = |wanted: f64| -> Result<Option<f64>, Error> {
+        let k = crushes.windows(2).position(|pair| pair[0] <= wanted && wanted <= pair[1]);
+        let Some(k) = k else { return Ok(None) };
+        let (mut from, mut to) = (at(k), at(k + 1));
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (from + to);
+            if crush_at(middle)? < wanted { from = middle } else { to = middle }
+        }
+        Ok(Some(0.5 * (from + to)))
+    };
+    let speed_m_per_s = find(crush_m)?.ok_or_else(|| {
+        error!(
+            Prediction,
+            "no speed gives a crush of {crush_m} m: the model's crush goes from {:.3} m at {} to {:.3} m at {}",
+            crushes[0],
+            km_per_h(low),
+            crushes[INTERVALS],
+            km_per_h(high)
+        )
+    })?;
+    let means = model.leave_one_out.as_ref();
+    let means = means.and_then(|of| of.means.iter().find(|means| means.model == model.kind.name()));
+    let crush_error = means.map(|means| means.max_crush_error);
+    let off =
+        |share: f64| crush_error.map_or(Ok(None), |error| find(crush_m * (1.0 + share * error)));
+    let (low_m_per_s, high_m_per_s) = (off(-1.0)?, off(1.0)?);
+    Ok(SpeedOfCrush { crush_m, speed_m_per_s, low_m_per_s, high_m_per_s, crush_error })
+}
