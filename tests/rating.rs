@@ -92,6 +92,31 @@ fn runs_are_rated_by_the_acceptance_rule() {
             && said.contains("EN 15227:2020+A1:2024"),
         "{said}"
     );
+    // An interface that one of both lacks, and what is for single signals.
+    let less: String = std::fs::read_to_string(folder.join("one.csv")).unwrap();
+    let header: Vec<&str> = less.lines().next().unwrap().split(',').collect();
+    let kept = |line: &str| -> String {
+        let fields = line.split(',').zip(&header).filter(|(_, name)| !name.contains("A1|B1"));
+        fields.map(|(field, _)| field).collect::<Vec<_>>().join(",")
+    };
+    let less: Vec<String> = less.lines().map(kept).collect();
+    std::fs::write(folder.join("less.csv"), less.join("\n") + "\n").unwrap();
+    for (a, b) in [("one", "less"), ("less", "one")] {
+        let found: serde_json::Value =
+            serde_json::from_str(&crumple_ok(folder, &format!("rate {a}.csv {b}.csv --json")))
+                .unwrap();
+        assert_eq!(
+            (&found["passes"], &found["missing"]),
+            (&false.into(), &serde_json::json!(["A1|B1"]))
+        );
+    }
+    for option in ["--to 50ms", "--cfc 60", "--quantity other"] {
+        let all = format!("rate one.csv one.csv {option}");
+        let error = crumple_fails(folder, 2, &all.split(' ').collect::<Vec<_>>());
+        assert!(error.contains("is for one signal"), "{error}");
+    }
+    let error = crumple_fails(folder, 2, &["rate", "one.csv,scale=2", "one.csv"]);
+    assert!(error.contains("scale= is for one signal"), "{error}");
     std::fs::write(folder.join("none.csv"), "time_s,deflection_m[x],force_N[x]\n0,0,0\n0.1,1,1\n")
         .unwrap();
     let error = crumple_fails(folder, 2, &["rate", "one.csv", "none.csv"]);

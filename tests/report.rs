@@ -129,6 +129,7 @@ fn wrong_wishes_are_refused() {
         (1, "nothing.h5 -o a.html", "nothing.h5"),
         (2, "curves.h5 -o curves.h5", "names the input itself"),
         (2, "curves.h5 scenario.toml -o lead.model", "names the input itself"),
+        (2, "curves.h5 ./curves.h5 -o a.html", "is named twice"),
         (2, "curves.h5", "--output"),
         (
             2,
@@ -189,6 +190,13 @@ fn designs_and_trains_stand_side_by_side() {
         .next()
         .unwrap();
     assert!(side_by_side.contains("slower.toml") && !side_by_side.contains(">scenario.toml<"));
+    // Files of one name are told apart.
+    fs::create_dir(folder.join("b")).unwrap();
+    let same = fs::read_to_string(folder.join("scenario.toml")).unwrap();
+    let same = same.replace("lead.model", "../lead.model").replace("54km/h", "50km/h");
+    fs::write(folder.join("b/scenario.toml"), same).unwrap();
+    crumple_ok(folder, "report scenario.toml b/scenario.toml -o same.html");
+    says(&fs::read_to_string(folder.join("same.html")).unwrap(), "Scenario b&#x2f;scenario.toml");
     // Trains alone make a page as well.
     crumple_ok(folder, "report slower.toml -o train.html");
     says(&fs::read_to_string(folder.join("train.html")).unwrap(), "no limits are stated");

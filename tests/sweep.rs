@@ -597,6 +597,12 @@ fn a_stated_precision_ends_a_sweep() {
     let rough = report(0.02);
     let rows = rough["rows"].as_u64().unwrap();
     assert!(width(&rough) <= 0.02 && rows >= 100, "{rough}");
+    let until = &rough["until"];
+    assert_eq!(
+        (&until["is_reached"], &until["numbers"], &rough["resumed"]),
+        (&true.into(), &rows.into(), &0.into())
+    );
+    assert!((until["half_width"].as_f64().unwrap() / width(&rough) - 1.0).abs() < 1e-6);
     let fine = report(0.008);
     let more = fine["rows"].as_u64().unwrap();
     assert!(width(&fine) <= 0.008 && more > rows && more < 4000, "{rows} and {more}");
@@ -616,12 +622,24 @@ fn a_stated_precision_ends_a_sweep() {
     // Asked for less again, nothing is run; what cannot be reached ends with the plan's samples, and says so.
     assert_eq!(report(0.02)["resumed"], more);
     let said = folder.ok(&asked(1e-4).replace(" --json -q", ""));
-    assert!(
-        said.contains("after 4000 runs") && said.contains("not reached: state more samples"),
-        "{said}"
-    );
+    assert!(said.contains("after 4000 runs") && said.contains("± 0.0001 not reached"), "{said}");
+    // A link keeps its place, and its target grows.
+    #[cfg(unix)]
+    {
+        fs::create_dir(folder.path().join("there")).unwrap();
+        std::os::unix::fs::symlink("there/real.csv", folder.path().join("link.csv")).unwrap();
+        for (path, half_width) in [("there/real.csv", 0.5), ("link.csv", 0.02)] {
+            folder.ok(&format!("sweep s.toml -o {path} --until {column}={half_width} -q"));
+        }
+        assert!(folder.path().join("link.csv").is_symlink());
+        assert_eq!(self::rows(&folder.text("there/real.csv")).1.len() as u64, rows);
+    }
     for (arguments, says) in [
-        ("--until nothing=1 -o a.csv", "there is no result \"nothing\""),
+        ("--until max_deflection_m[A1|B1]=1 -o -", "name it with -o"),
+        (
+            "--until nothing=1 -o a.csv",
+            "there is no result \"nothing\": name it in results of [sweep], or one of ",
+        ),
         ("--until x -o a.csv", "is not a precision"),
         ("--until max_deflection_m[A1|B1]=-1 -o a.csv", "is not a precision"),
         ("--until max_deflection_m[A1|B1]=1 -o a.h5", "--until writes one .csv file"),
@@ -629,10 +647,30 @@ fn a_stated_precision_ends_a_sweep() {
     ] {
         folder.put("grid.toml", GRID);
         let all = format!("sweep s.toml {arguments}");
-        let code = if says == "is not a precision" { 2 } else { 1 };
+        let code = if ["is not a precision", "name it with -o"].contains(&says) { 2 } else { 1 };
         let error = crumple_fails(folder.path(), code, &all.split(' ').collect::<Vec<_>>());
         assert!(error.contains(says), "{arguments}: {error}");
     }
+}
+
+/// Runs of which a verdict is not known are no sample: the share they leave open is in the interval.
+#[test]
+fn what_is_not_known_is_not_precise() {
+    let plan = SPEEDS
+        .replace("samples = 40", "samples = 300\nresults = [\"max_deflection\", \"over_limits\"]");
+    let limits = "[limits]\nstandard = \"own\"\nedition = \"1\"\nmean_deceleration_g = 1.0\nsecondary_impact = \"50m/s\"\n";
+    let folder = Folder::new("");
+    // The run is too short for a secondary impact, and slow runs stay below the limit.
+    folder.put("s.toml", &format!("{}{limits}{plan}", SCENARIO.replace("0.6,2", "5,2")));
+    let report = folder.json("sweep s.toml -o out.csv --until over_limits=0.05 --json -q");
+    let until = &report["until"];
+    let (numbers, rows) = (until["numbers"].as_u64().unwrap(), report["rows"].as_u64().unwrap());
+    assert!(numbers < rows, "some are not known: {report}");
+    assert!(
+        until["half_width"].as_f64().unwrap() >= 0.5 * (rows - numbers) as f64 / rows as f64,
+        "{until}"
+    );
+    assert_eq!((rows, &until["is_reached"]), (300, &false.into()));
 }
 
 /// Warnings of many rows are counted by what they say, and a grid has no percentiles.

@@ -491,7 +491,7 @@ fn the_sequence_of_a_run() {
         assert!(times[first.saturating_sub(1)] <= contact && contact <= times[first], "{name}");
         // It opens where the force ends for long, and not while it acts.
         let force = column(&result, &format!("force_N[{name}]"));
-        let opened = (at(&format!("{name} opened")) / dt).round() as usize;
+        let opened = (at(&format!("{name} opened")) / dt - 1e-9).ceil() as usize;
         assert!(force[opened] == 0.0 && force[opened - 1] != 0.0, "{name} opens at {opened}");
     }
     for body in summary["bodies"].as_array().unwrap() {

@@ -5,6 +5,7 @@ Values of databases, models and runs are SI: m, s, N, kg, J. Histories are in th
 
 import json
 import os
+import re
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -29,7 +30,22 @@ def _array(floats):
 
 def _id(text):
     """An id as users write it: a number where it is one."""
-    return int(text) if text is not None and text.lstrip("-").isdigit() else text
+    return int(text) if text is not None and re.fullmatch("-?[0-9]+", text) else text
+
+
+def _key(entity):
+    """An id as it is looked up: 900001, 900001.0 (as pandas has it), "900001" and NumPy's numbers are one."""
+    if entity is None or isinstance(entity, str):
+        return _id(entity)
+    return int(entity) if entity == int(entity) else entity
+
+
+def _listed(of):
+    """One item or several, as a list of texts; None stays."""
+    if of is None:
+        return None
+    is_one = isinstance(of, (str, int, np.integer))
+    return [str(_key(one)) for one in ([of] if is_one else of)]
 
 
 class _Mapping(Mapping):
@@ -67,7 +83,7 @@ class Component(_Mapping):
     _what = "id"
 
     def __contains__(self, entity):
-        return (entity if entity is None else _id(str(entity))) in self._items
+        return _key(entity) in self._items
 
     def __init__(self, name, time, arrays, titles):
         super().__init__(arrays)
@@ -88,7 +104,7 @@ class Component(_Mapping):
 
     def __getitem__(self, entity):
         """The values of an id, given as a number, as text ("3:surfa"), or None."""
-        return super().__getitem__(entity if entity is None else _id(str(entity)))
+        return super().__getitem__(_key(entity))
 
 
 class Section(_Mapping):
@@ -186,13 +202,12 @@ class Histories(_Mapping):
 def read(path, ids=None, components=None, section=None, format=None):
     """Read a solver's file: any that the program reads (nodout, rcforc, binout, T01, ...).
 
-    Only what is selected is parsed: `ids` (numbers, or texts such as "3:surfa"), `components` (named as in binout), a
-    `section` of a binout. Damage is no error: `problems` names it.
+    Only what is selected is parsed: `ids` (numbers, or texts such as "3:surfa"), `components` (named as in binout), one or
+    several, a `section` of a binout. Damage is no error: `problems` names it.
 
     Raises `crumple.Error` if the file cannot be opened or read.
     """
-    wanted = None if ids is None else [str(entity) for entity in ids]
-    sections = _crumple.read(os.fspath(path), wanted, components and list(components), section, format)
+    sections = _crumple.read(os.fspath(path), _listed(ids), _listed(components), section, format)
     return Histories(Path(path), [Section(*of) for of in sections])
 
 
@@ -266,6 +281,9 @@ class Model:
         """
         return Curve(json.loads(self._model.predict(float(speed), extrapolate)))
 
+    def __reduce__(self):
+        return (type(self), (self.path.resolve(),))
+
     def __repr__(self):
         low, high = (3.6 * speed for speed in self.range)
         return f"<Model {self.name} of {self.group}, {low:.4g} to {high:.4g} km/h>"
@@ -294,17 +312,17 @@ class Curve:
 
         Options are those of `crumple export`: `force="contact"`, `units="mm-t-s"`.
         """
-        from crumple._commands import _options
+        from crumple._commands import _options, _output
 
         with tempfile.TemporaryDirectory() as folder:
             curve = Path(folder) / "curve.json"
-            curve.write_text(json.dumps(self.document))
-            return run("export", curve, "-o", output, *_options({"to": to, **options}))
+            curve.write_text(json.dumps(self.document), encoding="utf-8")
+            return run("export", *_output(output), *_options({"to": to, **options}), "--", curve)
 
     def _repr_svg_(self):
         with tempfile.TemporaryDirectory() as folder:
             curve = Path(folder) / "curve.json"
-            curve.write_text(json.dumps(self.document))
+            curve.write_text(json.dumps(self.document), encoding="utf-8")
             return _picture(curve)
 
     def __repr__(self):
@@ -330,11 +348,11 @@ class Run(_Mapping):
 
 def simulate(scenario):
     """Run a scenario (TOML)."""
-    return Run(run("simulate", scenario))
+    return Run(run("simulate", "--", scenario))
 
 
 def _picture(path, *arguments):
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.svg"
-        run("plot", path, *arguments, "-o", picture)
-        return picture.read_text()
+        run("plot", *arguments, "-o", picture, "--", path)
+        return picture.read_text(encoding="utf-8")

@@ -81,8 +81,8 @@ class Histories(_Mapping[str, Section]):
 
 def read(
     path: _Path,
-    ids: Iterable[int | str] | None = None,
-    components: Iterable[str] | None = None,
+    ids: int | str | Iterable[int | str] | None = None,
+    components: str | Iterable[str] | None = None,
     section: str | None = None,
     format: str | None = None,
 ) -> Histories: ...
@@ -127,6 +127,7 @@ class Model:
     range: tuple[float, float]
     def __init__(self, path: _Path) -> None: ...
     def predict(self, speed: float, extrapolate: bool = False) -> Curve: ...
+    def __reduce__(self) -> tuple[type[Model], tuple[Path]]: ...
 
 class Curve:
     document: dict[str, Any]

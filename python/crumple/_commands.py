@@ -6,11 +6,29 @@ import subprocess
 import sys
 import warnings
 
+from crumple import _crumple
 from crumple._errors import Error
 
 
 class Warned(UserWarning):
     """A warning of the program."""
+
+
+# The program in a Python of its own, which looks into no folder and no setting but the compiled part.
+_START = """
+import importlib.util, signal, sys
+spec = importlib.util.spec_from_file_location("crumple._crumple", sys.argv[1])
+module = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(module)
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+sys.exit(module.main(["crumple", *sys.argv[2:]]))
+"""
+
+
+def _program():
+    if not sys.executable or getattr(sys, "frozen", False):
+        raise Error("commands need a Python interpreter (sys.executable) to run in; this one is embedded or frozen")
+    return [sys.executable, "-I", "-S", "-c", _START, _crumple.__file__]
 
 
 def run(*arguments, check=True):
@@ -20,8 +38,10 @@ def run(*arguments, check=True):
 
     Raises `crumple.Error` if the command fails.
     """
-    words = [sys.executable, "-m", "crumple", *(os.fspath(a) if isinstance(a, os.PathLike) else str(a) for a in arguments)]
-    done = subprocess.run([*words, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False)
+    words = [os.fspath(a) if isinstance(a, os.PathLike) else str(a) for a in arguments]
+    done = subprocess.run(
+        [*_program(), *words[:1], "--json", *words[1:]], stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False
+    )
     for line in done.stderr.decode(errors="replace").splitlines():
         if line.startswith("warning: "):
             warnings.warn(line.removeprefix("warning: "), Warned, stacklevel=3)
@@ -32,7 +52,7 @@ def run(*arguments, check=True):
     failed = isinstance(document, dict) and set(document) == {"error"}
     if check and failed:
         raise Error.of_document(done.stdout)
-    if check and done.returncode not in (0, 3) and document is None:
+    if check and document is None:
         raise Error(done.stderr.decode(errors="replace").strip() or f"crumple ended with code {done.returncode}")
     return document
 
@@ -50,34 +70,40 @@ def _options(options):
     return words
 
 
+def _output(path):
+    """The option of an output, whatever its name begins with."""
+    return [] if path is None else [f"--output={os.fspath(path)}"]
+
+
 def build(study, output, **options):
     """Build a study (TOML) into a database; only changed runs are read again."""
-    return run("build", study, "-o", output, *_options(options))
+    return run("build", *_output(output), *_options(options), "--", study)
 
 
 def init(runs, output=None, **options):
     """Examine run folders and write a study of them."""
-    return run("init", *([runs] if isinstance(runs, (str, os.PathLike)) else runs), *(["-o", output] if output else []), *_options(options))
+    runs = [runs] if isinstance(runs, (str, os.PathLike)) else list(runs)
+    return run("init", *_output(output), *_options(options), "--", *runs)
 
 
 def validate(database, group=None, **options):
     """Leave out every speed in turn, predict it with every model, and compare with FE."""
-    return run("validate", database, *_options({"group": group, **options}))
+    return run("validate", *_options({"group": group, **options}), "--", database)
 
 
 def train(database, output, group=None, **options):
     """Train a model and write it; gives the model."""
     from crumple import Model
 
-    run("train", database, "-o", output, *_options({"group": group, **options}))
+    run("train", *_output(output), *_options({"group": group, **options}), "--", database)
     return Model(output)
 
 
 def sweep(scenario, output, **options):
     """Run a scenario many times; the rows are in `output`, the report is returned."""
-    return run("sweep", scenario, "-o", output, *_options(options))
+    return run("sweep", *_output(output), *_options(options), "--", scenario)
 
 
 def rate(reference, prediction, **options):
     """Rate a prediction against a reference by every measure."""
-    return run("rate", reference, prediction, *_options(options))
+    return run("rate", *_options(options), "--", reference, prediction)

@@ -53,6 +53,36 @@ def test_only_what_is_selected():
         crumple.read(NODOUT, ids=["three"])
 
 
+def test_one_or_several_of_any_kind():
+    whole = crumple.read(NODOUT).only()["x_velocity"][900001]
+    for ids in (900001, "900001", [np.int64(900001)], np.array([900001]), pd.Series([900001.0])):
+        for components in ("x_velocity", ["x_velocity"], np.array(["x_velocity"])):
+            component = crumple.read(NODOUT, ids=ids, components=components).only()["x_velocity"]
+            assert np.array_equal(component[np.int32(900001)], whole) and 900001.0 in component
+    assert "\u00b2" not in component and None not in component
+    del component
+    histories = crumple.read(NODOUT)
+    view = histories.only()["x_velocity"][900001]
+    del histories
+    assert np.array_equal(view, whole)
+
+
+def test_folders_of_the_user_are_not_looked_into(tmp_path, monkeypatch):
+    for name in ("random.py", "crumple.py", "signal.py"):
+        (tmp_path / name).write_text("raise RuntimeError('not this one')\n")
+    shutil.copy(DEMO / "scenario.toml", tmp_path / "-x.toml")
+    shutil.copy(DEMO / "lead.model", tmp_path / "lead.model")
+    monkeypatch.chdir(tmp_path)
+    assert len(crumple.simulate("-x.toml")["time_s"]) > 100
+    crumple.Model("lead.model").predict(10.0).export("-x.csv")
+    assert (tmp_path / "-x.csv").exists()
+    model = pickle.loads(pickle.dumps(crumple.Model("lead.model")))
+    assert model.predict(10.0).max_deflection == crumple.Model("lead.model").predict(10.0).max_deflection
+    monkeypatch.setattr(sys, "executable", "")
+    with pytest.raises(crumple.Error, match="embedded or frozen"):
+        crumple.simulate("-x.toml")
+
+
 def test_damage_is_named(tmp_path):
     cut = tmp_path / "nodout"
     text = NODOUT.read_bytes()

@@ -448,15 +448,16 @@ fn energy(name: &str, run: &Motion, names: &[String], is_named: bool) -> Result<
         panel.title = name.into();
     }
     let last = |taken_j: &Vec<f64>| taken_j.last().copied().unwrap_or_default();
-    let drawn = run.interfaces.iter().filter(|of| names.contains(&of.name));
     // By place in the chain, so that runs of one train have the same colours.
-    let mut of: Vec<(usize, &InterfaceMotion)> = drawn.enumerate().collect();
+    let (mut of, mut others): (Vec<_>, Vec<_>) =
+        run.interfaces.iter().enumerate().partition(|(_, of)| names.contains(&of.name));
     of.sort_by(|(_, a), (_, b)| last(&b.taken_j).total_cmp(&last(&a.taken_j)));
-    let others = of.split_off(if of.len() > MOST_AREAS { MOST_AREAS - 1 } else { of.len() });
+    others.extend(of.split_off(if of.len() > MOST_AREAS { MOST_AREAS - 1 } else { of.len() }));
     of.sort_by_key(|(place, _)| *place);
     let mut parts: Vec<(String, Vec<f64>)> =
         of.iter().map(|(_, of)| (of.name.clone(), of.taken_j.clone())).collect();
     let states = run.time_s.len();
+    others.retain(|(_, of)| last(&of.taken_j) > 1e-3 * start_j);
     if !others.is_empty() {
         let sum = |t: usize| others.iter().map(|(_, of)| of.taken_j[t]).sum();
         let name = format!("{} further interfaces", others.len());

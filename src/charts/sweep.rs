@@ -51,9 +51,13 @@ pub fn sweep(
         }
     };
     let results = results(columns, wanted)?;
+    let is_empty = |result: &&&ResultColumn| !result.values.iter().any(|value| value.is_finite());
+    if let Some(result) = results.iter().find(is_empty) {
+        return Err(no_result(result));
+    }
     let mut chart = match chosen[..] {
         [x] => over_one(title, x, &results, is_grid(x), varied.len() > 1),
-        [x, y] => over_two(title, [x, y], &results, [is_grid(x), is_grid(y)]),
+        [x, y] => over_two(title, [x, y], &results, [is_grid(x), is_grid(y)])?,
         _ => return Err(error!(Plot, "results are drawn over one or two varied quantities")),
     };
     let others = varied.iter().filter(|column| !chosen.iter().any(|c| c.name == column.name));
@@ -66,6 +70,10 @@ pub fn sweep(
         chart.notes.push(format!("From {seen} of {} rows, chosen by their item.", columns.rows));
     }
     Ok(chart)
+}
+
+fn no_result(result: &ResultColumn) -> Error {
+    error!(Plot, "no row has a number in {}: the column message says why", result.name)
 }
 
 fn unknown<'a>(what: &str, name: &str, all: impl Iterator<Item = &'a ResultColumn>) -> Error {
@@ -247,7 +255,7 @@ fn over_two(
     [x, y]: [&ResultColumn; 2],
     results: &[&ResultColumn],
     is_grid: [bool; 2],
-) -> Chart {
+) -> Result<Chart, Error> {
     let (columns, rows) = (groups(x, is_grid[0]), groups(y, is_grid[1]));
     let edges = |groups: &[(f64, Vec<usize>)]| {
         let middles: Vec<f64> = groups.iter().map(|(middle, _)| *middle).collect();
@@ -280,6 +288,9 @@ fn over_two(
                 }
             }
         }
+        if cells.is_empty() {
+            return Err(no_result(result));
+        }
         let all = cells.iter().map(|(.., mean)| *mean);
         let (low, high) =
             all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
@@ -307,7 +318,7 @@ fn over_two(
         ));
         chart.panels.push(panel);
     }
-    chart
+    Ok(chart)
 }
 
 fn unit_in_brackets(unit: &str) -> String {

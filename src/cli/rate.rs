@@ -205,6 +205,7 @@ struct LoadedSignal {
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if args.are_runs()? {
+        args.refuse_of_signals()?;
         return rate_runs(&args.reference.path, &args.prediction.path, options);
     }
     let both = &args.both;
@@ -226,6 +227,27 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
 }
 
 impl Args {
+    /// Refuses what is for signals alone.
+    fn refuse_of_signals(&self) -> Result<(), Failure> {
+        let addresses = [&self.reference, &self.prediction];
+        for (given, what) in [
+            (addresses.iter().any(|address| address.scale != 1.0), "scale="),
+            (addresses.iter().any(|address| address.unit.is_some()), "time="),
+            (self.from.is_some(), "--from"),
+            (self.to.is_some(), "--to"),
+            (self.cfc.is_some(), "--cfc"),
+            (self.quantity.is_some(), "--quantity"),
+        ] {
+            if given {
+                return usage(format!(
+                    "{what} is for one signal: name its column after the file, {}:COLUMN; without columns two whole results are compared",
+                    self.reference.path.display()
+                ));
+            }
+        }
+        Ok(())
+    }
+
     /// Whether both files are results of runs, of which no column is named.
     fn are_runs(&self) -> Result<bool, Failure> {
         let SignalOptions { column, id, component, section, format } = &self.both;
@@ -266,7 +288,7 @@ fn rate_runs(reference: &Path, prediction: &Path, options: GlobalOptions) -> Com
         Motion::of_csv(&text).map_err(|e| failed_at(path, e))
     };
     let (r, p) = (read(reference)?, read(prediction)?);
-    let Some(found) = accept(&r.stages(), &p.stages(), None, TIE_S) else {
+    let Some(found) = accept(&r.stages(), &p.stages(), TIE_S) else {
         return usage(format!(
             "{} and {} have no interface in common that takes energy: to rate one column, name it: {}:COLUMN",
             reference.display(),
@@ -306,6 +328,9 @@ fn print_runs(out: &mut dyn Write, found: &RunAcceptance) -> io::Result<()> {
         false => format!("another sequence: {p} instead of {r}"),
     };
     writeln!(out, "{sequence}")?;
+    if !found.missing.is_empty() {
+        writeln!(out, "not in both: {}", found.missing.join(", "))?;
+    }
     let verdict = if found.passes { "passes" } else { "fails" };
     writeln!(
         out,

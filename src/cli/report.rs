@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use crate::clock::now_utc;
 use crate::database::Database;
-use crate::file::write_whole;
+use crate::file::{is_same, write_whole};
 use crate::report::{MethodSpeeds, ReportSettings, report};
 
 use super::arguments::{self, FileKind, one_of};
@@ -72,7 +72,10 @@ fn command() -> String {
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let (mut databases, mut scenarios) = (Vec::new(), Vec::new());
-    for file in &args.files {
+    for (k, file) in args.files.iter().enumerate() {
+        if args.files[..k].iter().any(|other| is_same(other, file)) {
+            return usage(format!("{} is named twice", file.display()));
+        }
         match FileKind::of(file)? {
             FileKind::Database => {
                 keep_input(file, &args.output)?;

@@ -143,7 +143,7 @@ pub(super) fn run(args: &Args, global: GlobalOptions) -> CommandResult {
         return Err(failed(message));
     }
     let design = Design { is_random: sweep.is_random(), is_grid: sweep.is_grid() };
-    say(&report, design, reached.as_deref(), begun, output, global)
+    say(&report, design, reached.as_ref(), begun, output, global)
 }
 
 fn is_hdf5(output: &Path) -> bool {
@@ -235,7 +235,7 @@ struct Design {
 fn say(
     report: &Report,
     Design { is_random, is_grid }: Design,
-    reached: Option<&str>,
+    reached: Option<&Reached>,
     begun: Instant,
     output: &Path,
     global: GlobalOptions,
@@ -263,11 +263,12 @@ fn say(
         let (warned, rows, reasons) = (report.warned, report.rows, shown.join("; "));
         global.warn(&format!("{warned} of {rows} items have warnings in their rows: {reasons}"));
     }
-    let outcome = Outcome::warned_if(report.failed + report.warned > 0);
+    let is_short = reached.is_some_and(|reached| !reached.is_reached);
+    let outcome = Outcome::warned_if(report.failed + report.warned > 0 || is_short);
     if is_stdout(output) {
         return Ok(outcome);
     }
-    let document = document! { #[serde(flatten)] report: report, seconds: seconds, output: output };
+    let document = document! { #[serde(flatten)] report: report, until if_any: reached, seconds: seconds, output: output };
     global.show(&document, |out| {
         output::table(out, statistics(report, is_grid))?;
         if let Some(least) = varied(report).and(report.sensitivities.iter().map(|s| s.rows).min()) {
@@ -279,7 +280,7 @@ fn say(
         }
         print_share_over_limits(out, report, is_random)?;
         if let Some(reached) = reached {
-            writeln!(out, "{reached}")?;
+            writeln!(out, "{}", reached.text(report.rows))?;
         }
         let resumed = match report.resumed {
             0 => String::new(),
@@ -307,7 +308,10 @@ fn until(
     precision: &Precision,
     options: &WriteOptions,
     global: GlobalOptions,
-) -> Result<(Report, Option<String>), Failure> {
+) -> Result<(Report, Option<Reached>), Failure> {
+    if is_stdout(output) {
+        return usage("--until writes one .csv file, which it makes longer: name it with -o");
+    }
     let bar = Bar::over(global, sweep.items());
     let mut is_first = true;
     let stop = stop_flag();
@@ -319,17 +323,50 @@ fn until(
         }
     })?;
     let Precision { column, half_width: wanted } = precision;
-    let mean = report.columns.iter().find(|of| of.column == *column).and_then(|of| of.mean);
-    let known = match mean.zip(half_width) {
-        Some((mean, half_width)) => {
-            let is_reached = half_width <= *wanted;
-            let verdict = if is_reached { "reached" } else { "not reached: state more samples" };
-            format!("{} ± {} (95 %); ± {wanted} {verdict}", digits(mean), digits(half_width))
-        }
-        None => "not known".into(),
+    let of = report.columns.iter().find(|of| of.column == *column);
+    let reached = Reached {
+        column: column.clone(),
+        mean: of.and_then(|of| of.mean),
+        half_width,
+        wanted: *wanted,
+        numbers: of.map_or(0, |of| of.count),
+        is_reached: half_width.is_some_and(|half_width| half_width <= *wanted),
     };
-    let text = format!("{column} after {}: {known}", counted(report.rows, "run"));
-    Ok((report, Some(text)))
+    if !reached.is_reached && report.is_complete() {
+        global.warn(&format!("{column}: ± {wanted} is not reached: state more samples in [sweep]"));
+    }
+    Ok((report, Some(reached)))
+}
+
+/// What was reached of a stated precision.
+#[derive(serde::Serialize)]
+struct Reached {
+    column: String,
+    mean: Option<f64>,
+    /// Half of the 95 % confidence interval.
+    half_width: Option<f64>,
+    wanted: f64,
+    /// Rows that have a number.
+    numbers: u64,
+    is_reached: bool,
+}
+
+impl Reached {
+    fn text(&self, rows: u64) -> String {
+        let Self { column, wanted, numbers, is_reached, .. } = self;
+        let known = match self.mean.zip(self.half_width) {
+            Some((mean, half_width)) => {
+                let verdict = if *is_reached { "reached" } else { "not reached" };
+                format!("{} ± {} (95 %); ± {wanted} {verdict}", digits(mean), digits(half_width))
+            }
+            None => "not known: too few runs have a number".into(),
+        };
+        let without = match rows - numbers {
+            0 => String::new(),
+            without => format!(" ({without} have no number)"),
+        };
+        format!("{column} after {}{without}: {known}", counted(rows, "run"))
+    }
 }
 
 /// Percentiles are those of a distribution: a grid has none.

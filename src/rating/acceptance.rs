@@ -107,6 +107,8 @@ pub(crate) struct RunAcceptance {
     /// Difference of the energies of all stages over the initial energy.
     pub energy_error: f64,
     pub stages: Vec<StageAcceptance>,
+    /// Stages that count and that only one of the runs has.
+    pub missing: Vec<String>,
     /// Stages that count, in the order in which they begin in the reference and in the prediction.
     pub sequences: [Vec<String>; 2],
     pub same_sequence: bool,
@@ -116,14 +118,13 @@ pub(crate) struct RunAcceptance {
 /// Share of the reference's energy below which a stage does not count.
 const LEAST_SHARE: f64 = 0.01;
 
-/// Rates the stages that both runs have, by name. Energies are compared with `initial_j`; without it with the energy that
-/// the reference's stages take at most, which is less and so stricter. `None` if they have no stage in common.
+/// Rates the stages of two runs by their names. Energies are compared with what the reference's stages take at most, which is
+/// less than the initial energy and so stricter. `None` if they have no stage in common.
 ///
 /// Stages that begin within `tie_s` of each other have no order.
 pub(crate) fn accept(
     reference: &[StageRecord<'_>],
     prediction: &[StageRecord<'_>],
-    initial_j: Option<f64>,
     tie_s: f64,
 ) -> Option<RunAcceptance> {
     let pairs: Vec<(&str, StageResult, StageResult)> = reference
@@ -133,8 +134,18 @@ pub(crate) fn accept(
             Some((r.name, r.result(), p.result()))
         })
         .collect();
-    let most_j: f64 = pairs.iter().map(|(_, r, _)| r.mean_force_n * r.displacement_m).sum();
-    let initial_energy_j = initial_j.unwrap_or(most_j);
+    let most_j = |stages: &[StageRecord<'_>]| -> f64 {
+        let results = stages.iter().map(StageRecord::result);
+        results.map(|result| result.mean_force_n * result.displacement_m).sum()
+    };
+    let lacks = |of: &[StageRecord<'_>], other: &[StageRecord<'_>]| -> Vec<String> {
+        let least_j = LEAST_SHARE * most_j(of);
+        let alone = of.iter().filter(|stage| other.iter().all(|o| o.name != stage.name));
+        let counting = alone.filter(|stage| stage.result().dissipated_j >= least_j);
+        counting.map(|stage| stage.name.to_string()).collect()
+    };
+    let missing = [lacks(reference, prediction), lacks(prediction, reference)].concat();
+    let initial_energy_j = most_j(reference);
     if pairs.is_empty() || initial_energy_j <= 0.0 {
         return None;
     }
@@ -149,12 +160,13 @@ pub(crate) fn accept(
                 p.displacement_m / r.displacement_m - 1.0,
                 p.mean_force_n / r.mean_force_n - 1.0,
             ),
-            counts: r.dissipated_j >= LEAST_SHARE * most_j,
+            counts: r.dissipated_j >= LEAST_SHARE * initial_energy_j,
         })
         .collect();
-    let sum = |of: fn(&StageAcceptance) -> f64| stages.iter().map(of).sum::<f64>();
-    let energy_error =
-        (sum(|s| s.prediction.dissipated_j) - sum(|s| s.reference.dissipated_j)) / initial_energy_j;
+    let all_j = |stages: &[StageRecord<'_>]| -> f64 {
+        stages.iter().map(|stage| stage.result().dissipated_j).sum()
+    };
+    let energy_error = (all_j(prediction) - all_j(reference)) / initial_energy_j;
     let counting: Vec<&StageAcceptance> = stages.iter().filter(|stage| stage.counts).collect();
     let same_sequence = counting.iter().all(|a| {
         counting.iter().all(|b| {
@@ -164,7 +176,9 @@ pub(crate) fn accept(
             let (r, p) = (before(|s| s.reference.begin_s), before(|s| s.prediction.begin_s));
             r.is_none() || p.is_none() || r == p
         })
-    });
+    }) && counting
+        .iter()
+        .all(|stage| stage.reference.begin_s.is_some() == stage.prediction.begin_s.is_some());
     let order = |begin: fn(&StageAcceptance) -> Option<f64>| {
         let mut order = counting.clone();
         let time = |stage: &StageAcceptance| begin(stage).unwrap_or(f64::INFINITY);
@@ -173,6 +187,7 @@ pub(crate) fn accept(
     };
     let sequences = [order(|s| s.reference.begin_s), order(|s| s.prediction.begin_s)];
     let passes = same_sequence
+        && missing.is_empty()
         && energy_error.abs() <= LIMIT
         && counting.iter().all(|stage| stage.acceptance.passes);
     Some(RunAcceptance {
@@ -183,6 +198,7 @@ pub(crate) fn accept(
         sequences,
         same_sequence,
         passes,
+        missing,
         stages,
     })
 }
@@ -210,16 +226,18 @@ mod tests {
         let first = ([0.0, 1.0, 1.0, 1.0], [0.5, 1.0, 1.0, 1.0]);
         let reference = [stage("a", &d, &f), stage("b", &later.0, &later.1)];
         let close = [stage("a", &d2, &f2), stage("b", &later.0, &later.1)];
-        let found = accept(&reference, &close, None, 0.01).unwrap();
+        let found = accept(&reference, &close, 0.01).unwrap();
         assert!(found.passes && found.same_sequence, "{found:?}");
         assert_eq!(found.initial_energy_j, 1.5);
         assert!((found.stages[0].acceptance.displacement_error - 0.08).abs() < 1e-12);
         assert!((found.stages[0].acceptance.mean_force_error + 0.08).abs() < 1e-12);
         let turned = [stage("b", &first.0, &first.1), stage("a", &d2, &f2)];
-        let found = accept(&reference, &turned, None, 0.01).unwrap();
+        let found = accept(&reference, &turned, 0.01).unwrap();
         assert!(!found.same_sequence && !found.passes);
         assert_eq!(found.sequences[1], ["b", "a"]);
-        assert!(accept(&reference, &[], None, 0.01).is_none());
+        let found = accept(&reference, &close[..1], 0.01).unwrap();
+        assert!(!found.passes && found.missing == ["b"], "{found:?}");
+        assert!(accept(&reference, &[], 0.01).is_none());
         // At the bound, and beyond.
         assert!(Acceptance::of(0.1, -0.1, 0.1).passes && !Acceptance::of(0.0, 0.0, 0.1001).passes);
     }

@@ -218,7 +218,7 @@ pub(crate) fn report(
     let mut ran = Vec::new();
     for scenario in scenarios {
         step(&format!("running {}", scenario.display()));
-        ran.push(train::add(&mut content, scenario, settings)?);
+        ran.push(train::add(&mut content, scenario, &short_name(scenario, scenarios), settings)?);
     }
     if databases.len() > 1 {
         side_by_side::add_designs(&mut content, &designs);
@@ -269,7 +269,9 @@ fn groups<'a>(
             let is_shown = settings.groups.is_empty() || settings.groups.iter().any(|g| g == group);
             let title = match databases {
                 [_] => group.into(),
-                _ => format!("{group}, {}", file_name(path)),
+                _ => {
+                    format!("{group}, {}", short_name(path, databases.iter().map(|(path, _)| path)))
+                }
             };
             if is_shown {
                 groups.push((title, group, database.cases(group)));
@@ -321,6 +323,13 @@ fn html(content: &Content) -> String {
 /// JSON that may be in a script element, whatever its strings hold.
 fn in_script(json: &str) -> String {
     json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
+}
+
+/// The last part of a path; the whole if another one ends in the same.
+fn short_name<'a>(path: &Path, all: impl IntoIterator<Item = &'a PathBuf>) -> String {
+    let name = file_name(path);
+    let alike = all.into_iter().filter(|other| file_name(other) == name).count();
+    if alike > 1 { path.display().to_string() } else { name }
 }
 
 /// The last part of a path.

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use super::figure::Figure;
 use super::{
-    Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, ToDo, Verdict, energy,
-    file_name, mass, metres, percent,
+    Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, ToDo, Verdict, energy, mass,
+    metres, percent,
 };
 use crate::assess::ComparisonSettings;
 use crate::assess::train::{TrainComparison, compare_train};
@@ -43,13 +43,14 @@ const SHOWN: [(Quantity, &str); 5] = [
 pub(super) fn add(
     content: &mut Content,
     path: &Path,
+    name: &str,
     settings: &ReportSettings,
 ) -> Result<Ran, Error> {
     let read = scenario::read(path)?;
     let (prepared, origins) = scenario::load_with_origins(path)?;
     let run = prepared.run()?;
     let number = content.sections.len() + 1;
-    let name = file_name(path);
+    let name = name.to_string();
     let summary = prepared.summary(&run);
     let uncertainty = origins.iter().filter_map(|of| Some(of.left_out.as_ref()?.force_l1));
     add_verdicts(content, &name, &summary, uncertainty.fold(0.0, f64::max));

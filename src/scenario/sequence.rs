@@ -75,7 +75,10 @@ pub(super) fn sequence<'a>(prepared: &'a Prepared, run: &Run) -> Vec<Event<'a>> 
         if let Some(time_s) = crossing(history.data_end_m) {
             add(time_s, Happening::BeyondData);
         }
-        add(history.max_deflection_time_s, Happening::LargestCrush);
+        // At the end of the run it is still crushed.
+        if run.time_s.last().is_some_and(|end_s| history.max_deflection_time_s < *end_s) {
+            add(history.max_deflection_time_s, Happening::LargestCrush);
+        }
     }
     events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
     events
@@ -98,13 +101,22 @@ fn contacts(time_s: &[f64], history: &InterfaceHistory) -> Vec<(f64, Happening)>
         let again = (open..time_s.len()).find(|k| is_loaded(*k));
         let end = again.unwrap_or(time_s.len() - 1);
         if time_s[end] - time_s[open] >= OPEN_S {
-            events.push((time_s[open], Happening::Opened));
+            events.push((opened_s(time_s, &history.force_n, open), Happening::Opened));
             events.extend(again.map(|k| (time_s[k - 1], Happening::ContactAgain)));
         }
         let Some(again) = again else { break };
         at = again;
     }
     events
+}
+
+/// When a force that is 0 at output `open` and was not before ended: along the line through its last two values.
+fn opened_s(time_s: &[f64], force_n: &[f64], open: usize) -> f64 {
+    let last = open - 1;
+    let before = last.checked_sub(1).map_or(0.0, |k| force_n[k]);
+    let fall = before - force_n[last];
+    let share = if fall * force_n[last] > 0.0 { force_n[last] / fall } else { 1.0 };
+    time_s[last] + share.min(1.0) * (time_s[open] - time_s[last])
 }
 
 /// When the mean speed of the first train no longer exceeds that of the second, or 0 against a wall.

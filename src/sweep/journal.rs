@@ -60,6 +60,16 @@ pub fn write(
     // A link is followed, so that its target is replaced and not the link.
     let output = &target_of(output).map_err(failed(output))?;
     let _lock = WriterLock::take(output)?;
+    write_locked(sweep, output, options, &mut progress)
+}
+
+/// As [`write()`], for who holds the lock; `output` is not a link.
+pub(super) fn write_locked(
+    sweep: &Sweep,
+    output: &Path,
+    options: &WriteOptions,
+    progress: &mut dyn FnMut(u64) -> ControlFlow<()>,
+) -> Result<Report, Error> {
     let head = ShardHeader::of(sweep, options.shard);
     let (part, sums) = (beside(output, ".part"), beside(output, ".part.sums"));
     let mut tally = Tally::new(&head);

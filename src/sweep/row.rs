@@ -228,6 +228,12 @@ impl ShardHeader {
                 self.version, wanted.version
             ));
         }
+        if self.items != wanted.items && self.columns == wanted.columns {
+            return Some(format!(
+                "it is of {} items, this of {}: plan, scenario or a file it names have changed since, or it ended at a stated precision (--until)",
+                self.items, wanted.items
+            ));
+        }
         if self.hash != wanted.hash || self.items != wanted.items || self.columns != wanted.columns
         {
             return Some("plan, scenario or a file it names have changed since".into());

@@ -165,15 +165,22 @@ fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
 /// Quantile of the normal distribution that leaves out 2.5 %.
 const Z: f64 = 1.959_963_985;
 
+/// Below so many numbers Student's quantile differs from the normal one by more than 4 %.
+const LEAST_NUMBERS: u64 = 30;
+
 impl ColumnStatistics {
     /// Half the width of the interval that holds the mean of all possible rows with 95 % probability, if these are drawn
-    /// at random; of [`OVER_LIMITS`] that of the share.
-    pub(crate) fn half_width(&self) -> Option<f64> {
+    /// at random; of [`OVER_LIMITS`] that of the share of all `rows`, those of which it is not known taken as either. `None`
+    /// for fewer numbers than the normal distribution is good for.
+    pub(crate) fn half_width(&self, rows: u64) -> Option<f64> {
         if self.column == OVER_LIMITS {
-            let (low, high) = share_interval(self.mean?, self.count);
+            let over = self.mean? * self.count as f64;
+            let share = |over: f64| over / rows as f64;
+            let (low, _) = share_interval(share(over), rows);
+            let (_, high) = share_interval(share(over + (rows - self.count) as f64), rows);
             return Some(0.5 * (high - low));
         }
-        Some(Z * self.sd? / (self.count as f64).sqrt())
+        (self.count >= LEAST_NUMBERS).then_some(Z * self.sd? / (self.count as f64).sqrt())
     }
 }
 

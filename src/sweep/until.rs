@@ -8,13 +8,13 @@ use std::io::{BufWriter, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use super::journal::{beside, sum};
+use super::journal::{beside, sum, write_locked};
 use super::row::{ShardFile, ShardHeader};
 use super::statistics::ColumnStatistics;
 use super::to_hdf5::is_hdf5;
-use super::{Report, Shard, Sweep, WriteOptions, write};
+use super::{Report, Shard, Sweep, WriteOptions};
 use crate::error::{Error, error};
-use crate::file::not_written;
+use crate::file::{WriterLock, not_written, target_of};
 use crate::guess::hint;
 
 /// When a sweep is precise enough.
@@ -58,21 +58,26 @@ pub fn write_until(
         let guess = hint(&precision.column, &all);
         return Err(error!(
             Sweep,
-            "--until: there is no result \"{}\": expected one of {all}{guess}", precision.column
+            "--until: there is no result \"{}\": name it in results of [sweep], or one of {all}{guess}",
+            precision.column
         ));
     }
+    let output = &target_of(output).map_err(|e| not_written(output, e))?;
+    let _lock = WriterLock::take(output)?;
     let most = sweep.items();
     let mut samples = match (options.restart, of_earlier_run(sweep, output, most)?) {
         (false, Some(earlier)) => earlier,
         _ => FIRST.min(most),
     };
     let mut options = *options;
+    let mut resumed = None;
     loop {
         sweep.set_samples(samples)?;
-        let report = write(sweep, output, &options, &mut progress)?;
+        let mut report = write_locked(sweep, output, &options, &mut progress)?;
         options.restart = false;
+        report.resumed = *resumed.get_or_insert(report.resumed);
         let of = report.columns.iter().find(|of| of.column == precision.column);
-        let half_width = of.and_then(ColumnStatistics::half_width);
+        let half_width = of.and_then(|of: &ColumnStatistics| of.half_width(report.rows));
         let is_precise = half_width.is_some_and(|half_width| half_width <= precision.half_width);
         if !report.is_complete() || is_precise || samples == most {
             return Ok((report, half_width));
@@ -123,7 +128,10 @@ fn extend(output: &Path, head: &ShardHeader) -> Result<(), Error> {
         of_rows.write_all(sum(line).as_bytes()).map_err(failed)?;
         Ok(true)
     })?;
-    rows.flush().and_then(|()| of_rows.flush()).map_err(failed)?;
+    for file in [rows, of_rows] {
+        let file = file.into_inner().map_err(|error| failed(error.into_error()))?;
+        file.sync_all().map_err(failed)?;
+    }
     // Only now that its rows are in the other file.
     fs::remove_file(output).map_err(|e| not_written(output, e))
 }
