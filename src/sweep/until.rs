@@ -30,10 +30,10 @@ pub struct Precision {
 const FIRST: u64 = 100;
 
 /// Runs samples of the sweep until `precision` is reached, or all that its plan states, and writes the rows to `output` as
-/// [`write()`] does. Fewer samples of an earlier run are kept. Gives the statistics of the column with the report.
+/// [`super::write()`] does. Fewer samples of an earlier run are kept. Gives the statistics of the column with the report.
 ///
 /// # Errors
-/// As [`write()`]; for plans with grids or strata, whose first rows are no sample of the whole; for an output as HDF5; for an
+/// As [`super::write()`]; for plans with grids or strata, whose first rows are no sample of the whole; for an output as HDF5; for an
 /// unknown column.
 pub fn write_until(
     sweep: &mut Sweep,
