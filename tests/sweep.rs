@@ -1126,6 +1126,16 @@ fn the_example_runs() {
 
 #[test]
 fn help_has_examples() {
+    // Every result that a plan may name.
+    let help = crumple_ok(Path::new("."), "sweep --help");
+    let plan = fs::read_to_string(root().join("schemas/plan.schema.json")).unwrap();
+    let plan: Value = serde_json::from_str(&plan).unwrap();
+    let results = plan["$defs"]["ResultName"]["oneOf"].as_array().unwrap();
+    assert!(results.len() > 10);
+    for result in results {
+        let name = result["const"].as_str().unwrap();
+        assert!(help.split([' ', ',', '.', '\n', '(']).any(|word| word == name), "{name}");
+    }
     for arguments in [&["sweep", "--help"][..], &["sweep", "merge", "--help"]] {
         let help = crumple_ok(Path::new("."), arguments);
         assert!(help.contains("Examples:") && help.contains("crumple sweep merge -o"), "{help}");

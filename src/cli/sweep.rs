@@ -34,7 +34,10 @@ use super::{
   crumple sweep scenario.toml --plan plan.toml -o results.h5
   crumple sweep scenario.toml --shard 2/3 -o part2.csv
   crumple sweep scenario.toml --until over_limits=0.02 -o results.csv      # the share within ±2 %
-  crumple sweep merge -o results.csv part1.csv part2.csv part3.csv"
+  crumple sweep merge -o results.csv part1.csv part2.csv part3.csv
+Results that [sweep] may name: peak_force, max_deflection, max_deflection_time, restitution, final_speed,
+mean_deceleration, energy_error, momentum_error (these if none are named), moving_mean_deceleration,
+secondary_impact, occupant_load, energy, over_limits."
 )]
 pub(super) struct Args {
     #[command(subcommand)]
