@@ -203,7 +203,7 @@ def read(path, ids=None, components=None, section=None, format=None):
     """Read a solver's file: any that the program reads (nodout, rcforc, binout, T01, ...).
 
     Only what is selected is parsed: `ids` (numbers, or texts such as "3:surfa"), `components` (named as in binout), one or
-    several, a `section` of a binout. Damage is no error: `problems` names it.
+    several, a `section` of a binout. Damage is not an error: `problems` names it.
 
     Raises `crumple.Error` if the file cannot be opened or read.
     """

@@ -194,7 +194,7 @@ pub struct Drawing {
     pub width: f64,
     /// Height in pixels.
     pub height: f64,
-    /// The chart's title, for who cannot see it.
+    /// The chart's title, for readers who cannot see it.
     pub(crate) title: String,
     /// From the lowest to the topmost.
     pub(crate) shapes: Vec<Shape>,

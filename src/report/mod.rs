@@ -104,7 +104,7 @@ pub(crate) struct Section {
 /// What came out, in a sentence.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Verdict {
-    /// `over` or `kept` of a limit, `unknown`, or `known`: what is no matter of limits.
+    /// `over` or `kept` of a limit, `unknown`, or `known`: a result without a limit.
     state: &'static str,
     about: String,
     text: String,

@@ -63,7 +63,7 @@ pub fn write(
     write_locked(sweep, output, options, &mut progress)
 }
 
-/// As [`write()`], for who holds the lock; `output` is not a link.
+/// As [`write()`], for a caller that holds the lock; `output` is not a link.
 pub(super) fn write_locked(
     sweep: &Sweep,
     output: &Path,

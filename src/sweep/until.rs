@@ -33,7 +33,7 @@ const FIRST: u64 = 100;
 /// [`super::write()`] does. Fewer samples of an earlier run are kept. Gives the statistics of the column with the report.
 ///
 /// # Errors
-/// As [`super::write()`]; for plans with grids or strata, whose first rows are no sample of the whole; for an output as HDF5; for an
+/// As [`super::write()`]; for plans with grids or strata, whose first rows are not a sample of the whole; for an output as HDF5; for an
 /// unknown column.
 pub fn write_until(
     sweep: &mut Sweep,
