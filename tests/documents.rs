@@ -251,6 +251,7 @@ fn xarray_opens_databases_and_histories() {
         \x20   case = opened('curves.h5', ['time_s'], engine, group='lead-car-pair/48kmh')\n\
         \x20   assert all(v.dims == ('time_s',) for v in case.variables.values()), case\n\
         \x20   assert case.attrs['speed_kind'] == 'closing' and 'body_force_N' in case\n\
+        \x20   assert [v.units for v in (case.force_N, case.deflection_m, case.time_s)] == ['N', 'm', 's']\n\
         \x20   forces = opened('rcforc.h5', ['time', 'interface'], engine)\n\
         \x20   assert forces.x_force.dims == ('time', 'interface') and forces.x_force.units == 'N'\n\
         \x20   assert list(forces.interface.attrs['sides']) == ['surfa', 'surfb']\n\
@@ -265,6 +266,44 @@ fn xarray_opens_databases_and_histories() {
         .output()
         .unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
+/// silx, asked for the file's picture, draws force over deflection: also after a case was added to a file that
+/// another program has written to, which is edited and not written anew.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn silx_draws_the_curve_of_a_database() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-pair");
+    let look = "import h5py, sys\n\
+        from silx.io import nxdata\n\
+        with h5py.File('curves.h5', 'a') as file:\n\
+        \x20   for entry in [file, *file.values()]:\n\
+        \x20       data = nxdata.get_default(entry)\n\
+        \x20       assert data.is_curve and data.signal.name == f'/{sys.argv[1]}/force_N', data.signal.name\n\
+        \x20       assert data.axes_dataset_names == ['deflection_m'], data.axes_dataset_names\n\
+        \x20   for path in sys.argv[1:]:\n\
+        \x20       data = nxdata.NXdata(file[path])\n\
+        \x20       assert data.is_valid and (data.signal_name, data.axes_names) == ('Force', ['Deflection'])\n\
+        \x20       units = [file[path][name].attrs['units'] for name in ('force_N', 'body_force_N', 'deflection_m')]\n\
+        \x20       assert units == [b'N', b'N', b'm'], units\n\
+        \x20   file['lead-car-pair'].attrs['ours'] = 1\n";
+    let check = |cases: &[&str]| {
+        let output = python_of("CRUMPLE_PYTHON_TABLES")
+            .args([&["-c", look], cases].concat())
+            .current_dir(here)
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    };
+    check(&["lead-car-pair/72kmh", "lead-car-pair/36kmh"]);
+    crumple_ok(
+        here,
+        &["db", "rename", "curves.h5", "--case", "lead-car-pair/36kmh", "--to", "slow"],
+    );
+    crumple_ok(here, &["db", "tag", "curves.h5", "--case", "lead-car-pair/48kmh", "--add", "old"]);
+    check(&["lead-car-pair/72kmh", "lead-car-pair/slow", "lead-car-pair/48kmh"]);
 }
 
 /// Work that takes long says on a terminal what it is at, and nothing elsewhere.

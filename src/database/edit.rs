@@ -8,7 +8,7 @@ use std::{fmt, fs};
 
 use super::group::{self, GROUP_ATTRIBUTES};
 use super::layout::{
-    self, BODY_FORCE, CASE_ATTRIBUTES, Content, FoundGroup, ORIGINAL, Opened, ROOT, VERSION,
+    self, BODY_FORCE, CASE_ATTRIBUTES, Content, FoundGroup, ORIGINAL, Opened, PLOT, ROOT, VERSION,
 };
 use super::{CasePath, Database};
 use crate::curve::Case;
@@ -203,7 +203,7 @@ impl Edit<'_> {
     fn make(&self, path: &Path) -> Result<(), EditError> {
         let file = open(path)?;
         let root = file.root();
-        for (name, value) in layout::root_attributes() {
+        for (name, value) in layout::root_attributes(self.new) {
             root.set_attr(name, value)?;
         }
         self.put(&root)?;
@@ -245,15 +245,18 @@ impl Edit<'_> {
     }
 }
 
-fn add(group: &Group, case: &Case, content: Content<'_>) -> Result<(), EditError> {
+fn add(group: &Group, case: &Case, mut content: Content<'_>) -> Result<(), EditError> {
     group.create_group_with(&case.id.name, |group| {
-        for (name, value) in content.attributes {
+        for (name, value) in content.written() {
             group.set_attr(name, value);
         }
         group.create_group(ORIGINAL);
         for (path, values) in content.datasets {
             group.create_dataset(&path, |dataset| {
                 dataset.with_f64_data(&values);
+                for (name, value) in layout::labels(&path) {
+                    dataset.set_attr(name, value);
+                }
             });
         }
     })?;
@@ -293,10 +296,12 @@ fn replace_group_attributes(
     with_attributes(group, attributes)
 }
 
-fn replace_attributes(case: &Group, content: Content<'_>) -> Result<(), EditError> {
+fn replace_attributes(case: &Group, mut content: Content<'_>) -> Result<(), EditError> {
     let there = case.attrs()?;
     for name in CASE_ATTRIBUTES.iter().filter(|name| there.contains_key(**name)) {
-        if !content.attributes.iter().any(|(n, _)| n == name) {
+        let is_written =
+            content.attributes.iter().map(|(n, _)| n).chain(PLOT.iter().map(|(n, _)| n));
+        if !is_written.into_iter().any(|n| n == name) {
             case.remove_attr(name)?;
         }
     }
@@ -304,7 +309,7 @@ fn replace_attributes(case: &Group, content: Content<'_>) -> Result<(), EditErro
     let is_same = |a: &AttrValue, b: &AttrValue| {
         (a.as_str(), a.as_f64(), a.as_i64()) == (b.as_str(), b.as_f64(), b.as_i64())
     };
-    for (name, value) in content.attributes {
+    for (name, value) in content.written() {
         if !there.get(name).is_some_and(|before| is_same(before, &value)) {
             case.set_attr(name, value)?;
         }
@@ -319,11 +324,14 @@ fn replace_curves(case: &Group, content: &Content<'_>) -> Result<(), EditError> 
         let mut theirs = HashMap::new();
         if let Ok(found) = case.dataset(path) {
             theirs = found.attrs()?;
-            theirs.retain(|name, _| !is_of_dimensions(name));
+            theirs.retain(|name, _| !is_ours(name));
             case.delete(path)?;
         }
         case.create_dataset(path, |dataset| {
             dataset.with_f64_data(values);
+            for (name, value) in layout::labels(path) {
+                dataset.set_attr(name, value);
+            }
             for (name, value) in theirs {
                 dataset.set_attr(&name, value);
             }
@@ -449,14 +457,14 @@ impl Foreign {
     }
 
     fn of_dataset(&mut self, place: &str, dataset: &Dataset) -> Result<(), hdf5::Error> {
-        for name in dataset.attr_datatypes()?.keys().filter(|name| !is_of_dimensions(name)) {
+        for name in dataset.attr_datatypes()?.keys().filter(|name| !is_ours(name)) {
             self.add("attribute", place, name);
         }
         Ok(())
     }
 }
 
-/// Whether an attribute of a dataset is of its dimension scales, which earlier versions wrote.
-pub(super) fn is_of_dimensions(name: &str) -> bool {
-    ["CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"].contains(&name)
+/// Whether an attribute of a dataset is ours: a label, or of the dimension scales that earlier versions wrote.
+pub(super) fn is_ours(name: &str) -> bool {
+    ["units", "long_name", "CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST"].contains(&name)
 }

@@ -14,7 +14,8 @@ const STOPPED: &str = "stopped_mass_kg";
 const RATE: &str = "stopped_mass_rate_kg_per_m";
 const RESIDUAL: &str = "stopped_mass_residual_kg";
 /// Every attribute that a group can have; others belong to other programs.
-pub(super) const GROUP_ATTRIBUTES: [&str; 5] = [CASES, DEFLECTION, STOPPED, RATE, RESIDUAL];
+pub(super) const GROUP_ATTRIBUTES: [&str; 7] =
+    [CASES, DEFLECTION, STOPPED, RATE, RESIDUAL, "NX_class", "default"];
 
 /// The value of a group's attribute `cases`.
 fn case_names(cases: &[Case]) -> AttrValue {
@@ -23,7 +24,11 @@ fn case_names(cases: &[Case]) -> AttrValue {
 
 /// The attributes of a group with these cases, in order of speed.
 pub(super) fn attributes(name: &str, cases: &[Case]) -> Vec<(&'static str, AttrValue)> {
-    let mut all = vec![(CASES, case_names(cases))];
+    let mut all =
+        vec![(CASES, case_names(cases)), ("NX_class", AttrValue::String("NXentry".into()))];
+    // The case that a tool draws which is asked for the group's picture.
+    let last = cases.last();
+    all.extend(last.map(|case| ("default", AttrValue::VarLenString(case.id.name.clone()))));
     if let Some(stopped) = stopped_mass(name, cases) {
         all.extend(of_stopped_mass(&stopped));
     }
@@ -62,7 +67,7 @@ pub(super) fn differs(
     name: &str,
     cases: &[Case],
 ) -> Option<(&'static str, &'static str)> {
-    if GROUP_ATTRIBUTES[1..].iter().all(|name| !found.contains_key(*name)) {
+    if [DEFLECTION, STOPPED, RATE, RESIDUAL].iter().all(|name| !found.contains_key(*name)) {
         return None;
     }
     let expected = stopped_mass(name, cases).map(|stopped| of_stopped_mass(&stopped));

@@ -27,7 +27,8 @@ const WRITTEN_BY: &str = concat!("crumple ", env!("CARGO_PKG_VERSION"));
 /// The oldest it reads: that one has no body force, dates, origins and tags.
 pub(crate) const OLDEST: i64 = 2;
 
-pub(crate) const ROOT: [&str; 3] = ["format", "layout_version", "written_by"];
+pub(crate) const ROOT: [&str; 5] =
+    ["format", "layout_version", "written_by", "NX_class", "default"];
 /// Group of a case with the curve at the solver's rate.
 pub(crate) const ORIGINAL: &str = "original";
 /// Attribute of a case with the BLAKE3 hashes of its content.
@@ -47,7 +48,7 @@ pub(crate) struct Content<'a> {
 pub(crate) const BODY_FORCE: &str = "body_force_N";
 
 /// Every attribute that a case can have; others belong to other programs.
-pub(crate) const CASE_ATTRIBUTES: [&str; 26] = [
+pub(crate) const CASE_ATTRIBUTES: [&str; 29] = [
     "study",
     "speed_m_per_s",
     "speed_kind",
@@ -74,7 +75,29 @@ pub(crate) const CASE_ATTRIBUTES: [&str; 26] = [
     "tags",
     "user_notes",
     HASHES,
+    // What follows is PLOT.
+    "NX_class",
+    "signal",
+    "axes",
 ];
+
+/// Attributes of a case by which tools that know NeXus draw its curve. They are the same for every case, and
+/// not among the hashed ones.
+pub(crate) const PLOT: [(&str, &str); 3] =
+    [("NX_class", "NXdata"), ("signal", "force_N"), ("axes", "deflection_m")];
+
+/// Attributes of the dataset at `path`: its unit and what its axis is called. Of fixed length: each text of
+/// variable length takes 4 KiB.
+pub(crate) fn labels(path: &str) -> [(&'static str, AttrValue); 2] {
+    let (unit, name) = match path.rsplit('/').next().unwrap_or(path) {
+        "time_s" => ("s", "Time after contact"),
+        "deflection_m" => ("m", "Deflection"),
+        "closing_speed_m_per_s" => ("m/s", "Closing speed"),
+        BODY_FORCE => ("N", "Body force"),
+        _ => ("N", "Force"),
+    };
+    [("units", AttrValue::String(unit.into())), ("long_name", AttrValue::String(name.into()))]
+}
 
 impl<'a> Content<'a> {
     pub(crate) fn of(case: &'a Case) -> Result<Self, Error> {
@@ -153,6 +176,12 @@ impl<'a> Content<'a> {
         self.datasets.push((name.into(), values));
     }
 
+    /// All attributes of the case, those for other programs among them.
+    pub(crate) fn written(&mut self) -> impl Iterator<Item = (&'static str, AttrValue)> {
+        let plot = PLOT.map(|(name, value)| (name, AttrValue::String(value.into())));
+        std::mem::take(&mut self.attributes).into_iter().chain(plot)
+    }
+
     /// BLAKE3 of each dataset's values (doubles, little endian) by its path, and of all
     /// attributes: name, zero byte, value (text, or little endian), zero byte, each.
     pub(crate) fn hashes(&self) -> BTreeMap<String, String> {
@@ -215,18 +244,23 @@ pub(crate) fn with_hashes<'a>(database: &Database, case: &'a Case) -> Result<Con
     Ok(content)
 }
 
-pub(crate) fn root_attributes() -> [(&'static str, AttrValue); 3] {
-    [
+/// The attributes of the root, which draws its first case if it is asked for a picture.
+pub(crate) fn root_attributes(database: &Database) -> Vec<(&'static str, AttrValue)> {
+    let mut all = vec![
         ("format", AttrValue::VarLenString(FORMAT.into())),
         ("layout_version", AttrValue::I64(VERSION)),
         ("written_by", AttrValue::VarLenString(WRITTEN_BY.into())),
-    ]
+        ("NX_class", AttrValue::String("NXroot".into())),
+    ];
+    let first = database.groups().next();
+    all.extend(first.map(|group| ("default", AttrValue::VarLenString(group.into()))));
+    all
 }
 
 /// A database as the HDF5 file that it will be.
 pub(crate) fn encode(database: &Database) -> Result<FileBuilder, Error> {
     let mut file = FileBuilder::new();
-    for (name, value) in root_attributes() {
+    for (name, value) in root_attributes(database) {
         file.set_attr(name, value);
     }
     for (name, cases) in &database.groups {
@@ -235,9 +269,9 @@ pub(crate) fn encode(database: &Database) -> Result<FileBuilder, Error> {
             group.set_attr(attribute, value);
         }
         for case in cases {
-            let content = with_hashes(database, case)?;
+            let mut content = with_hashes(database, case)?;
             let mut builder = group.create_group(&case.id.name);
-            for (name, value) in content.attributes {
+            for (name, value) in content.written() {
                 builder.set_attr(name, value);
             }
             let mut original = builder.create_group(ORIGINAL);
@@ -247,6 +281,9 @@ pub(crate) fn encode(database: &Database) -> Result<FileBuilder, Error> {
                     None => builder.create_dataset(&path),
                 };
                 dataset.with_f64_data(&values);
+                for (name, value) in labels(&path) {
+                    dataset.set_attr(name, value);
+                }
             }
             builder.add_group(original.finish());
             group.add_group(builder.finish());
