@@ -268,6 +268,34 @@ fn xarray_opens_databases_and_histories() {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
+/// mlcroissant accepts the description of exported tables, and reads their records by it.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn mlcroissant_reads_the_tables() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-pair");
+    crumple_ok(here, "db export curves.h5 --originals --croissant -o tables");
+    let look = "import csv, mlcroissant\n\
+        data = mlcroissant.Dataset('tables/croissant.json')\n\
+        assert not data.metadata.issues.errors, data.metadata.issues.errors\n\
+        for name in ('cases', 'curves', 'originals'):\n\
+        \x20   rows = list(csv.DictReader(open(f'tables/{name}.csv')))\n\
+        \x20   records = list(data.records(name))\n\
+        \x20   assert len(records) == len(rows) > 3, name\n\
+        \x20   for row, record in list(zip(rows, records))[:50]:\n\
+        \x20       assert set(record) == {f'{name}/{column}' for column in row}, name\n\
+        \x20       for column, text in row.items():\n\
+        \x20           value = record[f'{name}/{column}']\n\
+        \x20           if isinstance(value, float): assert value == float(text), (column, value)\n\
+        \x20           elif isinstance(value, bytes): assert value.decode() == text, (column, value)\n\
+        force = [field for field in data.metadata.record_sets[1].fields if field.name == 'curves/force_N']\n\
+        assert 'Float' in str(force[0].data_types), force\n";
+    let output = python_of("CRUMPLE_PYTHON_TABLES").args(["-c", look]).current_dir(here).output();
+    let output = output.unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+}
+
 /// silx, asked for the file's picture, draws force over deflection: also after a case was added to a file that
 /// another program has written to, which is edited and not written anew.
 #[test]

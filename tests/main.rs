@@ -24,6 +24,7 @@ mod import;
 mod init;
 mod known_solutions;
 mod legacy_files;
+mod mdf;
 mod messages;
 mod models;
 mod new_user;

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, root};
+use crate::common::{
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, root, says,
+};
 use crumple::assess::{Choice, train, validate};
 use crumple::assess::{Purpose, Selection, gaps};
 use crumple::curve::audit;
@@ -1448,5 +1450,62 @@ fn the_next_run_is_nearly_the_best_of_two() {
         }
         let mean = regret / f64::from(pairs);
         assert!(mean <= at_most, "{group}: {:.2} points worse than the best", 100.0 * mean);
+    }
+}
+
+/// `--against` sets an earlier report beside this one; each of its numbers is that of one of the two.
+#[test]
+fn an_earlier_validation_is_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-pair");
+    let report = |more: &str| {
+        let printed = crumple_ok(here, &format!("validate curves.h5 --json{more}"));
+        serde_json::from_str::<serde_json::Value>(&printed).unwrap()["groups"][0].clone()
+    };
+    let now = report("");
+    let save = |group: &serde_json::Value| {
+        let text = serde_json::json!({ "groups": [group] }).to_string();
+        std::fs::write(here.join("old.json"), text).unwrap();
+    };
+    save(&now);
+    let same = report(" --against old.json")["against"].clone();
+    let rows = |of: &serde_json::Value, key: &str| of[key].as_array().unwrap().clone();
+    let all = [rows(&same, "models"), rows(&same, "speeds")].concat();
+    assert!(all.len() > 8 && all.iter().all(|row| row["force_l1"][0] == row["force_l1"][1]));
+    crumple_ok(here, "db rm curves.h5 --case lead-car-pair/48kmh");
+    let fewer = report(" --against old.json");
+    let against = &fewer["against"];
+    assert_eq!(against["chosen_before"], now["chosen"]);
+    assert_eq!(against["band_share"][0], now["band"]["pointwise_share"]);
+    for model in rows(against, "models") {
+        for (k, of) in [&now, &fewer].into_iter().enumerate() {
+            let mean = rows(of, "means").into_iter().find(|m| m["model"] == model["name"]);
+            for key in ["force_l1", "max_crush_error", "velocity_l1", "acceleration_l1"] {
+                let expected = mean.as_ref().map_or(serde_json::Value::Null, |m| m[key].clone());
+                assert_eq!(model[key][k], expected, "{model}");
+            }
+        }
+    }
+    let gone = rows(against, "speeds").into_iter().find(|row| row["name"] == "48kmh").unwrap();
+    assert!(gone["force_l1"][0].is_number() && gone["force_l1"][1].is_null());
+    let text = crumple_ok(here, "validate curves.h5 --against old.json");
+    says(&text, "lead-car-pair: since the earlier validation: ");
+    says(&text, " -> -");
+    let mut other = now.clone();
+    other["group"] = "another".into();
+    save(&other);
+    let noted = crumple_ok(here, "validate curves.h5 --against old.json --json");
+    says(&noted, "the earlier validation does not have this group");
+    for (text, message) in [
+        (
+            "{}",
+            "old.json: there are no groups in it: give what crumple validate --json has printed",
+        ),
+        ("{\"groups\": [1]}", "old.json: invalid type: integer `1`"),
+        ("", "old.json: EOF while parsing"),
+    ] {
+        std::fs::write(here.join("old.json"), text).unwrap();
+        says(&crumple_fails(here, 1, "validate curves.h5 --against old.json"), message);
     }
 }

@@ -2,8 +2,10 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import tempfile
 import warnings
 
 from crumple import _crumple
@@ -31,29 +33,86 @@ def _program():
     return [sys.executable, "-I", "-S", "-c", _START, _crumple.__file__]
 
 
+class _Progress:
+    """Shows the program's progress by tqdm, where it is installed."""
+
+    def __init__(self, command):
+        self.bar = None
+        try:
+            from tqdm.auto import tqdm
+        except ImportError:
+            return
+        # Not in files and pipes, as the program itself; in notebooks always.
+        self.bar = tqdm(desc=f"crumple {command}", disable=None, leave=False)
+
+    def show(self, text):
+        if self.bar is None:
+            return
+        done, _, items = text.partition("/")
+        if done.isdigit() and items.isdigit():
+            self.bar.total = int(items)
+            self.bar.update(int(done) - self.bar.n)
+        else:
+            self.bar.set_postfix_str(text)
+
+    def close(self):
+        if self.bar is not None:
+            self.bar.close()
+
+
+def _ended(child, command):
+    """What the program printed on both streams; interrupted with it, as in a terminal."""
+    lines, progress = [], _Progress(command)
+    try:
+        for line in child.stderr:
+            line = line.decode(errors="replace").rstrip("\r\n")
+            if line.startswith("progress: "):
+                progress.show(line.removeprefix("progress: "))
+            else:
+                lines.append(line)
+        child.wait()
+    except KeyboardInterrupt:
+        # A terminal has told the program too; it ends when what it writes is whole.
+        if child.poll() is None and os.name != "nt":
+            child.send_signal(signal.SIGINT)
+        try:
+            child.wait(timeout=30)
+        except subprocess.TimeoutExpired:
+            child.kill()
+        raise
+    finally:
+        progress.close()
+    return lines
+
+
 def run(*arguments, check=True):
     """Run a command of the program and return its JSON document.
 
-    `run("validate", "curves.h5", "--group", "lead-car-wall")`; warnings become Python warnings (`crumple.Warned`).
+    `run("validate", "curves.h5", "--group", "lead-car-wall")`; warnings become Python warnings (`crumple.Warned`). Progress is
+    shown by tqdm, if it is installed, on a terminal and in notebooks.
 
     Raises `crumple.Error` if the command fails.
     """
     words = [os.fspath(a) if isinstance(a, os.PathLike) else str(a) for a in arguments]
-    done = subprocess.run(
-        [*_program(), *words[:1], "--json", *words[1:]], stdout=subprocess.PIPE, stderr=subprocess.PIPE, check=False
-    )
-    for line in done.stderr.decode(errors="replace").splitlines():
+    words = [*_program(), *words[:1], "--json", *words[1:]]
+    environment = {**os.environ, "CRUMPLE_PROGRESS": "lines"}
+    with tempfile.TemporaryFile() as out:
+        with subprocess.Popen(words, stdout=out, stderr=subprocess.PIPE, env=environment) as child:
+            said = _ended(child, arguments[0] if arguments else "")
+        out.seek(0)
+        printed = out.read()
+    for line in said:
         if line.startswith("warning: "):
             warnings.warn(line.removeprefix("warning: "), Warned, stacklevel=3)
     try:
-        document = json.loads(done.stdout) if done.stdout.strip() else None
+        document = json.loads(printed) if printed.strip() else None
     except ValueError:
         document = None
     failed = isinstance(document, dict) and set(document) == {"error"}
     if check and failed:
-        raise Error.of_document(done.stdout)
+        raise Error.of_document(printed)
     if check and document is None:
-        raise Error(done.stderr.decode(errors="replace").strip() or f"crumple ended with code {done.returncode}")
+        raise Error("\n".join(said).strip() or f"crumple ended with code {child.returncode}")
     return document
 
 

@@ -5,6 +5,8 @@
 use std::ffi::{OsString, c_int};
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
 
 use crumple::curve::Case;
 use crumple::database::Database;
@@ -16,7 +18,7 @@ use crumple::solver::{self, Selection, SolverFile, WantedId};
 use crumple::surrogate::{Model, Query, predict};
 use linfa::prelude::*;
 use ndarray::{Array1, Array2};
-use pyo3::exceptions::{PyBufferError, PyValueError};
+use pyo3::exceptions::{PyBufferError, PyRuntimeError, PyValueError};
 use pyo3::ffi;
 use pyo3::prelude::*;
 use pyo3::types::PyModule;
@@ -60,6 +62,29 @@ impl Floats {
 
 fn floats(values: Vec<f64>) -> Floats {
     Floats(Numbers::Own(values))
+}
+
+/// Work without Python's lock. A signal, such as Ctrl-C, ends the wait for it at once; what it has read is dropped when it
+/// ends by itself.
+fn interruptible<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    let (done, mut result) = mpsc::channel();
+    let worker = std::thread::spawn(move || done.send(work()));
+    loop {
+        let waited;
+        (waited, result) =
+            py.detach(move || (result.recv_timeout(Duration::from_millis(50)), result));
+        match waited {
+            Ok(value) => return Ok(value),
+            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Disconnected) => match worker.join() {
+                Err(panic) => std::panic::resume_unwind(panic),
+                Ok(_) => return Err(PyRuntimeError::new_err("the work gave no result")),
+            },
+        }
+    }
 }
 
 /// The error of the library with its document, as `crumple.Error`.
@@ -127,14 +152,14 @@ fn read(
     let is_narrowed = ids.is_some() || components.is_some();
     let section_given = section_name.is_some();
     let selection = Selection { ids, components, section: section_name, ..Selection::all() };
-    let read = py.detach(|| {
+    let read = interruptible(py, move || {
         let sections = solver::read_sections(&path, format.as_deref(), &selection)?;
         // A single section is read as the program does, which knows what is missing and what was meant.
         if sections.len() == 1 && is_narrowed || sections.is_empty() && section_given {
             return Ok(vec![solver::read(&path, format.as_deref(), &selection)?]);
         }
         Ok(sections)
-    });
+    })?;
     let sections = read.map_err(|error: crumple::Error| failed(py, &error))?;
     Ok(sections.into_iter().map(section).collect())
 }
@@ -172,7 +197,8 @@ fn case(case: &Case) -> DatabaseCase {
 /// Groups of a database with their cases.
 #[pyfunction]
 fn database(py: Python<'_>, path: PathBuf) -> PyResult<Vec<(String, Vec<DatabaseCase>)>> {
-    let read = py.detach(|| Database::read(&path)).map_err(|error| failed(py, &error))?;
+    let read = interruptible(py, move || Database::read(&path))?;
+    let read = read.map_err(|error| failed(py, &error))?;
     let groups =
         read.groups().map(|group| (group.into(), read.cases(group).iter().map(case).collect()));
     Ok(groups.collect())
@@ -186,7 +212,8 @@ struct TrainedModel(Model);
 impl TrainedModel {
     #[new]
     fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        py.detach(|| Model::read(&path)).map(Self).map_err(|error| failed(py, &error))
+        let model = interruptible(py, move || Model::read(&path))?;
+        model.map(Self).map_err(|error| failed(py, &error))
     }
 
     /// Name of the group, of the model, and its slowest and fastest speed in m/s.
@@ -256,7 +283,7 @@ impl Forest {
             .bootstrap(bootstrap)
             .thresholds(thresholds)
             .ties(Ties::Random);
-        let forest = py.detach(|| params.fit(&data));
+        let forest = interruptible(py, move || params.fit(&data))?;
         forest.map(Self).map_err(|error: ForestError| PyValueError::new_err(error.to_string()))
     }
 

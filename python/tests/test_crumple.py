@@ -6,6 +6,7 @@ import os
 import pickle
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import threading
@@ -187,6 +188,79 @@ def test_the_forest_is_an_estimator():
         assert forest.score(frame, y) > 0.97 and math.isclose(forest.feature_importances_.sum(), 1.0)
         again = pickle.loads(pickle.dumps(forest))
         assert np.array_equal(again.predict(frame), forest.predict(frame))
+
+
+def test_the_blend_of_curves_is_the_model_linear(tmp_path):
+    import pandas as pd
+    from sklearn.model_selection import LeaveOneGroupOut, cross_val_score
+    from sklearn.utils.estimator_checks import check_estimator
+
+    from crumple.sklearn import CurveRegressor
+
+    results = check_estimator(CurveRegressor(), on_skip=None, on_fail="raise")
+    assert not [r for r in results if r["status"] in ("failed", "xfail")]
+    database = crumple.Database(DEMO / "curves.h5")
+    group = database["lead-car-wall"]
+    loading = {case.speed: case.force[: case.deflection.argmax() + 1] for case in group.values()}
+    rows = [(case.speed, d) for case in group.values() for d in case.deflection[: case.deflection.argmax() + 1]]
+    frame = pd.DataFrame(rows, columns=["v", "d"])
+    force = np.concatenate(list(loading.values()))
+    blend = CurveRegressor().fit(frame, force)
+    assert list(blend.feature_names_in_) == ["v", "d"] and np.abs(blend.predict(frame) - force).max() < 1e-6 * force.max()
+    again = pickle.loads(pickle.dumps(blend))
+    assert np.array_equal(again.predict(frame), blend.predict(frame))
+    for kmh in (20, 42, 66):
+        curve = database.train(tmp_path / "linear.model", "lead-car-wall", model="linear").predict(kmh / 3.6)
+        # A model's curve begins with no force, and has nodes of its own.
+        at = pd.DataFrame({"v": kmh / 3.6, "d": curve.deflection[1:]})
+        error = np.abs(blend.predict(at) - curve.force[1:]).sum() / np.abs(curve.force).sum()
+        assert error < 1e-3, (kmh, error)
+    scores = cross_val_score(CurveRegressor(), frame, force, groups=frame.v, cv=LeaveOneGroupOut())
+    assert len(scores) == len(group) and np.median(scores) > 0.8, scores
+    # With a second condition, which does not matter, at the conditions of the training.
+    angle = frame.assign(angle=frame.v > 10)[["v", "angle", "d"]]
+    assert np.allclose(CurveRegressor().fit(angle, force).predict(angle), force)
+
+
+def test_progress_is_shown_and_ctrl_c_ends_a_command(tmp_path, monkeypatch):
+    import tqdm.auto
+
+    seen = []
+
+    class Bar:
+        n = 0
+
+        def __init__(self, **options):
+            seen.append(options)
+
+        def update(self, more):
+            self.n += more
+            seen.append((self.n, self.total))
+            if self.total == 2000000 and self.n > 0:
+                signal.raise_signal(signal.SIGINT)
+
+        def set_postfix_str(self, text):
+            seen.append(text)
+
+        def close(self):
+            seen.append("closed")
+
+    monkeypatch.setattr(tqdm.auto, "tqdm", Bar)
+    shutil.copytree(DEMO, tmp_path / "demo")
+    monkeypatch.chdir(tmp_path / "demo")
+    crumple.sweep("scenario.toml", "sweep.csv")
+    assert seen[0]["desc"] == "crumple sweep" and (15, 15) in seen and seen[-1] == "closed"
+    seen.clear()
+    crumple.build("fe/lead-car-wall/study.toml", "own.h5")
+    assert any("kmh" in text for text in seen if isinstance(text, str)), seen
+    # What an interrupted sweep has written is whole, and it goes on from there.
+    varied = '{ what = "speed", train = "A", distribution = "uniform", from = "30km/h", to = "70km/h" }'
+    text = Path("scenario.toml").read_text().split("[sweep]")[0]
+    Path("long.toml").write_text(f"{text}\n[sweep]\nsamples = 2000000\nvary = [{varied}]\n")
+    with pytest.raises(KeyboardInterrupt):
+        crumple.sweep("long.toml", "long.csv")
+    rows = Path("long.csv.part").read_text()
+    assert not Path("long.csv").exists() and rows.endswith("\n") and 2 < rows.count("\n") < 2000000
 
 
 def test_the_code_of_the_readme_runs(tmp_path, monkeypatch):

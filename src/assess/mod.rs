@@ -1,6 +1,7 @@
 //! Assessment: predictions and methods against FE, with speeds left out, in one multi-body model
 //! and in whole trains.
 
+pub(crate) mod against;
 pub(crate) mod choose;
 pub(crate) mod compare;
 pub(crate) mod left_out;

@@ -11,6 +11,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::against::Against;
 use super::choose::{NextRun, Purpose, Selection, choose, scores};
 use super::left_out::{Answers, LeftOutCase, LeftOutRun, Score, query_of};
 use super::scatter::scatter;
@@ -51,6 +52,9 @@ pub enum GroupReport {
         /// The choice and each model with fewer speeds; empty if that was not asked for.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         subsets: Vec<OverSubsets>,
+        /// What has changed since an earlier validation; absent if none was given, or it lacks the group.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        against: Option<Against>,
     },
     /// There is no table.
     Failed {

@@ -1,11 +1,14 @@
 //! Standard output and standard error: text, tables and JSON documents; a closed pipe is not
 //! an error. Everything printed goes through here, where control characters are taken out:
-//! a title in a solver file may hold an escape sequence, which a terminal would obey. Progress is shown on a terminal only.
+//! a title in a solver file may hold an escape sequence, which a terminal would obey. Progress is
+//! shown on a terminal, or to the program that asks for it.
 
 use std::borrow::Cow;
 use std::error::Error;
+use std::fmt::Arguments;
 use std::io::{self, BufWriter, IsTerminal, Write};
-use std::time::Duration;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
@@ -329,8 +332,14 @@ fn size(stream: &impl std::os::windows::io::AsHandle) -> Option<usize> {
     terminal_size_of(stream).map(|(Width(width), _)| width.into()).filter(|width| *width > 0)
 }
 
-/// A spinner that names the step just done, or a bar over a known number of items; gone when it is dropped.
-pub(super) struct Bar(Option<ProgressBar>);
+/// A spinner that names the step just done, or a bar over a known number of items; gone when it is dropped. For the
+/// program that sets CRUMPLE_PROGRESS=lines, lines on standard error instead: `progress: STEP` or
+/// `progress: DONE/ITEMS`, at most ten a second.
+pub(super) enum Bar {
+    None,
+    Drawn(ProgressBar),
+    Lines { items: u64, last: Mutex<Option<Instant>> },
+}
 
 impl Bar {
     pub(super) fn new(options: GlobalOptions, what: &'static str) -> Self {
@@ -354,29 +363,53 @@ impl Bar {
     }
 
     fn visible(options: GlobalOptions, make: impl FnOnce() -> ProgressBar) -> Self {
-        Self((!options.quiet && std::io::stderr().is_terminal()).then(make))
+        if std::env::var_os("CRUMPLE_PROGRESS").is_some_and(|how| how == "lines") {
+            Self::Lines { items: make().length().unwrap_or_default(), last: Mutex::default() }
+        } else if !options.quiet && std::io::stderr().is_terminal() {
+            Self::Drawn(make())
+        } else {
+            Self::None
+        }
     }
 
     pub(super) fn step(&self, done: &str) {
-        if let Some(bar) = &self.0 {
-            bar.set_message(plain(done).into_owned());
+        match self {
+            Self::None => {}
+            Self::Drawn(bar) => bar.set_message(plain(done).into_owned()),
+            Self::Lines { .. } => self.line(false, format_args!("{}", plain(done))),
         }
     }
 
     /// Sets how many items are done; what was done before the first call says nothing of the time left.
     pub(super) fn set(&self, done: u64, is_first: bool) {
-        if let Some(bar) = &self.0 {
-            bar.set_position(done);
-            if is_first {
-                bar.reset_eta();
+        match self {
+            Self::None => {}
+            Self::Drawn(bar) => {
+                bar.set_position(done);
+                if is_first {
+                    bar.reset_eta();
+                }
             }
+            Self::Lines { items, .. } => {
+                self.line(is_first || done == *items, format_args!("{done}/{items}"));
+            }
+        }
+    }
+
+    fn line(&self, is_due: bool, text: Arguments<'_>) {
+        let Self::Lines { last, .. } = self else { return };
+        let mut last = last.lock().unwrap_or_else(PoisonError::into_inner);
+        if is_due || last.is_none_or(|at| at.elapsed() >= Duration::from_millis(100)) {
+            *last = Some(Instant::now());
+            // Who does not listen gets the results all the same.
+            let _ = writeln!(io::stderr(), "progress: {text}");
         }
     }
 }
 
 impl Drop for Bar {
     fn drop(&mut self) {
-        if let Some(bar) = &self.0 {
+        if let Self::Drawn(bar) = self {
             bar.finish_and_clear();
         }
     }

@@ -1,4 +1,4 @@
-//! `crumple simulate`: the multi-body run of a scenario, also as an ISO-MME folder with a channel per history.
+//! `crumple simulate`: the multi-body run of a scenario, also as MDF 4 or an ISO-MME folder with a channel per history.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -9,6 +9,7 @@ use super::arguments::FileKind;
 use super::{CommandResult, Failure, GlobalOptions, is_stdout, keep_inputs, output, usage};
 use crate::file::{not_written, write_all_whole, write_whole};
 use crate::formats::iso_mme::{Channel, Test, folder, interval_s, object};
+use crate::formats::mdf;
 use crate::multibody::{BodyHistory, Ledger, Run};
 use crate::scenario::{self, Limits, Prepared, Summary};
 use crate::table::Table;
@@ -19,12 +20,13 @@ use crate::unit::{Shown, km_per_h};
 #[command(after_help = "Examples:
   crumple simulate scenario.toml -o result.csv
   crumple simulate scenario.toml --json > result.json
+  crumple simulate scenario.toml -o result.mf4      # MDF 4
   crumple simulate scenario.toml -o result.mme      # an ISO-MME folder
   crumple simulate scenario.toml -o - | head        # CSV on standard output")]
 pub(super) struct Args {
     /// Scenario (TOML)
     scenario: PathBuf,
-    /// Result as CSV, or as a folder of ISO-MME (.mme); "-" is standard output
+    /// Result as CSV, as MDF 4 (.mf4) or as a folder of ISO-MME (.mme); "-" is standard output
     #[arg(short, long)]
     output: Option<PathBuf>,
 }
@@ -34,9 +36,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         keep_inputs(&args.scenario, output)?;
         options.keep_others(output, FileKind::Result)?;
         let is_csv = output.extension().is_none_or(|e| e.eq_ignore_ascii_case("csv"));
-        if !is_stdout(output) && !is_csv && !is_mme(output) {
+        if !is_stdout(output) && !is_csv && !is_mme(output) && !is_mdf(output) {
             return usage(format!(
-                "-o {}: a run is written as CSV or ISO-MME: name a .csv file or an .mme folder, or use --json",
+                "-o {}: a run is written as CSV, MDF 4 or ISO-MME: name a .csv or .mf4 file or an .mme folder, or use --json",
                 output.display()
             ));
         }
@@ -51,6 +53,8 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if let Some(path) = args.output.as_ref().filter(|_| !to_stdout) {
         if is_mme(path) {
             write_channels(path, &prepared, &run)?;
+        } else if is_mdf(path) {
+            write_whole(path, &mdf_of(&columns))?;
         } else {
             let mut csv = Vec::new();
             write_csv(&mut csv, &columns)?;
@@ -82,6 +86,35 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
 /// Whether an output is a folder of ISO-MME.
 fn is_mme(output: &Path) -> bool {
     output.extension().is_some_and(|e| e.eq_ignore_ascii_case("mme"))
+}
+
+fn is_mdf(output: &Path) -> bool {
+    output.extension().is_some_and(|e| e.eq_ignore_ascii_case("mf4"))
+}
+
+/// The columns as channels, with their units beside their names.
+fn mdf_of(columns: &[(String, &[f64])]) -> Vec<u8> {
+    const UNITS: [(&str, &str); 5] =
+        [("_m_per_s2", "m/s^2"), ("_m_per_s", "m/s"), ("_m", "m"), ("_N", "N"), ("_s", "s")];
+    let named = |(name, _): &(String, &[f64])| {
+        let (quantity, of) = name.split_once('[').unwrap_or((name, ""));
+        let unit = UNITS.iter().find(|(end, _)| quantity.ends_with(end));
+        let (end, unit) = unit.copied().unwrap_or_default();
+        let name = format!("{} {}", quantity.trim_end_matches(end), of.trim_end_matches(']'));
+        (name.trim().to_string(), unit)
+    };
+    let channels: Vec<mdf::Channel> = columns
+        .iter()
+        .skip(1)
+        .map(|column| {
+            let (name, unit) = named(column);
+            mdf::Channel { name, unit, values: column.1 }
+        })
+        .collect();
+    let time_s = columns.first().map_or(&[][..], |(_, time_s)| time_s);
+    let about =
+        "multi-body run of crumple: x positive in the direction in which the first train moves";
+    mdf::file(about, "run", time_s, &channels)
 }
 
 /// Column names and values, in the order of the scenario.

@@ -1,10 +1,15 @@
 //! `crumple validate`: every model at every left-out speed.
 
-use crate::error::Error;
+use crate::error::{Error, error};
+use crate::file;
 use crate::plural::counted;
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::assess::against::{Against, Changed, Pair};
 use crate::assess::choose::{NextRun, Purpose, Selection, next_run};
 use crate::assess::subsets::{OverSubsets, subsets};
 use crate::assess::validate::{
@@ -25,6 +30,9 @@ use crate::unit::km_per_h;
 
 use super::output::{self, Bar};
 use super::{CommandResult, GlobalOptions, Outcome, usage};
+
+/// Most bytes of an earlier report.
+const MOST_BYTES: u64 = 64 << 20;
 
 /// Leave out every speed in turn, predict it with every model, and compare with FE
 #[derive(clap::Args)]
@@ -63,6 +71,9 @@ pub(super) struct Args {
     /// Leave out every case, not 20 spread over the range of more (takes longer)
     #[arg(long)]
     thorough: bool,
+    /// Show what has changed since an earlier validation: the document that --json printed
+    #[arg(long, value_name = "FILE")]
+    against: Option<PathBuf>,
     /// Seed of the forests
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -77,13 +88,15 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if groups.is_empty() {
         return usage(format!("{} has no groups: build a study into it", args.database.display()));
     }
+    let earlier = args.against.as_deref().map(earlier).transpose()?;
     let bar = Bar::new(options, "validating");
     let mut report = Report { groups: Vec::new() };
     let mut outcome = Outcome::Clean;
     for &group in &groups {
         bar.step(&format!("validating {group}"));
         let cases = database.group(&args.database, group)?;
-        report.groups.push(match validated(args, group, cases) {
+        let before = earlier.iter().flatten().find(|validation| validation.group == group);
+        report.groups.push(match validated(args, group, cases, before) {
             Ok(validated) => validated,
             Err(error) if groups.len() == 1 => return Err(error.into()),
             // The others can be validated all the same.
@@ -106,7 +119,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     options.show(&report, |out| {
         let mut first = true;
         for group in &report.groups {
-            let GroupReport::Validated { validation, next_run, subsets } = group else { continue };
+            let GroupReport::Validated { validation, next_run, subsets, against } = group else {
+                continue;
+            };
             if !std::mem::take(&mut first) {
                 writeln!(out)?;
             }
@@ -115,6 +130,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
                 print_speeds(out, validation)?;
             } else {
                 print_summary(out, validation)?;
+            }
+            if let Some(against) = against {
+                print_against(out, validation, against)?;
             }
             if let Some(next) = next_run {
                 print_next(out, next)?;
@@ -135,7 +153,28 @@ pub(super) fn print_validation(
     if options.verbose { print_means(out, validation) } else { print_summary(out, validation) }
 }
 
-fn validated(args: &Args, group: &str, cases: &[Case]) -> Result<GroupReport, Error> {
+/// The groups of an earlier report; those that failed are not in it.
+fn earlier(path: &Path) -> Result<Vec<Validation>, Error> {
+    let wrong = |detail: String| {
+        let path = path.display();
+        error!(Rating, "{path}: {detail}: give what crumple validate --json has printed")
+    };
+    let text = file::read_text(path, MOST_BYTES).map_err(|source| Error::io(path, source))?;
+    let document: Value = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
+    let groups = document.get("groups").and_then(Value::as_array);
+    let groups = groups.ok_or_else(|| wrong("there are no groups in it".into()))?;
+    let validated = groups.iter().filter(|group| group.get("error").is_none());
+    validated
+        .map(|group| Validation::deserialize(group).map_err(|e| wrong(e.to_string())))
+        .collect()
+}
+
+fn validated(
+    args: &Args,
+    group: &str,
+    cases: &[Case],
+    before: Option<&Validation>,
+) -> Result<GroupReport, Error> {
     let candidates = ModelKind::all(args.seed);
     let best = Selection::Best(Purpose::Vehicle);
     let most = if args.thorough { usize::MAX } else { MOST_SPEEDS };
@@ -159,8 +198,12 @@ fn validated(args: &Args, group: &str, cases: &[Case]) -> Result<GroupReport, Er
             validation.notes.push(note.into());
         }
     }
+    if args.against.is_some() && before.is_none() {
+        validation.notes.push("the earlier validation does not have this group".into());
+    }
+    let against = before.map(|before| Against::of(before, &validation));
     let validation = Box::new(validation);
-    Ok(GroupReport::Validated { validation, next_run: next, subsets: over_subsets })
+    Ok(GroupReport::Validated { validation, next_run: next, subsets: over_subsets, against })
 }
 
 fn percent(error: f64) -> String {
@@ -225,6 +268,33 @@ fn print_speeds(out: &mut dyn Write, validation: &Validation) -> io::Result<()> 
         }
     }
     Ok(())
+}
+
+fn print_against(out: &mut dyn Write, now: &Validation, against: &Against) -> io::Result<()> {
+    let changed = |[before, now]: Pair| {
+        let text = |share: Option<f64>| share.map_or("-".into(), percent);
+        format!("{} -> {}", text(before), text(now))
+    };
+    let table = |first: &'static str, rows| {
+        Table::of(rows)
+            .column(first, |of: &&Changed| of.name.clone())
+            .column("force", |of| changed(of.force_l1))
+            .column("crush", |of| changed(of.max_crush_error))
+            .column("velocity", |of| changed(of.velocity_l1))
+            .column("acceleration", |of| changed(of.acceleration_l1))
+    };
+    let chosen = match against.chosen_before == now.chosen {
+        true => format!("{} is still chosen", now.chosen),
+        false => format!("{} is chosen, it was {}", now.chosen, against.chosen_before),
+    };
+    let group = &now.group;
+    writeln!(
+        out,
+        "{group}: since the earlier validation: {chosen}; band {}",
+        changed(against.band_share)
+    )?;
+    output::table(out, table("mean of", &against.models))?;
+    output::table(out, table("left out", &against.speeds))
 }
 
 fn print_next(out: &mut dyn Write, next: &NextRun) -> io::Result<()> {

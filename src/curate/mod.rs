@@ -5,6 +5,7 @@
 //! file in the old one's place: a killed program leaves the one or the other, and a second writer
 //! gets an error.
 
+mod croissant;
 mod join;
 mod labels;
 mod selection;

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::croissant;
 use crate::curve::body::body_force_n;
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
 use crate::dataset::grid;
@@ -19,10 +20,12 @@ use crate::unit::SpeedKind;
 /// their paths: `cases.csv` and `curves.csv`, the curves at their common interval, and with `originals`
 /// those at the solver's rate. Numbers have as many digits as they need to be read back the same; what a case
 /// does not have is empty.
+/// With `described_as`, `croissant.json` describes them under this name.
 pub(crate) fn write_tables(
     cases: &[&Case],
     path: &Path,
     originals: bool,
+    described_as: Option<&str>,
 ) -> Result<Vec<PathBuf>, Error> {
     std::fs::create_dir_all(path).map_err(|e| not_written(path, e))?;
     let mut written = Vec::new();
@@ -41,6 +44,9 @@ pub(crate) fn write_tables(
     table("curves.csv", &|out| write_sampled(out, cases))?;
     if originals {
         table("originals.csv", &|out| write_originals(out, cases))?;
+    }
+    if let Some(name) = described_as {
+        written.push(croissant::describe(name, cases, &written)?);
     }
     Ok(written)
 }

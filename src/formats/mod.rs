@@ -13,6 +13,7 @@ pub(crate) mod iso_mme;
 mod json;
 mod lsdyna;
 mod mat;
+pub(crate) mod mdf;
 mod modelica;
 mod onnx;
 mod radioss;
@@ -174,6 +175,12 @@ pub const FORMATS: &[Format] = &[
         extensions: &["mme"],
         description: "ISO-MME folder of a case's histories: displacement, velocity, force, SI",
         ..of(Tail::None, Writer::Case(iso_mme::write_case))
+    },
+    Format {
+        name: "mdf",
+        extensions: &["mf4"],
+        description: "MDF 4 (ASAM) with a case's histories: deflection, velocity, force, SI",
+        ..of(Tail::None, Writer::Case(mdf::write_case))
     },
     Format {
         name: "table",

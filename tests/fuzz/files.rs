@@ -23,8 +23,8 @@ fn written(name: &str, bytes: &[u8]) -> PathBuf {
 }
 
 /// Endings of curve files; the first byte chooses one.
-const ENDINGS: [&str; 12] =
-    ["csv", "txt", "json", "k", "rad", "mo", "mat", "crv", "cur", "tab", "chn", "dat"];
+const ENDINGS: [&str; 13] =
+    ["csv", "txt", "json", "k", "rad", "mo", "mat", "crv", "cur", "tab", "chn", "dat", "mf4"];
 
 /// Any bytes give a curve whose points are numbers, or an error that begins with the file.
 pub fn curve(bytes: &[u8]) {

@@ -19,7 +19,7 @@ pub(super) struct Args {
     /// Curve database; created if it does not exist
     #[arg(required_unless_present = "list")]
     database: Option<PathBuf>,
-    /// Curves: tables (CSV and similar), JSON, LS-DYNA, Radioss, Modelica, MAT v4, ISO-MME (a folder)
+    /// Curves: tables (CSV and similar), JSON, LS-DYNA, Radioss, Modelica, MAT v4, MDF 4, ISO-MME (a folder)
     #[arg(required_unless_present = "list")]
     files: Vec<PathBuf>,
     /// List the formats that are read

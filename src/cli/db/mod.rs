@@ -138,7 +138,7 @@ Tags and notes stay with a case when it is built again.")]
     /// with the names of its case. For single curves in other tools' formats: crumple export.
     #[command(after_help = "Examples:
   crumple db export curves.h5 -o tables
-  crumple db export curves.h5 --group lead-car-wall --originals -o tables
+  crumple db export curves.h5 --group lead-car-wall --originals --croissant -o tables
 docs/databases.md has recipes for pandas, polars, DuckDB, Parquet and xarray.")]
     Export(ExportArgs),
 }
@@ -225,13 +225,18 @@ struct ExportArgs {
     /// Also write originals.csv, the curves at the solver's rate
     #[arg(long)]
     originals: bool,
+    /// Also write croissant.json, which describes the tables for machine-learning tools (Croissant 1.0)
+    #[arg(long)]
+    croissant: bool,
 }
 
 fn export(args: &ExportArgs, options: GlobalOptions) -> CommandResult {
     let database = Database::read(&args.database)?;
     let selection = args.chosen.selection();
     let cases: Vec<&Case> = selection.find(&args.database, &database)?;
-    let files = curate::write_tables(&cases, &args.output, args.originals)?;
+    let name = args.database.file_stem().unwrap_or_default().to_string_lossy();
+    let described_as = args.croissant.then_some(&*name);
+    let files = curate::write_tables(&cases, &args.output, args.originals, described_as)?;
     let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     let database = args.database.display().to_string();
     let document = document! { database: database, cases: cases.len(), files: &files };

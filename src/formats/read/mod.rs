@@ -18,6 +18,7 @@ mod label;
 mod layout;
 mod lsdyna;
 mod mat;
+mod mdf;
 mod modelica;
 mod radioss;
 mod table;
@@ -58,6 +59,13 @@ pub(crate) const READERS: &[Reader] = &[
         description: "MAT file of version 4: fd_load, or the only matrix of two columns",
         recognise: mat::recognise,
         read: mat::read,
+    },
+    Reader {
+        name: MDF,
+        extensions: &["mf4", "mdf"],
+        description: "MDF 4 (ASAM) with a deflection and a force over time in one group",
+        recognise: mdf::recognise,
+        read: mdf::read,
     },
     Reader {
         name: JSON,
@@ -136,8 +144,9 @@ pub struct ReadOptions {
     pub time_column: Option<String>,
 }
 
-/// The reader of binary files.
+/// The readers of binary files.
 const MAT: &str = "mat";
+const MDF: &str = "mdf";
 /// The reader of predicted curves.
 const JSON: &str = "json";
 /// The readers that have columns to choose.
@@ -239,7 +248,7 @@ fn parse(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static str)
     }
     let reader = reader(&input)?;
     if let (Some(option), true) =
-        (options.column_option(), ![TABLES, CURVES].contains(&reader.name))
+        (options.column_option(), ![TABLES, CURVES, MDF].contains(&reader.name))
     {
         let format = reader.name;
         return Err(error!(
@@ -252,7 +261,7 @@ fn parse(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static str)
     if options.is_without_times() {
         found.time_s = None;
     }
-    found.notes.extend(text.note.filter(|_| reader.name != MAT).map(String::from));
+    found.notes.extend(text.note.filter(|_| ![MAT, MDF].contains(&reader.name)).map(String::from));
     found.files.splice(0..0, own);
     Ok((found, reader.name))
 }

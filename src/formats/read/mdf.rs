@@ -1,0 +1,367 @@
+//! Curve of an MDF 4 file (ASAM): one of its groups of channels, read as the table that it is.
+//!
+//! Test departments' tools write them in many ways; read are sorted groups of numbers in whole bytes, plain, in lists of
+//! blocks and compressed, with linear conversions. Everything else is named with what to do about it.
+
+use std::fmt::Write;
+use std::io::Read;
+
+use flate2::read::ZlibDecoder;
+
+use super::columns::{check_curves, check_points, choose};
+use super::curve::ReadCurve;
+use super::label::{Label, Quantity};
+use super::{Input, tables};
+use crate::error::{Error, error};
+
+/// How every MDF file begins, and where the version is.
+const BEGINNING: &[u8] = b"MDF     ";
+/// Bytes of a group's records, unpacked, at most.
+const MOST_BYTES: u64 = 1 << 30;
+/// The same of one compressed block; writers pack 4 MiB.
+const MOST_PACKED: u64 = 64 << 20;
+/// Numbers of a table at most.
+const MOST_NUMBERS: usize = 20_000_000;
+
+pub(super) fn recognise(input: &Input<'_>) -> bool {
+    input.bytes.starts_with(BEGINNING)
+}
+
+pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
+    if input.bytes.get(8) != Some(&b'4') {
+        return Err(wrong("expected MDF of version 4, found an earlier version: save it as MDF 4"));
+    }
+    let file = Blocks(input.bytes);
+    let header = file.block(64, b"HD")?;
+    let mut groups = groups(&file, &header)?;
+    let chosen = chosen(&groups, input.options.curve.as_deref())?;
+    let mut group = groups.swap_remove(chosen);
+    // Columns chosen by the user may be any, by their numbers too.
+    if input.options.column_option().is_none() && group.is_curve() {
+        group.channels.retain(|channel| channel.quantity().is_some());
+    }
+    let mut text = String::new();
+    for line in file.text(header.link(5)).unwrap_or_default().lines() {
+        let _ = writeln!(text, "# {line}");
+    }
+    group.rows(&file, &mut text)?;
+    let mut found = tables::read(&Input { text: &text, ..*input })?;
+    found.notes.insert(0, format!("curve: group {} of the file, read as a table", group.name));
+    found.notes.extend(group.left_out.iter().map(|why| format!("left out: channel {why}")));
+    Ok(found)
+}
+
+fn wrong(what: &str) -> Error {
+    error!(CurveFile, "{what}")
+}
+
+/// The blocks of a file, by their offsets.
+struct Blocks<'a>(&'a [u8]);
+
+struct Block<'a> {
+    links: &'a [u8],
+    data: &'a [u8],
+}
+
+impl Block<'_> {
+    /// 0 where there is none.
+    fn link(&self, k: usize) -> u64 {
+        integer(self.links, 8 * k, 8)
+    }
+}
+
+/// An unsigned number of so many bytes, little-endian; 0 beyond the end.
+fn integer(bytes: &[u8], at: usize, size: usize) -> u64 {
+    let bytes = bytes.get(at..at + size).unwrap_or_default();
+    bytes.iter().rev().fold(0, |number, byte| number << 8 | u64::from(*byte))
+}
+
+impl<'a> Blocks<'a> {
+    fn kind(&self, at: u64) -> &'a [u8] {
+        let at = usize::try_from(at).unwrap_or(usize::MAX);
+        at.checked_add(4).and_then(|end| self.0.get(at..end)).unwrap_or_default()
+    }
+
+    fn block(&self, at: u64, kind: &[u8; 2]) -> Result<Block<'a>, Error> {
+        let kind = String::from_utf8_lossy(kind);
+        let cut = || {
+            error!(
+                CurveFile,
+                "byte {at}: expected a block ##{kind}, found the end of the file or something else: it may be cut off, or was never finalised; open and save it with the program that recorded it"
+            )
+        };
+        if self.kind(at) != format!("##{kind}").as_bytes() {
+            return Err(cut());
+        }
+        let begin = usize::try_from(at).map_err(|_| cut())?;
+        let (length, links) = (integer(self.0, begin + 8, 8), integer(self.0, begin + 16, 8));
+        let end = usize::try_from(length).ok().and_then(|length| begin.checked_add(length));
+        let whole = end.and_then(|end| self.0.get(begin..end)).ok_or_else(cut)?;
+        let links = usize::try_from(links).ok().and_then(|n| n.checked_mul(8)?.checked_add(24));
+        let (head, data) = links.and_then(|at| whole.split_at_checked(at)).ok_or_else(cut)?;
+        Ok(Block { links: head.get(24..).ok_or_else(cut)?, data })
+    }
+
+    /// The text of a block of text, or the first in one of XML.
+    fn text(&self, at: u64) -> Option<String> {
+        let kind = self.kind(at).last_chunk().filter(|kind| [b"TX", b"MD"].contains(kind))?;
+        let data = self.block(at, kind).ok()?.data;
+        let text = String::from_utf8_lossy(data.split(|byte| *byte == 0).next()?);
+        if kind == b"TX" {
+            return Some(text.trim().into());
+        }
+        let inside = text.split_once("<TX")?.1.split_once('>')?.1.split_once("</TX>")?.0;
+        let plain = inside.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&");
+        Some(plain.trim().into())
+    }
+}
+
+/// Blocks that refer to each other one after another, as many as the file has room for.
+fn chain<'a>(file: &Blocks<'a>, first: u64, kind: &[u8; 2]) -> Result<Vec<Block<'a>>, Error> {
+    let (mut found, mut at) = (Vec::new(), first);
+    while at != 0 {
+        found.push(file.block(at, kind)?);
+        check_curves(found.len())?;
+        at = found[found.len() - 1].link(0);
+    }
+    Ok(found)
+}
+
+/// A channel of numbers in the records of its group.
+struct Channel {
+    name: String,
+    unit: String,
+    /// First byte and bytes.
+    at: usize,
+    size: usize,
+    /// `cn_data_type`: unsigned, signed, floating, each little-endian and then big-endian.
+    kind: u8,
+    /// value = offset + factor × raw.
+    offset: f64,
+    factor: f64,
+}
+
+struct Group {
+    name: String,
+    channels: Vec<Channel>,
+    left_out: Vec<String>,
+    records: u64,
+    record_bytes: usize,
+    data: u64,
+    /// Why its records cannot be read.
+    unread: Option<&'static str>,
+}
+
+fn groups(file: &Blocks<'_>, header: &Block<'_>) -> Result<Vec<Group>, Error> {
+    let mut groups = Vec::new();
+    for data in chain(file, header.link(0), b"DG")? {
+        for block in chain(file, data.link(1), b"CG")? {
+            let mut group = Group {
+                name: (groups.len() + 1).to_string(),
+                channels: Vec::new(),
+                left_out: Vec::new(),
+                records: integer(block.data, 8, 8),
+                record_bytes: (integer(block.data, 24, 4) + integer(block.data, 28, 4)) as usize,
+                data: data.link(2),
+                unread: (integer(data.data, 0, 1) != 0)
+                    .then_some("several groups share its records: sort the file (asammdf does)"),
+            };
+            for (k, block) in chain(file, block.link(1), b"CN")?.iter().enumerate() {
+                let name = file.text(block.link(2)).unwrap_or_else(|| format!("channel {}", k + 1));
+                match channel(file, block, name.clone(), group.record_bytes) {
+                    Ok(channel) => group.channels.push(channel),
+                    Err(why) => group.left_out.push(format!("\"{name}\": {why}")),
+                }
+            }
+            if group.channels.len() > 1 {
+                groups.push(group);
+                check_curves(groups.len())?;
+            }
+        }
+    }
+    Ok(groups)
+}
+
+fn channel(
+    file: &Blocks<'_>,
+    block: &Block<'_>,
+    name: String,
+    record_bytes: usize,
+) -> Result<Channel, &'static str> {
+    let byte = |at: usize| integer(block.data, at, 1) as u8;
+    let (kind, at, bits) = (byte(2), integer(block.data, 4, 4), integer(block.data, 8, 4));
+    if ![0, 2, 3].contains(&byte(0)) {
+        return Err("its values are not in the records");
+    }
+    let (at, size) = (at as usize, bits as usize / 8);
+    let is_whole = byte(3) == 0 && bits % 8 == 0 && (1..=8).contains(&size);
+    if !is_whole || kind > 5 || kind > 3 && ![4, 8].contains(&size) || at + size > record_bytes {
+        return Err("it does not hold numbers in whole bytes");
+    }
+    let mut found = Channel { name, unit: String::new(), at, size, kind, offset: 0.0, factor: 1.0 };
+    let mut unit = file.text(block.link(6));
+    if let Ok(conversion) = file.block(block.link(4), b"CC") {
+        unit = unit.or(file.text(conversion.link(1)));
+        // After precision (1), flags (2), references (2), parameters (2) and the physical range (16).
+        let parameter = |k: usize| f64::from_bits(integer(conversion.data, 24 + 8 * k, 8));
+        match integer(conversion.data, 0, 1) {
+            0 => {}
+            1 => (found.offset, found.factor) = (parameter(0), parameter(1)),
+            _ => return Err("its conversion is not linear: save it with physical values"),
+        }
+    }
+    found.unit = unit.unwrap_or_default();
+    Ok(found)
+}
+
+impl Channel {
+    fn label(&self) -> String {
+        match &*self.unit {
+            "" => self.name.clone(),
+            unit => format!("{} [{unit}]", self.name),
+        }
+    }
+
+    fn quantity(&self) -> Option<Quantity> {
+        Label::of_column(&self.label()).map(|label| label.quantity)
+    }
+
+    /// Its value in a record.
+    fn of(&self, record: &[u8]) -> f64 {
+        let mut bytes = [0; 8];
+        let raw = &record[self.at..self.at + self.size];
+        bytes[..self.size].copy_from_slice(raw);
+        if self.kind % 2 == 1 {
+            bytes[..self.size].reverse();
+        }
+        let raw = u64::from_le_bytes(bytes);
+        let unused = 64 - 8 * self.size as u32;
+        let raw = match (self.kind / 2, self.size) {
+            (0, _) => raw as f64,
+            (1, _) => ((raw << unused) as i64 >> unused) as f64,
+            (_, 4) => f64::from(f32::from_bits(raw as u32)),
+            _ => f64::from_bits(raw),
+        };
+        if self.factor == 1.0 && self.offset == 0.0 { raw } else { self.offset + self.factor * raw }
+    }
+}
+
+/// The group that was requested, else the only one with a deflection and a force.
+fn chosen(groups: &[Group], asked: Option<&str>) -> Result<usize, Error> {
+    if groups.is_empty() {
+        return Err(wrong("expected a group with several channels of numbers, found none"));
+    }
+    let listed = groups.iter().map(|group| {
+        let labels: Vec<String> = group.channels.iter().map(Channel::label).collect();
+        (group.name.clone(), labels.join(", "))
+    });
+    let curves: Vec<usize> = (0..groups.len()).filter(|k| groups[*k].is_curve()).collect();
+    match (asked, &*curves) {
+        (None, [only]) => Ok(*only),
+        _ => choose(listed, asked),
+    }
+}
+
+impl Group {
+    fn is_curve(&self) -> bool {
+        let has = |wanted| self.channels.iter().any(|channel| channel.quantity() == Some(wanted));
+        has(Quantity::Deflection) && has(Quantity::Force)
+    }
+
+    /// Its header and rows as the lines of a table.
+    fn rows(&self, file: &Blocks<'_>, text: &mut String) -> Result<(), Error> {
+        if let Some(why) = self.unread {
+            return Err(error!(CurveFile, "group {}: {why}", self.name));
+        }
+        let records = usize::try_from(self.records).unwrap_or(usize::MAX);
+        check_points(records)?;
+        let wanted = self.records.saturating_mul(self.record_bytes as u64);
+        if wanted > MOST_BYTES || records.saturating_mul(self.channels.len()) > MOST_NUMBERS {
+            return Err(wrong(
+                "the group has more than 1 GiB of records or 20 million numbers: export the channels that you need",
+            ));
+        }
+        let mut data = Vec::new();
+        data_of(file, self.data, wanted as usize, &mut data)?;
+        let whole = data.len() / self.record_bytes.max(1);
+        if whole < records {
+            return Err(error!(
+                CurveFile,
+                "group {}: expected {records} records, found {whole}: the file may be cut off, or was never finalised; open and save it with the program that recorded it",
+                self.name
+            ));
+        }
+        let quoted = |label: String| format!("\"{}\"", label.replace(['"', '\n', '\r'], " "));
+        let labels: Vec<String> = self.channels.iter().map(|c| quoted(c.label())).collect();
+        let _ = writeln!(text, "{}", labels.join(","));
+        let mut digits = zmij::Buffer::new();
+        for record in data.chunks_exact(self.record_bytes.max(1)).take(records) {
+            for (k, channel) in self.channels.iter().enumerate() {
+                text.push_str(if k == 0 { "" } else { "," });
+                text.push_str(digits.format(channel.of(record)));
+            }
+            text.push('\n');
+        }
+        Ok(())
+    }
+}
+
+/// Appends the bytes of a block of data, or of all in a list of them, up to `most`.
+fn data_of(file: &Blocks<'_>, at: u64, most: usize, out: &mut Vec<u8>) -> Result<(), Error> {
+    let (mut at, mut lists) = (at, 0);
+    loop {
+        lists += 1;
+        check_curves(lists)?;
+        match file.kind(at) {
+            b"##HL" => at = file.block(at, b"HL")?.link(0),
+            b"##DL" => {
+                let list = file.block(at, b"DL")?;
+                for k in 1..list.links.len() / 8 {
+                    piece(file, list.link(k), most, out)?;
+                    if out.len() >= most {
+                        return Ok(());
+                    }
+                }
+                at = list.link(0);
+            }
+            _ if at == 0 => return Ok(()),
+            _ => return piece(file, at, most, out),
+        }
+        if at == 0 || out.len() >= most {
+            return Ok(());
+        }
+    }
+}
+
+fn piece(file: &Blocks<'_>, at: u64, most: usize, out: &mut Vec<u8>) -> Result<(), Error> {
+    if file.kind(at) != b"##DZ" {
+        let data = file.block(at, b"DT")?.data;
+        out.extend_from_slice(&data[..data.len().min(most.saturating_sub(out.len()))]);
+        return Ok(());
+    }
+    let packed = file.block(at, b"DZ")?.data;
+    // Two letters of the kind packed, how (1), one of padding, the row of a transposition (4), bytes unpacked (8), packed (8).
+    let (how, columns) = (integer(packed, 2, 1), integer(packed, 4, 4) as usize);
+    let size = integer(packed, 8, 8).min(MOST_PACKED);
+    let mut plain = Vec::new();
+    let read =
+        ZlibDecoder::new(packed.get(24..).unwrap_or_default()).take(size).read_to_end(&mut plain);
+    if how > 1 || read.is_err() {
+        return Err(error!(
+            CurveFile,
+            "byte {at}: its compressed block cannot be unpacked: save the file without compression"
+        ));
+    }
+    // Transposed, the first bytes of all rows come first; what fills no row stays as it is.
+    if how == 1 && columns > 0 {
+        let rows = plain.len() / columns;
+        let mut rowwise = plain.clone();
+        for (k, byte) in plain[..rows * columns].iter().enumerate() {
+            rowwise[k % rows * columns + k / rows] = *byte;
+        }
+        plain = rowwise;
+    }
+    plain.truncate(most.saturating_sub(out.len()));
+    out.append(&mut plain);
+    Ok(())
+}

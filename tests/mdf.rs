@@ -1,0 +1,156 @@
+//! MDF 4: asammdf reads what is written, and what it writes is read, in every way that tools pack it.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crumple::database::Database;
+use crumple::formats::{ReadOptions, read};
+
+use crate::common::{
+    build_fixture, crumple_fails, crumple_ok, demo_folder, python_of, run_python, says,
+};
+
+fn clients(arguments: &[&Path]) -> Value {
+    let arguments: Vec<String> = arguments.iter().map(|a| a.display().to_string()).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    run_python(python_of("CRUMPLE_PYTHON_TABLES"), "mdf.py", &arguments)
+}
+
+const CASE: [&str; 5] = ["curves.h5", "--group", "lead-car-wall", "--case", "36kmh"];
+
+/// The record of a case over time, as lines of a table.
+fn record(here: &Path) -> (Vec<[f64; 3]>, String) {
+    let database = Database::read(&here.join("curves.h5")).unwrap();
+    let case = database.cases("lead-car-wall").iter().find(|c| c.id.name == "36kmh").unwrap();
+    let curve = &case.curves.sampled;
+    let rows: Vec<[f64; 3]> = (0..curve.time_s().len())
+        .map(|k| [curve.time_s()[k], curve.deflection_m()[k], curve.force_n()[k]])
+        .collect();
+    let lines: String = rows.iter().map(|[t, d, f]| format!("{t:?},{d:?},{f:?}\n")).collect();
+    (rows, format!("t_s,d_m,force_N\n{lines}"))
+}
+
+/// asammdf finds every channel of a case and of a run, with its unit and values.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn asammdf_reads_what_is_written() {
+    let folder = demo_folder();
+    let here = folder.path();
+    crumple_ok(here, &[&["export"], &CASE[..], &["-o", "case.mf4"]].concat());
+    let found = clients(&[Path::new("read"), &here.join("case.mf4")]);
+    assert_eq!(found["version"], "4.10");
+    assert!(found["comment"].as_str().unwrap().contains("mass_kg: 24000"), "{found}");
+    let (rows, _) = record(here);
+    let (first, last) = (rows[0], rows[rows.len() - 1]);
+    for (name, unit, column) in [("deflection", "m", 1), ("force", "N", 2)] {
+        let peak = rows.iter().map(|row| row[column]).fold(f64::MIN, f64::max);
+        let expected = serde_json::json!([
+            unit,
+            rows.len(),
+            [first[0], last[0]],
+            [first[column], last[column]],
+            peak
+        ]);
+        assert_eq!(found["channels"][name], expected);
+    }
+    crumple_ok(here, "simulate two-sets.toml -q -o run.mf4");
+    crumple_ok(here, "simulate two-sets.toml -q -o run.csv");
+    let table = fs::read_to_string(here.join("run.csv")).unwrap();
+    let columns = table.lines().next().unwrap().split(',').count();
+    let found = clients(&[Path::new("read"), &here.join("run.mf4")]);
+    let channels = found["channels"].as_object().unwrap();
+    assert_eq!(channels.len(), columns);
+    let last: Vec<f64> =
+        table.lines().last().unwrap().split(',').map(|n| n.parse().unwrap()).collect();
+    let speed =
+        table.lines().next().unwrap().split(',').position(|n| n == "v_m_per_s[A1]").unwrap();
+    assert_eq!(
+        (&channels["v A1"][0], channels["v A1"][3][1].as_f64()),
+        (&"m/s".into(), Some(last[speed]))
+    );
+}
+
+/// What is exported comes back bit for bit, and so does what asammdf packs, to the digits of its numbers.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn what_asammdf_writes_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-wall");
+    let (rows, table) = record(here);
+    fs::write(here.join("curve.csv"), table).unwrap();
+    crumple_ok(here, &[&["export"], &CASE[..], &["-o", "case.mf4"]].concat());
+    crumple_ok(here, "db add own.h5 case.mf4 --group own");
+    let own = Database::read(&here.join("own.h5")).unwrap();
+    let (own, case) = (&own.cases("own")[0], Database::read(&here.join("curves.h5")).unwrap());
+    let case = case.cases("lead-car-wall").iter().find(|c| c.id.name == "36kmh").unwrap();
+    assert!(own.curves.original.force_n() == case.curves.sampled.force_n());
+    assert!(own.conditions == case.conditions && own.curves.force_kind == case.curves.force_kind);
+
+    let ways = clients(&[Path::new("write"), here, &here.join("curve.csv")]);
+    for (k, way) in ways.as_array().unwrap().iter().enumerate() {
+        let (curve, format) =
+            read(&here.join(format!("way{k}.mf4")), &ReadOptions::default()).unwrap();
+        assert_eq!((format, curve.force_n.len()), ("mdf", rows.len()), "{way}");
+        // Integers of 0.1 mm; single precision of 3 MN; whole newtons.
+        for (k, [t, d, f]) in rows.iter().enumerate() {
+            assert!((curve.time_s.as_ref().unwrap()[k] - t).abs() < 1e-12, "{way}");
+            assert!(
+                (curve.deflection_m[k] - d).abs() <= 0.5001e-4,
+                "{way}: {} {d}",
+                curve.deflection_m[k]
+            );
+            assert!((curve.force_n[k] - f).abs() <= 0.7, "{way}: {} {f}", curve.force_n[k]);
+        }
+    }
+    let two = ReadOptions { curve: Some("2".into()), ..ReadOptions::default() };
+    let (half, _) = read(&here.join("two.mf4"), &two).unwrap();
+    assert!(rows.iter().zip(&half.force_n).all(|([_, _, f], half)| (half - f / 2.0).abs() <= 0.5));
+    for (file, message) in [
+        (
+            "two.mf4",
+            "the file holds several curves: choose one with --curve: 1 (\"time [s], crush [m], load [N]\"), 2",
+        ),
+        ("none.mf4", "expected"),
+        ("old.mdf", "expected MDF of version 4, found an earlier version: save it as MDF 4"),
+    ] {
+        says(
+            &crumple_fails(
+                here,
+                1,
+                &["db", "add", "x.h5", file, "--group", "g", "--speed", "36km/h"],
+            ),
+            message,
+        );
+    }
+}
+
+/// Cut or altered anywhere it is a curve or an error that names the file, in little time and memory.
+#[test]
+fn damage_is_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-wall");
+    crumple_ok(here, &[&["export"], &CASE[..], &["-o", "case.mf4"]].concat());
+    let whole = fs::read(here.join("case.mf4")).unwrap();
+    let path = here.join("damaged.mf4");
+    let look = |bytes: &[u8]| {
+        fs::write(&path, bytes).unwrap();
+        match read(&path, &ReadOptions::default()) {
+            Ok((curve, _)) => assert_eq!(curve.force_n.len(), curve.deflection_m.len()),
+            Err(error) => assert!(error.to_string().contains("damaged.mf4"), "{error}"),
+        }
+    };
+    (0..whole.len()).step_by(389).for_each(|end| look(&whole[..end]));
+    // Everything but the records is in the first and the last bytes.
+    let records = whole.windows(4).position(|w| w == b"##DT").unwrap();
+    for at in (0..records + 24).chain(whole.len() - 64..whole.len()) {
+        for value in [0, 1, 0x7f, 0xff] {
+            let mut bytes = whole.clone();
+            bytes[at] = value;
+            look(&bytes);
+        }
+    }
+}
