@@ -230,6 +230,36 @@ fn stopped_mass(path: &Path) -> Option<[Vec<f64>; 4]> {
     Some([of("deflection_m")?, of("kg")?, of("rate_kg_per_m")?, of("residual_kg")?])
 }
 
+/// A study can be built in parts, which joined are the bytes of the whole.
+#[test]
+fn runs_are_built_one_by_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let study = fixture("fe/lead-car-pair/study.toml").display().to_string();
+    let build = |output: &str, runs: &[&str]| {
+        let runs: Vec<&str> = runs.iter().flat_map(|run| ["--run", run]).collect();
+        let arguments = [&["build", &study, "-o", output], &runs[..]].concat();
+        let output = crumple_in(here, &arguments);
+        (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    assert_eq!(build("whole.h5", &[]).0, 0);
+    assert_eq!(build("a.h5", &["48kmh"]).0, 0);
+    assert_eq!(build("b.h5", &["72kmh", "36kmh", "60kmh"]).0, 0);
+    crumple_ok(here, "db merge a.h5 b.h5 -o joined.h5");
+    assert!(fs::read(here.join("joined.h5")).unwrap() == fs::read(here.join("whole.h5")).unwrap());
+    // One after the other into one file, too.
+    for run in ["60kmh", "36kmh", "72kmh", "48kmh"] {
+        assert_eq!(build("grown.h5", &[run]).0, 0);
+    }
+    assert!(fs::read(here.join("grown.h5")).unwrap() == fs::read(here.join("whole.h5")).unwrap());
+    let (code, error) = build("whole.h5", &["48kmh", "48km"]);
+    assert_eq!(code, 1);
+    says(
+        &error,
+        "there is no run \"48km\": it has 36kmh, 48kmh, 60kmh, 72kmh; did you mean \"48kmh\"?",
+    );
+}
+
 /// A group's stopped mass is in its file, that of the model trained on it; it changes with the cases,
 /// whether the file is written again or edited, and goes with those that determine it.
 #[test]

@@ -7,7 +7,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use crate::common::{crumple_fails, crumple_in, crumple_ok, demo_folder, python, root, says};
+use crate::common::{
+    crumple_fails, crumple_in, crumple_ok, demo_folder, python, python_of, root, says,
+};
 use crumple::sweep::{Chunk, Shard, Sweep, WriteOptions, merge, write};
 use serde_json::Value;
 
@@ -1140,4 +1142,31 @@ fn help_has_examples() {
         let help = crumple_ok(Path::new("."), arguments);
         assert!(help.contains("Examples:") && help.contains("crumple sweep merge -o"), "{help}");
     }
+}
+
+/// The Dask example on a cluster of two workers, of which one is killed at work: sweep, build and validation have the
+/// bytes of one process.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn a_dask_cluster_gives_the_bytes_of_one_process() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let scenario = fs::read_to_string(here.join("scenario.toml")).unwrap();
+    let scenario = scenario.split("[sweep]").next().unwrap();
+    let speed = "{ what = \"speed\", train = \"A\", distribution = \"uniform\", from = \"30km/h\", to = \"70km/h\" }";
+    let scenario = format!("{scenario}\n[sweep]\nsamples = 2000\nvary = [{speed}]\n");
+    fs::write(here.join("many.toml"), scenario).unwrap();
+    let output = python_of("CRUMPLE_PYTHON_TABLES")
+        .arg(root().join("tests/python/dask_same_bytes.py"))
+        .arg(root().join("examples/dask"))
+        .arg(here)
+        .args(["many.toml", "fe/lead-car-wall/study.toml", "curves.h5"])
+        .env("CRUMPLE", env!("CARGO_BIN_EXE_crumple"))
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stdout);
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{said}\n{error}");
+    assert_eq!(said.matches(": the same bytes").count(), 4, "{said}\n{error}");
+    says(&said, "a worker of 2 was killed");
 }

@@ -229,9 +229,19 @@ class Case:
 
 
 class Group(_Mapping):
-    """Cases by name, in order of speed."""
+    """Cases by name, in order of speed. Each is read from the file when it is first asked for, and no other with it."""
 
     _what = "case"
+
+    def __init__(self, path, name, cases):
+        super().__init__(dict.fromkeys(cases))
+        self.path, self.name = path, name
+
+    def __getitem__(self, name):
+        case = super().__getitem__(name)
+        if case is None:
+            case = self._items[name] = Case(*_crumple.case(os.fspath(self.path), self.name, name))
+        return case
 
     def to_pandas(self):
         """A DataFrame of all samples: case, speed, time, deflection, force."""
@@ -245,14 +255,14 @@ class Group(_Mapping):
 
 
 class Database(_Mapping):
-    """A curve database: groups by name."""
+    """A curve database: groups by name. Open it again after another program has changed the file."""
 
     _what = "group"
 
     def __init__(self, path):
         self.path = Path(path)
         groups = _crumple.database(os.fspath(path))
-        super().__init__({name: Group({of[0]: Case(*of) for of in cases}) for name, cases in groups})
+        super().__init__({name: Group(self.path, name, cases) for name, cases in groups})
 
     def validate(self, group=None, **options):
         """As `crumple.validate`."""

@@ -2,7 +2,7 @@
 
 from typing import final
 
-__all__ = ["__version__", "Floats", "TrainedModel", "Forest", "read", "database", "main"]
+__all__ = ["__version__", "Floats", "TrainedModel", "Forest", "read", "database", "case", "main"]
 
 __version__: str
 
@@ -17,7 +17,8 @@ type _Case = tuple[str, tuple[float, str], tuple[float, float | None], str, list
 def read(
     path: str, ids: list[str] | None, components: list[str] | None, section_name: str | None, format: str | None
 ) -> list[_Section]: ...
-def database(path: str) -> list[tuple[str, list[_Case]]]: ...
+def database(path: str) -> list[tuple[str, list[str]]]: ...
+def case(path: str, group: str, name: str) -> _Case: ...
 def main(arguments: list[str]) -> int: ...
 
 @final

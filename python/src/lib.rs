@@ -194,14 +194,17 @@ fn case(case: &Case) -> DatabaseCase {
     )
 }
 
-/// Groups of a database with their cases.
+/// Groups of a database with the names of their cases.
 #[pyfunction]
-fn database(py: Python<'_>, path: PathBuf) -> PyResult<Vec<(String, Vec<DatabaseCase>)>> {
-    let read = interruptible(py, move || Database::read(&path))?;
-    let read = read.map_err(|error| failed(py, &error))?;
-    let groups =
-        read.groups().map(|group| (group.into(), read.cases(group).iter().map(case).collect()));
-    Ok(groups.collect())
+fn database(py: Python<'_>, path: PathBuf) -> PyResult<Vec<(String, Vec<String>)>> {
+    interruptible(py, move || Database::names(&path))?.map_err(|error| failed(py, &error))
+}
+
+/// One case of a group; no other is read.
+#[pyfunction(name = "case")]
+fn read_case(py: Python<'_>, path: PathBuf, group: String, name: String) -> PyResult<DatabaseCase> {
+    let read = interruptible(py, move || Database::read_case(&path, Some(&group), &name))?;
+    read.map(|read| case(&read)).map_err(|error| failed(py, &error))
 }
 
 /// A trained model.
@@ -325,5 +328,6 @@ fn _crumple(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<Forest>()?;
     module.add_function(wrap_pyfunction!(read, module)?)?;
     module.add_function(wrap_pyfunction!(database, module)?)?;
+    module.add_function(wrap_pyfunction!(read_case, module)?)?;
     module.add_function(wrap_pyfunction!(main, module)?)
 }

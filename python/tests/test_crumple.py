@@ -166,7 +166,8 @@ def test_other_threads_run_meanwhile():
     thread = threading.Thread(target=counting)
     thread.start()
     for _ in range(5):
-        crumple.Database(DEMO / "curves.h5")
+        for group in crumple.Database(DEMO / "curves.h5").values():
+            list(group.values())
     stop.set()
     thread.join()
     assert count > 3
@@ -188,6 +189,18 @@ def test_the_forest_is_an_estimator():
         assert forest.score(frame, y) > 0.97 and math.isclose(forest.feature_importances_.sum(), 1.0)
         again = pickle.loads(pickle.dumps(forest))
         assert np.array_equal(again.predict(frame), forest.predict(frame))
+
+
+def test_cases_are_read_one_by_one(monkeypatch):
+    read, seen = crumple._crumple.case, []
+    monkeypatch.setattr(crumple._crumple, "case", lambda *names: seen.append(names) or read(*names))
+    database = crumple.Database(DEMO / "curves.h5")
+    assert list(database["lead-car-wall"])[:2] == ["12kmh", "18kmh"] and seen == []
+    for _ in range(2):
+        assert database["lead-car-wall"]["36kmh"].mass == 24000.0
+    assert [name for _, _, name in seen] == ["36kmh"]
+    with pytest.raises(KeyError, match="there is no case '36': expected one of 12kmh, 18kmh"):
+        database["lead-car-wall"]["36"]
 
 
 def test_the_blend_of_curves_is_the_model_linear(tmp_path):

@@ -25,6 +25,7 @@ use crate::curve::{Case, Origin};
 use crate::database::{CasePath, Database};
 use crate::error::{Error, ErrorCode, error};
 use crate::file::{self, WriterLock, is_file};
+use crate::guess;
 use crate::study::{self, LocatedRun, Study};
 
 const LISTED: usize = 3;
@@ -104,7 +105,23 @@ pub fn build(
     path: &Path,
     progress: impl Fn(&str) + Sync,
 ) -> Result<BuildReport, Error> {
+    build_runs(manifest, path, &[], progress)
+}
+
+/// The same of these runs only, or of all if there are none; the others stay as the database has them.
+pub(crate) fn build_runs(
+    manifest: &Path,
+    path: &Path,
+    only: &[String],
+    progress: impl Fn(&str) + Sync,
+) -> Result<BuildReport, Error> {
     let study = study::load(manifest)?;
+    let known: Vec<String> = study.runs().iter().map(|entry| entry.case_name()).collect();
+    if let Some(unknown) = only.iter().find(|name| !known.contains(name)) {
+        let (path, known) = (manifest.display(), known.join(", "));
+        let hint = guess::hint(unknown, &known);
+        return Err(error!(Study, "{path}: there is no run \"{unknown}\": it has {known}{hint}"));
+    }
     let _lock = WriterLock::take(path)?;
     let is_there = is_file(path)?;
     let mut database = if is_there { Database::read_as_it_is(path)? } else { Database::default() };
@@ -122,6 +139,7 @@ pub fn build(
         .runs()
         .par_iter()
         .zip(located)
+        .filter(|(entry, _)| only.is_empty() || only.contains(&entry.case_name()))
         .map(|(entry, located)| {
             let name = entry.case_name();
             let before = previous.of_run.get(&name);

@@ -30,6 +30,9 @@ pub(super) struct Args {
     /// Database to write or to update; curves.h5 next to the study if absent
     #[arg(short, long)]
     output: Option<PathBuf>,
+    /// Build this run only, as a part of the work; may be repeated [default: all]
+    #[arg(long)]
+    run: Vec<String>,
 }
 
 /// Name of a study that is not named, and of a database that is not.
@@ -57,7 +60,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let (study, output) = args.files()?;
     let bar = Bar::new(options, "reading runs");
     let done = AtomicUsize::new(0);
-    let report = build::build(&study, &output, |name| {
+    let report = build::build_runs(&study, &output, &args.run, |name| {
         let done = done.fetch_add(1, Ordering::Relaxed) + 1;
         bar.step(&format!("{} read, last {name}", counted(done, "run")));
     })?;

@@ -90,13 +90,31 @@ impl Database {
         layout::decode(path)
     }
 
+    /// The names of the groups of a database file and of their cases in order of speed, without reading a case.
+    ///
+    /// # Errors
+    /// If the file is missing, not HDF5, not a curve database, of another layout, or damaged.
+    pub fn names(path: &Path) -> Result<Vec<(String, Vec<String>)>, Error> {
+        let opened = layout::open(path)?;
+        let names = opened.groups()?.into_iter().map(|group| {
+            let found: Vec<String> = group.cases.into_iter().map(|(name, _)| name).collect();
+            let mut names = group.listed.unwrap_or_default();
+            let there: HashSet<&String> = found.iter().collect();
+            names.retain(|name| there.contains(name));
+            // A file that others have changed lists fewer.
+            let names = if names.len() == found.len() { names } else { found };
+            (group.name, names)
+        });
+        Ok(names.filter(|(_, names)| !names.is_empty()).collect())
+    }
+
     /// Reads one case of a database file, and no other: of `group`, or of the only group there
     /// is.
     ///
     /// # Errors
     /// As for [`Database::read`] and [`Database::group_or_only`], and if the
     /// group has no such case.
-    pub(crate) fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, Error> {
+    pub fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, Error> {
         let opened = layout::open(path)?;
         if let Some((group, found)) = opened.find(group, case) {
             let FoundCase { case, hashes, .. } = opened.case(&group, case, &found)?;

@@ -1,0 +1,84 @@
+"""Sweeps, builds and validations of crumple as tasks of Dask.
+
+    from dask.distributed import Client
+    import crumple_dask
+
+    client = Client("tcp://scheduler:8786")  # yours: of a cluster, or a LocalCluster
+    crumple_dask.sweep(client, "scenario.toml", "results.csv", shards=64)
+
+Every task is a run of the program on a part of the work that writes a file of its own in a folder that all workers
+see. It may be tried again any number of times: what is complete is not done again. Joined, the files are the bytes
+that one process would have written.
+"""
+
+import json
+import os
+import pathlib
+import subprocess
+import time
+import tomllib
+
+PROGRAM = os.environ.get("CRUMPLE", "crumple")
+RETRIES = 5
+
+
+def run(*arguments, date=None):
+    """Run the program on one core and return what it prints."""
+    environment = {**os.environ, "RAYON_NUM_THREADS": "1"}
+    if date:
+        environment["SOURCE_DATE_EPOCH"] = str(date)
+    words = [PROGRAM, *map(str, arguments), "--json"]
+    while True:
+        done = subprocess.run(words, env=environment, capture_output=True, text=True)
+        if done.returncode == 0:
+            return done.stdout
+        # The program of a worker that was killed may still be at this part: it will be complete then.
+        if '"code": "locked"' not in done.stdout:
+            raise RuntimeError(f"{' '.join(words)}\n{done.stderr}")
+        time.sleep(1)
+
+
+def _all(client, tasks):
+    """Run tasks, each the arguments and a date, and return what they print."""
+    futures = [client.submit(run, *task, date=date, retries=RETRIES, pure=False) for task, date in tasks]
+    return client.gather(futures)
+
+
+def _folder(output):
+    folder = pathlib.Path(f"{output}.parts")
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
+
+
+def sweep(client, scenario, output, shards):
+    """Run a sweep in so many shards and join them; a file that exists is complete and kept."""
+    parts = [_folder(output) / f"part{k}of{shards}.csv" for k in range(1, shards + 1)]
+    tasks = [("sweep", scenario, "--shard", f"{k}/{shards}", "-o", part) for k, part in enumerate(parts, 1)]
+    _all(client, [(task, None) for task in tasks])
+    return json.loads(run("sweep", "merge", *parts, "-o", output))
+
+
+def build(client, study, output, shards):
+    """Build a study in so many parts and join them."""
+    # One date for all, as one process has it.
+    date = int(os.environ.get("SOURCE_DATE_EPOCH", time.time()))
+    entries = tomllib.loads(pathlib.Path(study).read_text())["run"]
+    names = [entry.get("name", entry["path"].removeprefix("./").strip("/").replace("/", "_")) for entry in entries]
+    chosen = [[word for name in names[k::shards] for word in ("--run", name)] for k in range(min(shards, len(names)))]
+    parts = [_folder(output) / f"part{k}.h5" for k in range(len(chosen))]
+    tasks = [(("build", study, "-o", part, *runs), date) for part, runs in zip(parts, chosen)]
+    _all(client, tasks)
+    if len(parts) == 1:
+        return run("db", "copy", parts[0], "--to", output, date=date)
+    return run("db", "merge", *parts, "-o", output, date=date)
+
+
+def validate(client, database, output):
+    """Validate every group of a database and write the document that `crumple validate --json` prints."""
+    groups = list(json.loads(run("db", "ls", database))["groups"])
+    documents = _all(client, [(("validate", database, "--group", group), None) for group in groups])
+    # Each document holds one group: its text is between the brackets of the list.
+    parts = [(text.index("[") + 1, text.rindex("\n  ]")) for text in documents]
+    inside = [text[start:end] for text, (start, end) in zip(documents, parts)]
+    (start, end), text = parts[0], documents[0]
+    pathlib.Path(output).write_text(text[:start] + ",".join(inside) + text[end:])
