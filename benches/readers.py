@@ -133,20 +133,29 @@ def main(folder, program):
     wide = [(0, 10)] + [(10 + 12 * k, 22 + 12 * k) for k in range(12)]
     fields = ", ".join(f"pl.col('line').str.slice({a}, {b - a}).str.strip_chars().cast(pl.Float64).alias('c{k}')"
                        for k, (a, b) in enumerate(wide))
-    polars = python(
-        "import polars as pl",
-        f"pl.read_csv({small!r}, has_header=False, separator='\\x01', quote_char=None, new_columns=['line'])"
-        f".filter(pl.col('line').str.len_bytes() == 154).filter(pl.col('line').str.starts_with('  1'))"
-        f".select({fields})", repeat=1)
+    def in_polars(path):
+        return python(
+            "import polars as pl",
+            f"pl.read_csv({path!r}, has_header=False, separator='\\x01', quote_char=None, new_columns=['line'])"
+            f".filter(pl.col('line').str.len_bytes() == 154).filter(pl.col('line').str.starts_with('  1'))"
+            f".select({fields})", repeat=1)
+
+    def from_python(path):
+        return python("import crumple", f"crumple.read({path!r})", repeat=1)
+
     pandas = python(
         "import pandas as pd",
         f"pd.read_fwf({small!r}, colspecs={wide!r}, header=None, skiprows=2)", repeat=1)
     read = library()
     table("nodout, 5 000 nodes x 40 states, 31 MB, into memory", "crumple", best({
-        "crumple": read(small), "polars: slices of lines": polars, "pandas.read_fwf": pandas}))
+        "crumple": read(small), "crumple.read in Python": from_python(small),
+        "polars: slices of lines": in_polars(small), "pandas.read_fwf": pandas}))
+    table("nodout, 310 MB, into memory from Python", "crumple.read in Python", best({
+        "crumple.read in Python": from_python(nodout), "polars: slices of lines": in_polars(nodout)}))
 
     table("binout, the same values in single precision, 96 MB, 12 channels into memory", "dynars", best({
         "crumple": read(binout, "nodout"),
+        "crumple.read in Python": python("import crumple", f"crumple.read({binout!r}, section='nodout')"),
         "dynars": python("from dynars import Binout",
                          f"b = Binout({binout!r}); r = [b.read('nodout', n) for n in {COMPONENTS!r}]; del b, r", 5),
         "lasso-python": python("from lasso.dyna import Binout",
@@ -160,4 +169,24 @@ def main(folder, program):
     }))
 
 
+def check(folder):
+    """What crumple.read gives in Python is what dynars reads of a binout, and what the file says of a nodout."""
+    import crumple
+    import numpy as np
+    from dynars import Binout
+
+    binout, small = os.path.join(folder, "binout0000"), os.path.join(folder, "nodout_small")
+    ours, theirs = crumple.read(binout, section="nodout").only(), Binout(binout)
+    for name in COMPONENTS:
+        assert np.array_equal(ours[name].array, theirs.read("nodout", name)), name
+    ours = crumple.read(small).only()
+    with open(small) as lines:
+        rows = [line for line in lines if len(line) == 155 and line.startswith("  1")]
+    for k, name in enumerate(COMPONENTS):
+        fields = np.array([float(line[10 + 12 * k : 22 + 12 * k]) for line in rows])
+        assert np.array_equal(ours[name].array.ravel(), fields), name
+    print("crumple.read in Python: values equal to those of dynars and of the file")
+
+
 main(*sys.argv[1:])
+check(sys.argv[1])

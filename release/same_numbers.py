@@ -17,7 +17,7 @@ def numbers(path):
 
 reference = pathlib.Path(sys.argv[1])
 for other in map(pathlib.Path, sys.argv[2:]):
-    for name in ("validation.json", "law.model", "p.csv", "p.k"):
+    for name in ("validation.json", "law.model", "p.csv", "p.k", "sweep.csv"):
         if (reference / name).read_bytes() == (other / name).read_bytes():
             continue
         a, b = numbers(reference / name), numbers(other / name)

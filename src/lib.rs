@@ -37,6 +37,8 @@ pub mod unit;
 
 mod clock;
 
+mod os;
+
 mod guess;
 
 mod plural;

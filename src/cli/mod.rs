@@ -30,14 +30,12 @@ use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-#[cfg(unix)]
-use std::sync::Arc;
 use std::sync::OnceLock;
 
 use crate::error::ErrorCode;
 use crate::failure::{self, DONE, DONE_WITH_WARNINGS, ErrorDocument, FAILED, USAGE};
 use crate::file::{self, is_same};
-use crate::{database, solver};
+use crate::{database, os, solver};
 use arguments::FileKind;
 use clap::{FromArgMatches, Parser, Subcommand};
 use serde::Serialize;
@@ -253,17 +251,6 @@ impl GlobalOptions {
     }
 }
 
-/// Lets a write beyond the limit on the size of files (`ulimit -f`) fail, with a message that
-/// names the file, where the signal's default would end the process without one.
-#[cfg(unix)]
-fn survive_file_size_limit() {
-    // Without the handler the process ends, and the old file is there all the same.
-    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
-}
-
-#[cfg(not(unix))]
-fn survive_file_size_limit() {}
-
 /// The command line that was given, for what repeats it.
 static GIVEN: OnceLock<Vec<OsString>> = OnceLock::new();
 
@@ -320,7 +307,7 @@ pub fn main() -> ExitCode {
 
 /// The program with these arguments, the first its own name; its exit code.
 pub fn run_program(arguments: Vec<OsString>) -> u8 {
-    survive_file_size_limit();
+    os::survive_file_size_limit();
     let cli = match parsed(arguments) {
         Ok(cli) => cli,
         Err(code) => return code,

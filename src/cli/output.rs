@@ -15,8 +15,8 @@ use serde::Serialize;
 
 use super::{CommandResult, Failure, GlobalOptions};
 use crate::error::Place;
+use crate::os::terminal_width;
 use crate::table::{Cell, Table};
-use terminal_size::{Width, terminal_size_of};
 
 /// Writes text to standard output.
 pub(super) fn print(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
@@ -308,28 +308,18 @@ const LEAST: usize = 40;
 /// Characters in a line of the terminal that standard output is; `None` if it is none.
 pub(super) fn width() -> Option<usize> {
     let out = io::stdout();
-    out.is_terminal().then(|| stated().or_else(|| size(&out)).unwrap_or(80).max(LEAST))
+    out.is_terminal().then(|| stated().or_else(|| terminal_width(&out)).unwrap_or(80).max(LEAST))
 }
 
 /// The same for standard error.
 pub(super) fn error_width() -> Option<usize> {
     let err = io::stderr();
-    err.is_terminal().then(|| stated().or_else(|| size(&err)).unwrap_or(80).max(LEAST))
+    err.is_terminal().then(|| stated().or_else(|| terminal_width(&err)).unwrap_or(80).max(LEAST))
 }
 
 /// The user's choice, whatever the terminal supports.
 fn stated() -> Option<usize> {
     std::env::var("COLUMNS").ok()?.parse().ok().filter(|width| *width > 0)
-}
-
-#[cfg(unix)]
-fn size(stream: &impl std::os::fd::AsFd) -> Option<usize> {
-    terminal_size_of(stream).map(|(Width(width), _)| width.into()).filter(|width| *width > 0)
-}
-
-#[cfg(windows)]
-fn size(stream: &impl std::os::windows::io::AsHandle) -> Option<usize> {
-    terminal_size_of(stream).map(|(Width(width), _)| width.into()).filter(|width| *width > 0)
 }
 
 /// A spinner that names the step just done, or a bar over a known number of items; gone when it is dropped. For the

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::Error;
+use crate::os::is_pipe;
 pub use write::{WriterLock, write_at};
 pub(crate) use write::{not_written, write_all_whole, write_by_path, write_whole};
 
@@ -48,16 +49,6 @@ pub(crate) fn kind(path: &Path) -> io::Result<Kind> {
         // A device may have no end.
         _ => refused("a device or a socket"),
     }
-}
-
-#[cfg(unix)]
-fn is_pipe(kind: fs::FileType) -> bool {
-    std::os::unix::fs::FileTypeExt::is_fifo(&kind)
-}
-
-#[cfg(not(unix))]
-fn is_pipe(_: fs::FileType) -> bool {
-    false
 }
 
 /// Opens a file for reading; all else is refused before it is opened.

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::{explained, folder_of, if_there, target_of};
 use crate::error::{Error, error};
+use crate::os::is_at;
 
 /// The error of a file that cannot be written; what was there before still is.
 pub(crate) fn not_written(path: &Path, source: io::Error) -> Error {
@@ -227,18 +228,6 @@ pub(super) fn lock(path: &Path) -> io::Result<Option<File>> {
             return Ok(Some(file));
         }
     }
-}
-
-#[cfg(unix)]
-pub(super) fn is_at(file: &File, path: &Path) -> bool {
-    use std::os::unix::fs::MetadataExt;
-    let identity = |m: fs::Metadata| (m.dev(), m.ino());
-    file.metadata().map(identity).ok() == fs::symlink_metadata(path).map(identity).ok()
-}
-
-#[cfg(not(unix))]
-pub(super) fn is_at(_: &File, path: &Path) -> bool {
-    path.exists()
 }
 
 #[cfg(test)]

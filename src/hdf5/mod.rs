@@ -24,6 +24,7 @@ use std::sync::{Arc, OnceLock};
 use std::{fs, io};
 
 use crate::file;
+use crate::os::{allocate, write_all_at};
 pub(crate) use hdf5_pure::{
     AttrValue, Dataset, DatasetBuilder, Error, File, FileAccessProperties, FileBuilder,
     FileLocking, FormatError, Group, ReadSeekSource, Source,
@@ -167,15 +168,6 @@ impl Skeleton {
     }
 }
 
-/// Reserves the file's blocks at once, which makes writing them cheaper.
-fn allocate(file: &fs::File, length: u64) -> io::Result<()> {
-    #[cfg(target_os = "linux")]
-    if rustix::fs::fallocate(file, rustix::fs::FallocateFlags::empty(), 0, length).is_ok() {
-        return Ok(());
-    }
-    file.set_len(length)
-}
-
 fn mark(number: usize) -> [u8; MARK_BYTES] {
     let mut mark = [0; MARK_BYTES];
     mark[..16].copy_from_slice(MARK);
@@ -215,23 +207,6 @@ impl Write for Sink<'_> {
     fn flush(&mut self) -> io::Result<()> {
         Ok(())
     }
-}
-
-/// Writes all bytes at a position.
-#[cfg(unix)]
-pub(crate) fn write_all_at(file: &fs::File, bytes: &[u8], at: u64) -> io::Result<()> {
-    std::os::unix::fs::FileExt::write_all_at(file, bytes, at)
-}
-
-/// Writes all bytes at a position.
-#[cfg(windows)]
-pub(crate) fn write_all_at(file: &fs::File, mut bytes: &[u8], mut at: u64) -> io::Result<()> {
-    while !bytes.is_empty() {
-        let written = std::os::windows::fs::FileExt::seek_write(file, bytes, at)?;
-        bytes = &bytes[written..];
-        at += written as u64;
-    }
-    Ok(())
 }
 
 #[cfg(test)]

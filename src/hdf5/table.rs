@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 
 use hdf5_pure::{CharacterSet, Datatype, StringPadding, make_f64_type, make_i64_type};
 
+use super::Skeleton;
 use super::{AttrValue, Dataset, Fault, File, FileBuilder, OpenError, declared_bytes};
-use super::{Skeleton, write_all_at};
 use crate::error::{Error, error};
 use crate::file::write_at;
+use crate::os::write_all_at;
 
 /// What the values of a column are; all have a fixed number of bytes, little endian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -13,9 +13,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use rayon::prelude::*;
 
 use crate::file::{write_at, write_whole};
+use crate::hdf5::Skeleton;
 use crate::hdf5::{self, AttrValue, DatasetBuilder, FileBuilder, OpenError};
-use crate::hdf5::{Skeleton, write_all_at};
 use crate::history::{EntityId, History, Side};
+use crate::os::write_all_at;
 use crate::solver::lsdyna::deck::Deck;
 use crate::solver::{self, Blocks, Selection, SolverFile, decks};
 use crate::unit::UnitSystem;

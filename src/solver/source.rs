@@ -9,7 +9,7 @@ use std::fs::File;
 use std::io::{self, BufRead, Read};
 use std::path::Path;
 
-use crate::file;
+use crate::{file, os};
 
 /// Bytes that can be read at any position, from several threads at once.
 pub trait Source: Send + Sync {
@@ -73,18 +73,8 @@ impl Source for Opened {
     fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
         let there = usize::try_from(self.size.saturating_sub(offset)).unwrap_or(usize::MAX);
         let count = there.min(buffer.len());
-        read_file_at(&self.file, &mut buffer[..count], offset)
+        os::read_at(&self.file, &mut buffer[..count], offset)
     }
-}
-
-#[cfg(unix)]
-fn read_file_at(file: &File, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
-    std::os::unix::fs::FileExt::read_at(file, buffer, offset)
-}
-
-#[cfg(windows)]
-fn read_file_at(file: &File, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
-    std::os::windows::fs::FileExt::seek_read(file, buffer, offset)
 }
 
 #[allow(unsafe_code, reason = "a map is only as safe as its file; see Access::Map")]
