@@ -207,7 +207,7 @@ fn no_unwrap_outside_tests() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 78409), ("files", 303), ("public types", 185), ("error types", 9)];
+    [("lines", 78410), ("files", 303), ("public types", 185), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {
@@ -254,9 +254,9 @@ fn tests_that_need_clients_are_found_by_name() {
         let text = fs::read_to_string(&path).unwrap();
         for behind in text.split("#[ignore = \"needs the Python clients").skip(1) {
             let name = behind.split("fn ").nth(1).unwrap().split('(').next().unwrap();
-            let is_found = ["clients", "documents", "exports", "fmu"].contains(&module)
-                || name.contains("h5py");
-            assert!(is_found, "{module}::{name} needs h5py in its name");
+            let is_found = ["clients", "documents", "exports", "fmu", "mdf"].contains(&module)
+                || ["h5py", "dask"].iter().any(|word| name.contains(word));
+            assert!(is_found, "{module}::{name} needs h5py or dask in its name");
         }
     }
 }

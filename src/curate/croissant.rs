@@ -10,7 +10,7 @@ use sha2::{Digest, Sha256};
 
 use crate::curve::{Case, Parameter};
 use crate::error::Error;
-use crate::file::{not_written, write_at};
+use crate::file::{self, not_written, write_at};
 
 /// Name of the document.
 const FILE: &str = "croissant.json";
@@ -112,7 +112,7 @@ fn about(set: &str) -> &'static str {
 
 /// Hexadecimal.
 fn sha256(path: &Path) -> io::Result<String> {
-    let (mut file, mut hash) = (File::open(path)?, Sha256::new());
+    let (mut file, mut hash) = (file::open(path)?, Sha256::new());
     let mut block = vec![0; 1 << 16];
     loop {
         match file.read(&mut block)? {

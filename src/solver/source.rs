@@ -9,7 +9,8 @@ use std::fs::File;
 use std::io::{self, BufRead, Read};
 use std::path::Path;
 
-use crate::{file, os};
+use crate::file;
+use crate::os;
 
 /// Bytes that can be read at any position, from several threads at once.
 pub trait Source: Send + Sync {
