@@ -108,7 +108,20 @@ fn what_asammdf_writes_is_read() {
     let two = ReadOptions { curve: Some("2".into()), ..ReadOptions::default() };
     let (half, _) = read(&here.join("two.mf4"), &two).unwrap();
     assert!(rows.iter().zip(&half.force_n).all(|([_, _, f], half)| (half - f / 2.0).abs() <= 0.5));
+    let (marked, _) = read(&here.join("marked.mf4"), &ReadOptions::default()).unwrap();
+    let valid: Vec<f64> = (0..rows.len()).filter(|k| k % 10 != 5).map(|k| rows[k][2]).collect();
+    assert_eq!(marked.force_n, valid);
+    let noted = "left out: 40 records marked as invalid".to_string();
+    assert!(marked.notes.contains(&noted), "{:?}", marked.notes);
     for (file, message) in [
+        (
+            "table.mf4",
+            "; left out: channel \"load\": its conversion is not linear: save it with physical values",
+        ),
+        (
+            "array.mf4",
+            "; left out: channel \"load\": it is an array: save its elements as channels",
+        ),
         (
             "two.mf4",
             "the file holds several curves: choose one with --curve: 1 (\"time [s], crush [m], load [N]\"), 2",
@@ -123,6 +136,42 @@ fn what_asammdf_writes_is_read() {
                 &["db", "add", "x.h5", file, "--group", "g", "--speed", "36km/h"],
             ),
             message,
+        );
+    }
+}
+
+/// Blocks that refer to themselves or to each other many times cost no more than the file is long.
+#[test]
+fn circles_of_blocks_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-wall");
+    crumple_ok(here, &[&["export"], &CASE[..], &["-o", "case.mf4"]].concat());
+    let whole = fs::read(here.join("case.mf4")).unwrap();
+    let find = |name: &[u8]| whole.windows(4).position(|w| w == name).unwrap();
+    let end = whole.len() as u64;
+    let set = |at: usize, link: u64| {
+        let mut bytes = whole.clone();
+        bytes[at..at + 8].copy_from_slice(&link.to_le_bytes());
+        bytes
+    };
+    // A list of data that goes on with itself and holds an empty block many times; groups and channels in circles.
+    let mut list = set(find(b"##DG") + 24 + 16, end);
+    let links = 100_000u64;
+    let empty = end + 24 + 8 * (links + 1);
+    list.extend_from_slice(b"##DL\0\0\0\0");
+    let words = [24 + 8 * (links + 1), links + 1, end];
+    let words = words.into_iter().chain((0..links).map(|_| empty));
+    words.for_each(|word| list.extend_from_slice(&word.to_le_bytes()));
+    list.extend_from_slice(b"##DT\0\0\0\0\x18\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0");
+    let circle = |name: &[u8]| set(find(name) + 24, find(name) as u64);
+    for bytes in [list, circle(b"##DG"), circle(b"##CG"), circle(b"##CN")] {
+        fs::write(here.join("circle.mf4"), bytes).unwrap();
+        let read = read(&here.join("circle.mf4"), &ReadOptions::default());
+        let error = read.unwrap_err().to_string();
+        assert!(
+            error.contains("the blocks of the file refer to each other without end"),
+            "{error}"
         );
     }
 }

@@ -38,6 +38,7 @@ documents! {
     formats_and_damage_hold: "docs/formats-and-damage.md";
     forest_holds: "docs/forest.md";
     sweeps_hold: "docs/sweeps.md";
+    scale_holds: "docs/scale.md";
     databases_hold: "docs/databases.md";
     verification_holds: "docs/verification.md";
     feeding_holds: "docs/feeding/README.md";

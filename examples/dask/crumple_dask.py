@@ -11,6 +11,7 @@ see. It may be tried again any number of times: what is complete is not done aga
 that one process would have written.
 """
 
+import hashlib
 import json
 import os
 import pathlib
@@ -34,7 +35,7 @@ def run(*arguments, date=None):
             return done.stdout
         # The program of a worker that was killed may still be at this part: it will be complete then.
         if '"code": "locked"' not in done.stdout:
-            raise RuntimeError(f"{' '.join(words)}\n{done.stderr}")
+            raise RuntimeError(f"{' '.join(words)}\n{done.stderr or done.stdout}")
         time.sleep(1)
 
 
@@ -55,22 +56,33 @@ def sweep(client, scenario, output, shards):
     parts = [_folder(output) / f"part{k}of{shards}.csv" for k in range(1, shards + 1)]
     tasks = [("sweep", scenario, "--shard", f"{k}/{shards}", "-o", part) for k, part in enumerate(parts, 1)]
     _all(client, [(task, None) for task in tasks])
-    return json.loads(run("sweep", "merge", *parts, "-o", output))
+    joined = _folder(output) / "joined.csv"
+    joined.unlink(missing_ok=True)
+    report = json.loads(run("sweep", "merge", *parts, "-o", joined))
+    joined.replace(output)
+    return report
 
 
 def build(client, study, output, shards):
     """Build a study in so many parts and join them."""
     # One date for all, as one process has it.
     date = int(os.environ.get("SOURCE_DATE_EPOCH", time.time()))
-    entries = tomllib.loads(pathlib.Path(study).read_text())["run"]
+    text = pathlib.Path(study).read_bytes()
+    entries = tomllib.loads(text.decode())["run"]
     names = [entry.get("name", entry["path"].removeprefix("./").strip("/").replace("/", "_")) for entry in entries]
     chosen = [[word for name in names[k::shards] for word in ("--run", name)] for k in range(min(shards, len(names)))]
-    parts = [_folder(output) / f"part{k}.h5" for k in range(len(chosen))]
+    # Parts of another division, or of another study, hold other cases.
+    name = f"of{len(chosen)}-{hashlib.sha256(text).hexdigest()[:12]}.h5"
+    parts = [_folder(output) / f"part{k}{name}" for k in range(1, len(chosen) + 1)]
     tasks = [(("build", study, "-o", part, *runs), date) for part, runs in zip(parts, chosen)]
     _all(client, tasks)
+    joined = _folder(output) / "joined.h5"
+    joined.unlink(missing_ok=True)
     if len(parts) == 1:
-        return run("db", "copy", parts[0], "--to", output, date=date)
-    return run("db", "merge", *parts, "-o", output, date=date)
+        run("db", "copy", parts[0], "--to", joined, date=date)
+    else:
+        run("db", "merge", *parts, "-o", joined, date=date)
+    joined.replace(output)
 
 
 def validate(client, database, output):

@@ -237,6 +237,9 @@ class Group(_Mapping):
         super().__init__(dict.fromkeys(cases))
         self.path, self.name = path, name
 
+    def __contains__(self, name):
+        return name in self._items
+
     def __getitem__(self, name):
         case = super().__getitem__(name)
         if case is None:
@@ -260,7 +263,8 @@ class Database(_Mapping):
     _what = "group"
 
     def __init__(self, path):
-        self.path = Path(path)
+        # Cases are read later, perhaps from another folder.
+        self.path = Path(path).resolve()
         groups = _crumple.database(os.fspath(path))
         super().__init__({name: Group(self.path, name, cases) for name, cases in groups})
 

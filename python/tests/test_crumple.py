@@ -201,6 +201,11 @@ def test_cases_are_read_one_by_one(monkeypatch):
     assert [name for _, _, name in seen] == ["36kmh"]
     with pytest.raises(KeyError, match="there is no case '36': expected one of 12kmh, 18kmh"):
         database["lead-car-wall"]["36"]
+    assert "48kmh" in database["lead-car-wall"] and len(seen) == 1
+    monkeypatch.chdir(DEMO)
+    database = crumple.Database("curves.h5")
+    monkeypatch.chdir("/")
+    assert database["lead-car-wall"]["48kmh"].mass == 24000.0
 
 
 def test_the_blend_of_curves_is_the_model_linear(tmp_path):

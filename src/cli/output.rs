@@ -353,9 +353,11 @@ impl Bar {
     }
 
     fn visible(options: GlobalOptions, make: impl FnOnce() -> ProgressBar) -> Self {
-        if std::env::var_os("CRUMPLE_PROGRESS").is_some_and(|how| how == "lines") {
+        if options.quiet {
+            Self::None
+        } else if std::env::var_os("CRUMPLE_PROGRESS").is_some_and(|how| how == "lines") {
             Self::Lines { items: make().length().unwrap_or_default(), last: Mutex::default() }
-        } else if !options.quiet && std::io::stderr().is_terminal() {
+        } else if std::io::stderr().is_terminal() {
             Self::Drawn(make())
         } else {
             Self::None

@@ -151,10 +151,13 @@ fn recorded(
         StatedContact::Time { s: time_s[0] }
     });
     let common = Sampling::default();
-    let states = ((time_s[time_s.len() - 1] - time_s[0]) / common.interval_s) as usize + 1;
+    let states = ((time_s[time_s.len() - 1] - time_s[0]) / common.interval_s) as usize;
     let setup = Setup {
         filter: Filter::None,
-        sampling: Sampling { states: states.clamp(common.states, MOST_STATES), ..common },
+        sampling: Sampling {
+            states: states.saturating_add(1).clamp(common.states, MOST_STATES),
+            ..common
+        },
         kind: impact.speed.kind,
         half_model: false,
         masses: impact.masses,

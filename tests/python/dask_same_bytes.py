@@ -35,7 +35,9 @@ def main():
         thread.start()
         report = crumple_dask.sweep(client, scenario, "sweep.csv", shards=7)
         thread.join()
-        crumple_dask.build(client, study, "built.h5", shards=3)
+        # Again, and divided in another way.
+        for shards in (3, 3, 2):
+            crumple_dask.build(client, study, "built.h5", shards)
         crumple_dask.validate(client, database, "validation.json")
         crumple_dask.sweep(client, scenario, "again.csv", shards=1)
     one = crumple_dask.PROGRAM

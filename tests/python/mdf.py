@@ -55,6 +55,21 @@ def write(folder, curve):
     file = MDF(version="4.10")
     file.append([Signal(np.arange(10.0), np.arange(10.0), name="temperature", unit="C")])
     file.save(f"{folder}/none.mf4", overwrite=True)
+    # Every tenth force is marked as invalid, and wrong; arrays; conversions by a table; a comment like our facts.
+    bad = np.arange(len(time)) % 10 == 5
+    file = MDF(version="4.10")
+    marked = Signal(np.where(bad, 0.0, force), time, name="load", unit="N", invalidation_bits=bad)
+    file.append([Signal(deflection, time, name="crush", unit="m"), marked], common_timebase=True)
+    file.header.comment = "force_kind: both & more"
+    file.save(f"{folder}/marked.mf4", overwrite=True)
+    for name, force_of in [
+        ("table", Signal(np.arange(len(time), dtype="u2"), time, name="load", unit="N",
+                         conversion={"raw_0": 0.0, "phys_0": 0.0, "raw_1": 400.0, "phys_1": 4e6})),
+        ("array", Signal(np.array(list(zip(np.stack([force] * 3, axis=1))), dtype=[("load", "<f8", (3,))]), time, name="load", unit="N")),
+    ]:
+        file = MDF(version="4.10")
+        file.append([Signal(deflection, time, name="crush", unit="m"), force_of], common_timebase=True)
+        file.save(f"{folder}/{name}.mf4", overwrite=True)
     MDF(version="3.30").save(f"{folder}/old.mdf", overwrite=True)
     print(json.dumps([" ".join(map(str, way)) for way in WAYS]))
 

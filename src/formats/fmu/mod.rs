@@ -11,7 +11,7 @@ mod table;
 use std::io::{Cursor, Write};
 
 use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, ZipWriter};
+use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
 use super::thin::thinned;
 use super::{ExportCurve, Exported};
@@ -181,8 +181,9 @@ fn pack(
     let compiled: Vec<&str> =
         sources.iter().map(|(file, _)| *file).filter(|file| file.ends_with(".c")).collect();
 
-    // A fixed date, so that the same input always gives the same bytes.
+    // A fixed date and system, so that the same input always gives the same bytes.
     let options = SimpleFileOptions::default()
+        .system(System::Unix)
         .compression_method(CompressionMethod::Deflated)
         .last_modified_time(DateTime::default())
         .unix_permissions(0o644);

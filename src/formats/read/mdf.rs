@@ -1,8 +1,10 @@
 //! Curve of an MDF 4 file (ASAM): one of its groups of channels, read as the table that it is.
 //!
 //! Test departments' tools write them in many ways; read are sorted groups of numbers in whole bytes, plain, in lists of
-//! blocks and compressed, with linear conversions. Everything else is named with what to do about it.
+//! blocks and compressed, with linear conversions. Everything else is named with what to do about it. Blocks may refer to each
+//! other in any way: a file has as many visits as it could hold blocks, several times over.
 
+use std::cell::Cell;
 use std::fmt::Write;
 use std::io::Read;
 
@@ -13,13 +15,20 @@ use super::curve::ReadCurve;
 use super::label::{Label, Quantity};
 use super::{Input, tables};
 use crate::error::{Error, error};
+use crate::plural::counted;
 
-/// How every MDF file begins, and where the version is.
+/// How every MDF file begins; the version and the program that wrote it follow.
 const BEGINNING: &[u8] = b"MDF     ";
+const OURS: &[u8] = b"crumple ";
 /// Bytes of a group's records, unpacked, at most.
 const MOST_BYTES: u64 = 1 << 30;
 /// The same of one compressed block; writers pack 4 MiB.
 const MOST_PACKED: u64 = 64 << 20;
+/// Bytes of a name, and of the comment of a file, that are read.
+const NAME: usize = 512;
+const COMMENT: usize = 64 << 10;
+/// Channels that a message lists.
+const LISTED: usize = 5;
 /// Numbers of a table at most.
 const MOST_NUMBERS: usize = 20_000_000;
 
@@ -31,21 +40,35 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     if input.bytes.get(8) != Some(&b'4') {
         return Err(wrong("expected MDF of version 4, found an earlier version: save it as MDF 4"));
     }
-    let file = Blocks(input.bytes);
+    let visits = Cell::new(input.bytes.len() / 8 + 100);
+    let file = Blocks { bytes: input.bytes, visits };
     let header = file.block(64, b"HD")?;
     let mut groups = groups(&file, &header)?;
-    let chosen = chosen(&groups, input.options.curve.as_deref())?;
+    let left_out = |of: &[Group]| {
+        let all = of.iter().flat_map(|group| &group.left_out).take(LISTED);
+        all.map(|why| format!("; left out: channel {why}")).collect::<String>()
+    };
+    let chosen = chosen(&groups, input.options.curve.as_deref());
+    let chosen = chosen.map_err(|error| error.followed_by(&left_out(&groups)))?;
     let mut group = groups.swap_remove(chosen);
     // Columns chosen by the user may be any, by their numbers too.
     if input.options.column_option().is_none() && group.is_curve() {
         group.channels.retain(|channel| channel.quantity().is_some());
     }
     let mut text = String::new();
-    for line in file.text(header.link(5)).unwrap_or_default().lines() {
+    // What an import needs to know; comments of other programs are about something else.
+    let comment =
+        file.text(header.link(5), COMMENT).filter(|_| input.bytes[16..].starts_with(OURS));
+    for line in comment.unwrap_or_default().lines() {
         let _ = writeln!(text, "# {line}");
     }
-    group.rows(&file, &mut text)?;
-    let mut found = tables::read(&Input { text: &text, ..*input })?;
+    let invalid = group.rows(&file, &mut text)?;
+    let found = tables::read(&Input { text: &text, ..*input });
+    let mut found =
+        found.map_err(|error| error.followed_by(&left_out(std::slice::from_ref(&group))))?;
+    if invalid > 0 {
+        found.notes.push(format!("left out: {} marked as invalid", counted(invalid, "record")));
+    }
     found.notes.insert(0, format!("curve: group {} of the file, read as a table", group.name));
     found.notes.extend(group.left_out.iter().map(|why| format!("left out: channel {why}")));
     Ok(found)
@@ -56,7 +79,11 @@ fn wrong(what: &str) -> Error {
 }
 
 /// The blocks of a file, by their offsets.
-struct Blocks<'a>(&'a [u8]);
+struct Blocks<'a> {
+    bytes: &'a [u8],
+    /// How many more are visited.
+    visits: Cell<usize>,
+}
 
 struct Block<'a> {
     links: &'a [u8],
@@ -79,7 +106,7 @@ fn integer(bytes: &[u8], at: usize, size: usize) -> u64 {
 impl<'a> Blocks<'a> {
     fn kind(&self, at: u64) -> &'a [u8] {
         let at = usize::try_from(at).unwrap_or(usize::MAX);
-        at.checked_add(4).and_then(|end| self.0.get(at..end)).unwrap_or_default()
+        at.checked_add(4).and_then(|end| self.bytes.get(at..end)).unwrap_or_default()
     }
 
     fn block(&self, at: u64, kind: &[u8; 2]) -> Result<Block<'a>, Error> {
@@ -93,25 +120,32 @@ impl<'a> Blocks<'a> {
         if self.kind(at) != format!("##{kind}").as_bytes() {
             return Err(cut());
         }
+        let left = self.visits.get().checked_sub(1);
+        self.visits.set(
+            left.ok_or_else(|| wrong("the blocks of the file refer to each other without end"))?,
+        );
         let begin = usize::try_from(at).map_err(|_| cut())?;
-        let (length, links) = (integer(self.0, begin + 8, 8), integer(self.0, begin + 16, 8));
+        let (length, links) =
+            (integer(self.bytes, begin + 8, 8), integer(self.bytes, begin + 16, 8));
         let end = usize::try_from(length).ok().and_then(|length| begin.checked_add(length));
-        let whole = end.and_then(|end| self.0.get(begin..end)).ok_or_else(cut)?;
+        let whole = end.and_then(|end| self.bytes.get(begin..end)).ok_or_else(cut)?;
         let links = usize::try_from(links).ok().and_then(|n| n.checked_mul(8)?.checked_add(24));
         let (head, data) = links.and_then(|at| whole.split_at_checked(at)).ok_or_else(cut)?;
         Ok(Block { links: head.get(24..).ok_or_else(cut)?, data })
     }
 
-    /// The text of a block of text, or the first in one of XML.
-    fn text(&self, at: u64) -> Option<String> {
+    /// The text of a block of text, or the first in one of XML, as far as it lies in so many bytes.
+    fn text(&self, at: u64, most: usize) -> Option<String> {
         let kind = self.kind(at).last_chunk().filter(|kind| [b"TX", b"MD"].contains(kind))?;
         let data = self.block(at, kind).ok()?.data;
+        let data = &data[..data.len().min(most)];
         let text = String::from_utf8_lossy(data.split(|byte| *byte == 0).next()?);
         if kind == b"TX" {
             return Some(text.trim().into());
         }
         let inside = text.split_once("<TX")?.1.split_once('>')?.1.split_once("</TX>")?.0;
-        let plain = inside.replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&");
+        let plain = inside.replace("&lt;", "<").replace("&gt;", ">").replace("&quot;", "\"");
+        let plain = plain.replace("&apos;", "'").replace("&amp;", "&");
         Some(plain.trim().into())
     }
 }
@@ -139,6 +173,8 @@ struct Channel {
     /// value = offset + factor × raw.
     offset: f64,
     factor: f64,
+    /// Byte and bit of the mark that a value is invalid.
+    invalid: Option<(usize, u8)>,
 }
 
 struct Group {
@@ -147,6 +183,8 @@ struct Group {
     left_out: Vec<String>,
     records: u64,
     record_bytes: usize,
+    /// Those before the marks of invalid values.
+    value_bytes: usize,
     data: u64,
     /// Why its records cannot be read.
     unread: Option<&'static str>,
@@ -162,13 +200,15 @@ fn groups(file: &Blocks<'_>, header: &Block<'_>) -> Result<Vec<Group>, Error> {
                 left_out: Vec::new(),
                 records: integer(block.data, 8, 8),
                 record_bytes: (integer(block.data, 24, 4) + integer(block.data, 28, 4)) as usize,
+                value_bytes: integer(block.data, 24, 4) as usize,
                 data: data.link(2),
                 unread: (integer(data.data, 0, 1) != 0)
                     .then_some("several groups share its records: sort the file (asammdf does)"),
             };
             for (k, block) in chain(file, block.link(1), b"CN")?.iter().enumerate() {
-                let name = file.text(block.link(2)).unwrap_or_else(|| format!("channel {}", k + 1));
-                match channel(file, block, name.clone(), group.record_bytes) {
+                let name =
+                    file.text(block.link(2), NAME).unwrap_or_else(|| format!("channel {}", k + 1));
+                match channel(file, block, name.clone(), &group) {
                     Ok(channel) => group.channels.push(channel),
                     Err(why) => group.left_out.push(format!("\"{name}\": {why}")),
                 }
@@ -186,22 +226,34 @@ fn channel(
     file: &Blocks<'_>,
     block: &Block<'_>,
     name: String,
-    record_bytes: usize,
+    group: &Group,
 ) -> Result<Channel, &'static str> {
     let byte = |at: usize| integer(block.data, at, 1) as u8;
     let (kind, at, bits) = (byte(2), integer(block.data, 4, 4), integer(block.data, 8, 4));
     if ![0, 2, 3].contains(&byte(0)) {
         return Err("its values are not in the records");
     }
+    if file.kind(block.link(1)) == b"##CA" {
+        return Err("it is an array: save its elements as channels");
+    }
     let (at, size) = (at as usize, bits as usize / 8);
     let is_whole = byte(3) == 0 && bits % 8 == 0 && (1..=8).contains(&size);
-    if !is_whole || kind > 5 || kind > 3 && ![4, 8].contains(&size) || at + size > record_bytes {
+    if !is_whole || kind > 5 || kind > 3 && ![4, 8].contains(&size) || at + size > group.value_bytes
+    {
         return Err("it does not hold numbers in whole bytes");
     }
-    let mut found = Channel { name, unit: String::new(), at, size, kind, offset: 0.0, factor: 1.0 };
-    let mut unit = file.text(block.link(6));
+    let flags = integer(block.data, 12, 4);
+    if flags & 1 != 0 {
+        return Err("all its values are marked as invalid");
+    }
+    let bit = integer(block.data, 16, 4) as usize;
+    let mark = (group.value_bytes + bit / 8, 1 << (bit % 8));
+    let invalid = Some(mark).filter(|(at, _)| flags & 2 != 0 && *at < group.record_bytes);
+    let (offset, factor) = (0.0, 1.0);
+    let mut found = Channel { name, unit: String::new(), at, size, kind, offset, factor, invalid };
+    let mut unit = file.text(block.link(6), NAME);
     if let Ok(conversion) = file.block(block.link(4), b"CC") {
-        unit = unit.or(file.text(conversion.link(1)));
+        unit = unit.or(file.text(conversion.link(1), NAME));
         // After precision (1), flags (2), references (2), parameters (2) and the physical range (16).
         let parameter = |k: usize| f64::from_bits(integer(conversion.data, 24 + 8 * k, 8));
         match integer(conversion.data, 0, 1) {
@@ -268,8 +320,8 @@ impl Group {
         has(Quantity::Deflection) && has(Quantity::Force)
     }
 
-    /// Its header and rows as the lines of a table.
-    fn rows(&self, file: &Blocks<'_>, text: &mut String) -> Result<(), Error> {
+    /// Its header and rows as the lines of a table; how many rows are left out, since a value in them is marked as invalid.
+    fn rows(&self, file: &Blocks<'_>, text: &mut String) -> Result<usize, Error> {
         if let Some(why) = self.unread {
             return Err(error!(CurveFile, "group {}: {why}", self.name));
         }
@@ -294,15 +346,20 @@ impl Group {
         let quoted = |label: String| format!("\"{}\"", label.replace(['"', '\n', '\r'], " "));
         let labels: Vec<String> = self.channels.iter().map(|c| quoted(c.label())).collect();
         let _ = writeln!(text, "{}", labels.join(","));
-        let mut digits = zmij::Buffer::new();
+        let (mut digits, mut invalid) = (zmij::Buffer::new(), 0);
         for record in data.chunks_exact(self.record_bytes.max(1)).take(records) {
+            let marks = self.channels.iter().filter_map(|channel| channel.invalid);
+            if marks.into_iter().any(|(at, bit)| record[at] & bit != 0) {
+                invalid += 1;
+                continue;
+            }
             for (k, channel) in self.channels.iter().enumerate() {
                 text.push_str(if k == 0 { "" } else { "," });
                 text.push_str(digits.format(channel.of(record)));
             }
             text.push('\n');
         }
-        Ok(())
+        Ok(invalid)
     }
 }
 
@@ -342,11 +399,17 @@ fn piece(file: &Blocks<'_>, at: u64, most: usize, out: &mut Vec<u8>) -> Result<(
     let packed = file.block(at, b"DZ")?.data;
     // Two letters of the kind packed, how (1), one of padding, the row of a transposition (4), bytes unpacked (8), packed (8).
     let (how, columns) = (integer(packed, 2, 1), integer(packed, 4, 4) as usize);
-    let size = integer(packed, 8, 8).min(MOST_PACKED);
+    let size = integer(packed, 8, 8);
+    if size > MOST_PACKED {
+        return Err(error!(
+            CurveFile,
+            "byte {at}: a compressed block has more than 64 MiB: save the file without compression"
+        ));
+    }
     let mut plain = Vec::new();
     let read =
         ZlibDecoder::new(packed.get(24..).unwrap_or_default()).take(size).read_to_end(&mut plain);
-    if how > 1 || read.is_err() {
+    if how > 1 || read.is_err() || plain.len() as u64 != size {
         return Err(error!(
             CurveFile,
             "byte {at}: its compressed block cannot be unpacked: save the file without compression"
