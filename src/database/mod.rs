@@ -112,7 +112,7 @@ impl Database {
     /// is.
     ///
     /// # Errors
-    /// As for [`Database::read`] and [`Database::group_or_only`], and if the
+    /// As for [`Database::read`], if the group is not named and there are several, and if the
     /// group has no such case.
     pub fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, Error> {
         let opened = layout::open(path)?;
