@@ -328,7 +328,7 @@ fn onnx_runtime_predicts_the_same() {
         assert_eq!(theirs["producer"], concat!("crumple ", env!("CARGO_PKG_VERSION")));
         let model = Model::read(&here.join("m")).unwrap();
         let forest = model.forest().expect("a forest was trained");
-        let ours: Array1<f64> = forest.forest().predict(&records);
+        let ours: Array1<f64> = forest.predict(&records);
         let theirs = theirs["predicted"].as_array().unwrap();
         assert_eq!(theirs.len(), ours.len());
         for ((ours, theirs), record) in ours.iter().zip(theirs).zip(records.rows()) {

@@ -8,11 +8,10 @@ use std::time::{Duration, Instant};
 
 use crate::common::{
     build_fixture, crumple_fails, crumple_in, crumple_ok as ok, crumple_started, edited, entries,
-    fixture, is_thorough, json, program, python, says, study_in,
+    fixture, held_by_another, is_thorough, json, program, python, says, study_in,
 };
 use crumple::curve::Case;
 use crumple::database::Database;
-use crumple::file::WriterLock;
 use hdf5_pure::{AttrValue, File as Hdf5};
 use serde_json::Value;
 
@@ -1046,7 +1045,7 @@ fn a_second_writer_is_known() {
     let (folder, study) = to_be_changed();
     let here = folder.path();
     let before = fs::read(here.join("curves.h5")).unwrap();
-    let held = WriterLock::take(&here.join("curves.h5")).unwrap();
+    let held = held_by_another(&here.join("curves.h5"));
     for (line, _) in CHANGING {
         let line = line.replace("STUDY", &study);
         fails(

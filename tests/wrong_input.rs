@@ -5,8 +5,8 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::{
-    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, entries, fixture, python,
-    says, shared,
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, entries, fixture,
+    held_by_another, python, says, shared,
 };
 
 /// The run of each group that is studied.
@@ -145,7 +145,7 @@ fn a_second_writer_is_known_and_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let path = build_fixture(folder.path(), "lead-car-wall");
     let before = fs::read(&path).unwrap();
-    let lock = crumple::file::WriterLock::take(&path).unwrap();
+    let lock = held_by_another(&path);
     let study = fixture("fe/lead-car-pair/study.toml");
     let error =
         crumple_fails(folder.path(), 1, &["build", study.to_str().unwrap(), "-o", "curves.h5"]);

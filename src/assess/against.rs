@@ -10,7 +10,7 @@ pub(crate) type Pair = [Option<f64>; 2];
 
 /// An earlier validation of the same group beside this one.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Against {
+pub(crate) struct Against {
     /// The model chosen before.
     pub chosen_before: String,
     /// Half width of the band between the speeds, in shares of the local force level: before and now.
@@ -23,7 +23,7 @@ pub struct Against {
 
 /// Errors before and now.
 #[derive(Debug, Serialize, JsonSchema)]
-pub struct Changed {
+pub(crate) struct Changed {
     /// The model or the case.
     pub name: String,
     /// Σ|p−r| / Σ|r| of the force.

@@ -144,7 +144,7 @@ pub(crate) fn scores<'a>(
 
 /// The speed whose FE run would help most.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct NextRun {
+pub(crate) struct NextRun {
     /// The speed to run, in m/s.
     pub speed_m_per_s: f64,
     /// Training speeds that it lies between.

@@ -287,7 +287,7 @@ fn peak_errors(along: &[f64], reference: &[f64], predicted: &[f64]) -> Vec<PeakE
 
 /// Why a case cannot be left out.
 #[derive(Debug, thiserror::Error)]
-pub enum NotLeftOut {
+pub(crate) enum NotLeftOut {
     /// Its maximum deflection is not known.
     #[error("case \"{case}\" ended while loading: not left out")]
     Truncated {

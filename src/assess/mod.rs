@@ -13,11 +13,9 @@ pub(crate) mod subsets;
 pub(crate) mod train;
 pub(crate) mod validate;
 
-pub use choose::{Gap, NextRun, Purpose, Selection, gaps};
-pub use left_out::NotLeftOut;
+pub use choose::{Purpose, Selection, gaps};
 pub use methods::ComparisonSettings;
-pub use reference::{MotionErrors, Reference};
+pub use reference::Reference;
 pub(crate) use row::Row;
-pub use subsets::OverSubsets;
-pub use train::{InterfaceCrush, TrainComparison, TrainRow, VehicleErrors, compare_train};
-pub use validate::{Choice, GroupReport, Report, train, validate};
+pub use train::{TrainComparison, compare_train};
+pub use validate::{Choice, Report, train, validate};

@@ -95,7 +95,7 @@ impl Reference {
     }
 
     /// Errors of the one-mass run that a force curve gives.
-    pub(crate) fn errors_with(&self, curve: &ForceCurve) -> Result<MotionErrors, Error> {
+    pub fn errors_with(&self, curve: &ForceCurve) -> Result<MotionErrors, Error> {
         let errors = self.errors(&self.run(curve)?)?;
         let MotionErrors { velocity_l1, acceleration_l1, acceleration_unfiltered_l1 } = errors;
         let all = [velocity_l1, acceleration_l1, acceleration_unfiltered_l1];
@@ -162,7 +162,7 @@ impl Reference {
     }
 
     /// Errors of speeds at [`time_s`](Self::time_s).
-    pub(crate) fn errors_of(&self, velocity: &[f64]) -> MotionErrors {
+    pub fn errors_of(&self, velocity: &[f64]) -> MotionErrors {
         let acceleration = derivative(&self.time_s, velocity);
         let smooth = filtered(&self.time_s, acceleration.clone());
         let inside =

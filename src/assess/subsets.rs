@@ -23,7 +23,7 @@ const MOST_SPEEDS: usize = 12;
 
 /// A model, or the choice among all, over the subsets of a group.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
-pub struct OverSubsets {
+pub(crate) struct OverSubsets {
     /// Name of the model, or `auto`.
     pub model: String,
     /// In how many subsets of 4 and 5 speeds it predicts every inner speed that these lack.

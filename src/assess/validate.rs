@@ -34,13 +34,13 @@ pub(crate) const MOST_SPEEDS: usize = 20;
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Report {
     /// In the order of the database.
-    pub groups: Vec<GroupReport>,
+    pub(crate) groups: Vec<GroupReport>,
 }
 
 /// One group: its table, or why there is none.
 #[derive(Debug, Serialize, JsonSchema)]
 #[serde(untagged)]
-pub enum GroupReport {
+pub(crate) enum GroupReport {
     /// The table of a group.
     Validated {
         /// Every model at every speed that was left out.

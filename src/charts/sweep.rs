@@ -23,7 +23,7 @@ const MOST_LINES: usize = 6;
 ///
 /// # Errors
 /// For a name that the sweep does not have, and for a sweep that varies nothing but curves.
-pub fn sweep(
+pub(crate) fn sweep(
     title: &str,
     columns: &SweepColumns,
     over: &[String],

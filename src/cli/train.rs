@@ -8,7 +8,7 @@ use crate::assess::choose::Purpose;
 use crate::assess::validate::{self, Choice};
 use crate::curve::StoppedMass;
 use crate::database::Database;
-use crate::forest::{StopRule, Thresholds};
+use crate::forest::{RegressionForest, StopRule, Thresholds};
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::{MODELS, ModelKind, WarningCode};
 use crate::unit::{Shown, SpeedKind, km_per_h};
@@ -171,7 +171,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         of_cases.filter(|w| w.code == WarningCode::CaseWarning).map(|warning| warning.message),
     );
     let outcome = options.warn_all(warnings);
-    let out_of_bag = model.forest().and_then(|forest| forest.forest().out_of_bag());
+    let out_of_bag = model.forest().and_then(RegressionForest::out_of_bag);
     let speeds: Vec<f64> = model.cases.iter().map(|c| c.speed_m_per_s).collect();
     let path = args.output.display();
     let document = document! {

@@ -23,7 +23,6 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, error};
 use crate::unit::{Speed, UnitSystem};
-pub use body::BodyMotion;
 pub use energy::audit;
 pub use envelope::Envelope;
 pub use extract::{Extracted, Measured, MeasuredForce, Setup, Stated, StatedContact, extract};
@@ -32,7 +31,7 @@ pub use from_table::from_table;
 pub use loading::{Loading, unloading_stiffness};
 pub use recipe::{Filter, ForceSource, Recipe, RecordedMotion, Sampling};
 pub use retrace::{Impact, Table};
-pub use stopped_mass::StoppedMass;
+pub(crate) use stopped_mass::StoppedMass;
 
 /// A force–deflection history: what one run measured at an interface.
 ///

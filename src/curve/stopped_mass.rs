@@ -13,7 +13,7 @@ use crate::signal::bounded;
 
 /// Stopped mass of the runs of a group, over the deflection.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct StoppedMass {
+pub(crate) struct StoppedMass {
     /// Nodes in m, from 0.
     pub deflection_m: Vec<f64>,
     /// Stopped mass in kg at each node, never falling: that of the body against a wall; of a pair

@@ -10,7 +10,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::error::Error;
 use crate::os::is_pipe;
-pub use write::{WriterLock, write_at};
+pub(crate) use write::WriterLock;
+pub use write::write_at;
 pub(crate) use write::{not_written, write_all_whole, write_by_path, write_whole};
 
 /// Whether content is read that is not what was written, by the fingerprint next to it. The command line

@@ -163,7 +163,7 @@ impl Drop for Draft {
 
 /// Held while a database or the result of a sweep is read, changed and written back.
 #[derive(Debug)]
-pub struct WriterLock {
+pub(crate) struct WriterLock {
     /// The kernel frees the lock with the file, however the process ends.
     _file: File,
     path: PathBuf,
@@ -175,7 +175,7 @@ impl WriterLock {
     /// # Errors
     /// Of code [`ErrorCode::Locked`](crate::error::ErrorCode::Locked) if another process holds it, and of code
     /// [`ErrorCode::Io`](crate::error::ErrorCode::Io) if its file cannot be created.
-    pub fn take(target: &Path) -> Result<Self, Error> {
+    pub(crate) fn take(target: &Path) -> Result<Self, Error> {
         let error = |source| {
             let source = explained(target, source);
             error!(

@@ -32,8 +32,7 @@ use crate::unit::UnitSystem;
 pub use export_curve::ExportCurve;
 pub(crate) use export_curve::TargetUnloading;
 pub use fmu::{FmiVersion, Spring, archive, binaries};
-pub use lsdyna::Material;
-pub use read::curve::Metadata;
+pub(crate) use lsdyna::Material;
 pub(crate) use read::history;
 pub use read::{ReadCurve, ReadOptions, read, readers};
 

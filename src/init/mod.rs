@@ -23,9 +23,9 @@ use crate::error::{Error, error};
 use crate::history::Side;
 use crate::study::StudyKind;
 use crate::unit::UnitSystem;
-pub use propose::propose;
+pub(crate) use propose::propose;
 pub(crate) use scenario::propose_scenario;
-pub use write::Proposal;
+pub(crate) use write::Proposal;
 pub(crate) use write::Proposed;
 
 pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
@@ -43,7 +43,7 @@ pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
 
 /// What the caller already knows; it overrides what is found.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct UserHints {
+pub(crate) struct UserHints {
     /// Units of the solver files.
     pub units: Option<UnitSystem>,
     /// Kind of impact.

@@ -32,7 +32,7 @@ use crate::unit::UnitSystem;
 ///
 /// # Errors
 /// If there is no run, none can be used, or they are several groups.
-pub fn propose(
+pub(crate) fn propose(
     folders: &[PathBuf],
     study: &Path,
     hints: &UserHints,

@@ -23,7 +23,7 @@ Change whatever you know better.";
 
 impl Proposal {
     /// The proposal as the text of a study manifest.
-    pub fn to_toml(&self) -> String {
+    pub(crate) fn to_toml(&self) -> String {
         let mut text = Text::default();
         HEAD.lines().for_each(|line| text.line(&format!("# {line}")));
         let missing = self.missing();
@@ -267,7 +267,7 @@ pub(super) fn speed_text(m_per_s: f64) -> String {
 
 /// A proposed study.
 #[derive(Clone, Debug, Serialize)]
-pub struct Proposal {
+pub(crate) struct Proposal {
     /// Group of the curve database, and name of the study.
     pub(crate) group: Proposed<String>,
     pub(crate) units: Proposed<UnitSystem>,

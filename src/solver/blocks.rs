@@ -47,7 +47,7 @@ pub struct Column {
 
 impl Column {
     /// Number of values of a state.
-    pub fn width(&self) -> usize {
+    pub(crate) fn width(&self) -> usize {
         self.entities.len().max(1)
     }
 }
@@ -64,18 +64,18 @@ impl Blocks {
     }
 
     /// Whether all states can be read and are plausible.
-    pub fn are_whole(&self) -> io::Result<bool> {
+    pub(crate) fn are_whole(&self) -> io::Result<bool> {
         self.states.are_whole()
     }
 
     /// Whether the values of all states, which were read, are plausible; if not, the file must be read as a
     /// whole, which says why.
-    pub fn are_plausible(&self) -> bool {
+    pub(crate) fn are_plausible(&self) -> bool {
         self.states.are_plausible()
     }
 
     /// Labels of the values, in [`Blocks::order`].
-    pub fn labels(&self) -> Vec<String> {
+    pub(crate) fn labels(&self) -> Vec<String> {
         let of = |column: &Column| {
             let entities = column.entities.iter().map(|e| format!("{}[{e}]", column.component));
             let global = column.entities.is_empty().then(|| column.component.clone());

@@ -41,7 +41,7 @@ const WIDEST: f64 = 1e6;
     Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
 )]
 #[serde(rename_all = "snake_case")]
-pub enum LeftOutSpeeds {
+pub(crate) enum LeftOutSpeeds {
     /// Speeds between others: for queries between training speeds.
     #[default]
     Inner,
@@ -83,7 +83,7 @@ pub struct Band {
     pub curves: usize,
     /// Which speeds these were.
     #[serde(default)]
-    pub left_out: LeftOutSpeeds,
+    pub(crate) left_out: LeftOutSpeeds,
     /// What the half widths below hold for. `inner`: distance of the two training speeds that a
     /// query lies between, and the widths go with its power 0.65; `ends`: distance to the
     /// nearest training speed, and they are in proportion to it.
@@ -95,7 +95,7 @@ pub struct Band {
     /// The part of both that comes from the scatter between repeated runs, whatever the span; the
     /// squares of it and of the error of interpolation add. Absent without such runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub scatter: Option<ScatterWidths>,
+    pub(crate) scatter: Option<ScatterWidths>,
     /// Share of the left-out points inside the band that the other curves give over the same
     /// span; `None` with fewer than two curves.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -112,7 +112,7 @@ pub struct Band {
 /// Half widths that the scatter between repeated runs gives by itself: Student's t times its root mean
 /// square.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct ScatterWidths {
+pub(crate) struct ScatterWidths {
     /// As for [`Band::pointwise_share`].
     pub pointwise_share: f64,
     /// As for [`Band::simultaneous_share`].

@@ -31,7 +31,7 @@ pub(crate) fn per_crush_force(stopped_kg: f64, mass_kg: f64) -> f64 {
 
 /// Stopped mass and crush force of the runs of a group.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CrushLaw {
+pub(crate) struct CrushLaw {
     /// β in (s/m)^½, over the closing speed of the model's kind.
     #[serde(rename = "sensitivity_sqrt_s_per_m")]
     pub sensitivity: f64,

@@ -13,7 +13,7 @@ use crate::error::{Error, error};
 
 /// One model: its name, its requirements, how it is fitted and read.
 #[derive(Clone, Copy, Debug)]
-pub struct ModelEntry {
+pub(crate) struct ModelEntry {
     /// As the command line and model files name it.
     pub name: &'static str,
     /// What it is, in one line.

@@ -32,7 +32,7 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 
 /// A fitted forest and the speeds it jumps between.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ForestSurrogate {
+pub(crate) struct ForestSurrogate {
     speeds_m_per_s: Vec<f64>,
     forest: RegressionForest<f64>,
 }
@@ -55,7 +55,7 @@ impl ForestSurrogate {
     }
 
     /// The forest that was fitted, on speed, deflection and features.
-    pub fn forest(&self) -> &RegressionForest<f64> {
+    pub(crate) fn forest(&self) -> &RegressionForest<f64> {
         &self.forest
     }
 

@@ -31,7 +31,7 @@ pub struct LeftOut {
     /// Maximum crush by every rule that has an answer.
     pub max_crush_errors: BTreeMap<MaxCrushRule, f64>,
     /// The first two peaks of FE's curve.
-    pub peaks: Vec<PeakError>,
+    pub(crate) peaks: Vec<PeakError>,
     /// Multi-body run driven by the model's body force; by the declared one if the two are
     /// the same.
     pub velocity_l1: f64,
@@ -53,7 +53,7 @@ pub struct LeftOut {
 
 /// One peak of FE's curve and the predicted one that matches it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct PeakError {
+pub(crate) struct PeakError {
     /// Deflection of FE's peak, in m.
     pub deflection_m: f64,
     /// Force of FE's peak, in N.

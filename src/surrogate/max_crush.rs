@@ -48,7 +48,7 @@ impl MaxCrushRule {
 
 /// The maximum crush by all rules, in m; `None` where a rule has no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-pub struct MaxCrush {
+pub(crate) struct MaxCrush {
     /// By a cubic spline over the speeds.
     pub spline_m: Option<f64>,
     /// By a cubic that never falls with the speed.

@@ -29,22 +29,19 @@ use std::fmt::Debug;
 
 use serde_json::value::RawValue;
 
-pub use band::{Band, LeftOutSpeeds, ScatterWidths};
-pub use cases::ModelCase;
-pub use crush_law::CrushLaw;
+pub use band::Band;
+pub(crate) use cases::ModelCase;
+pub(crate) use crush_law::CrushLaw;
 pub(crate) use curves::CaseCurve;
-pub use entry::ModelEntry;
-pub use forest::{ForestOptions, ForestSurrogate};
-pub use leave_one_out::{
-    BodyScatter, Floor, LeftOut, Means, PeakError, Scatter, SpeedScatter, Validation,
-};
-pub use max_crush::{MaxCrush, MaxCrushRule};
+pub use forest::ForestOptions;
+pub use leave_one_out::{LeftOut, Means, Scatter, Validation};
+pub use max_crush::MaxCrushRule;
 pub use model::Model;
 pub(crate) use models::MODELS;
 pub use models::ModelKind;
 pub use predict::{predict, predict_driving};
 pub use predicted::PredictedCurve;
-pub use predicted::{ForestQuantiles, Provenance, Rebound};
+pub use predicted::Provenance;
 pub use query::Query;
 pub(crate) use speed_of_crush::{SpeedOfCrush, speed_of_crush};
 pub use warning::{Warning, WarningCode};

@@ -17,6 +17,7 @@ use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{ForceKind, Masses};
 use crate::dataset::{Feature, TrainingSet, nearest};
 use crate::error::{Error, error};
+use crate::forest::RegressionForest;
 use crate::unit::{SpeedKind, UnitSystem};
 
 /// Warnings of training runs that a prediction repeats.
@@ -60,7 +61,7 @@ pub struct Model {
     /// For the force of the body's motion, where that is another.
     pub(super) fitted_body: Option<Arc<dyn Surrogate>>,
     /// Stopped mass and crush force behind both forces; `None` if the runs do not determine them.
-    pub crush_law: Option<CrushLaw>,
+    pub(crate) crush_law: Option<CrushLaw>,
     /// The curves of `cases`, made when the model is fitted or read.
     pub(super) curves: Curves,
 }
@@ -171,8 +172,8 @@ impl Model {
     }
 
     /// The forest of the declared force, if the model has one.
-    pub fn forest(&self) -> Option<&ForestSurrogate> {
-        self.fitted.forest()
+    pub fn forest(&self) -> Option<&RegressionForest<f64>> {
+        self.fitted.forest().map(ForestSurrogate::forest)
     }
 
     /// The maximum crush of its runs, in m.

@@ -94,7 +94,7 @@ impl ModelKind {
     }
 
     /// What the table of models says of it.
-    pub fn entry(&self) -> &'static ModelEntry {
+    pub(crate) fn entry(&self) -> &'static ModelEntry {
         self.entry
     }
 

@@ -285,6 +285,7 @@ impl<'a> Prediction<'a> {
             body_force_low_n: of_body.low_n,
             body_force_high_n: of_body.high_n,
             forest_quantiles: model
+                .fitted
                 .forest()
                 .and_then(|forest| forest.quantiles(&at, declared.deflection_m(), band::LEVEL))
                 .map(|(low_n, high_n)| ForestQuantiles { level: band::LEVEL, low_n, high_n }),

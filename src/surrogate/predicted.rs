@@ -154,7 +154,7 @@ pub struct Provenance {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub max_crush_rule: Option<MaxCrushRule>,
     /// The maximum crush by every rule.
-    pub max_crush: MaxCrush,
+    pub(crate) max_crush: MaxCrush,
     /// `mv²/2` against a wall, `μ v_r²/2` of a pair.
     #[serde(rename = "kinetic_energy_J")]
     pub kinetic_energy_j: f64,

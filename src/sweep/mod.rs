@@ -39,12 +39,13 @@ use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName, Spread, USUAL_RES
 use crate::scenario::{self, CheckedScenario, Prepared, Scenario, Sources};
 pub use journal::{WriteOptions, merge, write, write_rows};
 pub(crate) use results::ResultColumn;
-pub use results::SweepColumns;
+pub(crate) use results::SweepColumns;
 pub use run::Chunk;
 pub(crate) use statistics::{ColumnStatistics, Sensitivity, share_interval};
-pub use until::{Precision, write_until};
+pub(crate) use until::Precision;
+pub(crate) use until::write_until;
 use variables::Variable;
-pub use variables::VariableSummary;
+pub(crate) use variables::VariableSummary;
 
 /// A share of a sweep: block `index` of `count` blocks of neighbouring items.
 ///
@@ -227,7 +228,7 @@ impl Sweep {
     }
 
     /// The variables: columns and how many values they have.
-    pub fn variables(&self) -> Vec<VariableSummary> {
+    pub(crate) fn variables(&self) -> Vec<VariableSummary> {
         let variables = self.variables.iter().zip(&self.design.spreads);
         let summary = |(variable, spread): (&Variable, &Spread)| VariableSummary {
             column: variable.column.clone(),

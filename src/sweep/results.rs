@@ -18,7 +18,7 @@ pub(crate) struct ResultColumn {
 
 /// Columns of a sweep.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SweepColumns {
+pub(crate) struct SweepColumns {
     /// What was varied, but for choices of curves.
     pub(crate) varied: Vec<ResultColumn>,
     pub(crate) results: Vec<ResultColumn>,
@@ -31,7 +31,7 @@ impl SweepColumns {
     ///
     /// # Errors
     /// If the file is not a finished sweep, or a row is damaged.
-    pub fn read(path: &Path) -> Result<Self, Error> {
+    pub(crate) fn read(path: &Path) -> Result<Self, Error> {
         let file = ShardFile::read_head(path)?.ok_or_else(|| {
             error!(Sweep, "{}: expected \"# {FORMAT}\" in the first line and a whole head: run its sweep again with --restart", path.display())
         })?;

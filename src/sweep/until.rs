@@ -19,7 +19,7 @@ use crate::guess::hint;
 
 /// When a sweep is precise enough.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Precision {
+pub(crate) struct Precision {
     /// Column of a result.
     pub column: String,
     /// Half the width of the 95 % confidence interval of its mean, or of the share over limits, in the column's unit.
@@ -35,7 +35,7 @@ const FIRST: u64 = 100;
 /// # Errors
 /// As [`super::write()`]; for plans with grids or strata, whose first rows are not a sample of the whole; for an output as HDF5; for an
 /// unknown column.
-pub fn write_until(
+pub(crate) fn write_until(
     sweep: &mut Sweep,
     output: &Path,
     precision: &Precision,

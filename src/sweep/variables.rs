@@ -33,7 +33,7 @@ enum Target {
 
 /// A variable for people to look at.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct VariableSummary {
+pub(crate) struct VariableSummary {
     /// Name of its column.
     pub column: String,
     /// Values along the grid; `None` of a distribution.

@@ -151,6 +151,14 @@ pub fn crumple_started(folder: &Path, arguments: &(impl Arguments + ?Sized)) -> 
     command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap()
 }
 
+/// The lock of the file at `path`, as a process that writes it holds it.
+pub fn held_by_another(path: &Path) -> std::fs::File {
+    let name = format!("{}.lock", path.file_name().unwrap().to_str().unwrap());
+    let file = std::fs::File::create(path.with_file_name(name)).unwrap();
+    file.try_lock().unwrap();
+    file
+}
+
 /// Runs the program in `folder`.
 pub fn crumple_in(folder: &Path, arguments: &(impl Arguments + ?Sized)) -> Output {
     program(folder, arguments).env("SOURCE_DATE_EPOCH", DATE).output().unwrap()

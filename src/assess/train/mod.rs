@@ -58,9 +58,9 @@ pub struct TrainRow {
     /// Of the acceleration, filtered with CFC 60.
     pub mean_acceleration_l1: f64,
     /// Errors of each vehicle.
-    pub vehicles: Vec<VehicleErrors>,
+    pub(crate) vehicles: Vec<VehicleErrors>,
     /// Crush and energy between vehicles, and before the wall.
-    pub interfaces: Vec<InterfaceCrush>,
+    pub(crate) interfaces: Vec<InterfaceCrush>,
     /// Speed each interface's curve is for, in m/s; null where no speed belongs to it.
     pub interface_speeds_m_per_s: BTreeMap<String, Option<f64>>,
     /// Time to fit, in s.
@@ -75,7 +75,7 @@ pub struct TrainRow {
 
 /// Errors of one vehicle, as `Σ|p − r|/Σ|r|`.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct VehicleErrors {
+pub(crate) struct VehicleErrors {
     /// Name of the vehicle.
     pub vehicle: String,
     /// Of the velocity.
@@ -91,7 +91,7 @@ pub struct VehicleErrors {
 
 /// What is crushed between two vehicles, or a vehicle and the wall, up to the end of the comparison.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
-pub struct InterfaceCrush {
+pub(crate) struct InterfaceCrush {
     /// `A1|A2`.
     pub interface: String,
     /// Maximum approach of the two vehicles minus the gap, in m: both ends together.
