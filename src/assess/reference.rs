@@ -161,7 +161,7 @@ impl Reference {
         Ok(self.errors_of(&self.velocity_of(run)?))
     }
 
-    /// Errors of speeds at [`time_s`](Self::time_s).
+    /// Errors of speeds at `time_s`.
     pub fn errors_of(&self, velocity: &[f64]) -> MotionErrors {
         let acceleration = derivative(&self.time_s, velocity);
         let smooth = filtered(&self.time_s, acceleration.clone());

@@ -5,6 +5,7 @@
 //! All runs of a group share one `λ = dm_s/dd`, constant between nodes, by least squares with smoothing. It
 //! is not negative, and never so large that the crush force `F − λv²` would become tensile.
 
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::Envelope;
@@ -63,7 +64,7 @@ impl StoppedMass {
         let node = |i: usize| end_m * (i as f64 / SEGMENTS as f64).powf(SHORTER_AT_TIP);
         let deflection_m: Vec<f64> = (0..=SEGMENTS).map(node).collect();
         let states: Vec<Vec<(f64, f64)>> =
-            runs.iter().map(|run| stopped_by_momentum(run, mass_kg)).collect();
+            runs.par_iter().map(|run| stopped_by_momentum(run, mass_kg)).collect();
         let most_kg_per_m = most_kg_per_m(&deflection_m, runs);
         let rates = rates_kg_per_m(&deflection_m, &states, &most_kg_per_m);
         let mut stopped_kg = vec![0.0];

@@ -43,7 +43,11 @@ pub(super) fn write_keeping(
             Edit { old: &old, new: database, is_current, moves: &moves }.make(draft)
         });
         edited.map_err(|e| match e {
-            EditError::Hdf5(e) => would_drop(format!("{} ({e})", listed(&before))),
+            // If the copy can be read, the editor cannot do it.
+            EditError::Hdf5(e) => match layout::open(draft).and_then(|draft| found(&draft)) {
+                Ok(_) => would_drop(format!("{} ({e})", listed(&before))),
+                Err(unread) => unread,
+            },
             EditError::Content(e) => e,
         })?;
         // Whatever went wrong in it is seen here, before the old file is replaced.

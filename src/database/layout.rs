@@ -1,10 +1,12 @@
 //! Layout of the database file: `/group/case` with attributes and datasets.
 
 use std::borrow::Cow;
-use std::cell::Cell;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt::Display;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use rayon::prelude::*;
 
 use super::group::{self, CASES};
 use super::{CasePath, Database, damaged_curve};
@@ -257,6 +259,9 @@ pub(crate) fn root_attributes(database: &Database) -> Vec<(&'static str, AttrVal
     all
 }
 
+/// Cases whose content is made at once, on all processors.
+const HASHED_AT_ONCE: usize = 64;
+
 /// A database as the HDF5 file that it will be.
 pub(crate) fn encode(database: &Database) -> Result<FileBuilder, Error> {
     let mut file = FileBuilder::new();
@@ -268,8 +273,12 @@ pub(crate) fn encode(database: &Database) -> Result<FileBuilder, Error> {
         for (attribute, value) in group::attributes(name, cases) {
             group.set_attr(attribute, value);
         }
-        for case in cases {
-            let mut content = with_hashes(database, case)?;
+        let contents = cases.chunks(HASHED_AT_ONCE).flat_map(|cases| {
+            let contents = cases.par_iter().map(|case| with_hashes(database, case));
+            cases.iter().zip(contents.collect::<Vec<_>>())
+        });
+        for (case, content) in contents {
+            let mut content = content?;
             let mut builder = group.create_group(&case.id.name);
             for (name, value) in content.written() {
                 builder.set_attr(name, value);
@@ -300,7 +309,7 @@ pub(crate) struct Opened<'a> {
     /// Version of its layout.
     pub version: i64,
     /// Bytes of values that datasets may still declare.
-    left: Cell<u64>,
+    left: AtomicU64,
 }
 
 /// Bytes that datasets may declare in addition to a multiple of the file's size. A multiple,
@@ -367,7 +376,7 @@ impl<'a> Opened<'a> {
             ));
         }
         let left = DECLARED_BYTES + DECLARED_PER_BYTE.saturating_mul(file.file_size());
-        Ok(Self { path, file, fault, version: found, left: Cell::new(left) })
+        Ok(Self { path, file, fault, version: found, left: left.into() })
     }
 
     fn damaged(&self, place: &str, detail: impl Display) -> Error {
@@ -479,11 +488,19 @@ pub(crate) fn decode(path: &Path) -> Result<Database, Error> {
 fn decode_opened(opened: &Opened<'_>) -> Result<Database, Error> {
     let mut database = Database::default();
     for group in opened.groups()? {
-        let mut cases = Vec::with_capacity(group.cases.len());
+        let mut found = Vec::with_capacity(group.cases.len());
         for (name, case) in group.cases {
             let FoundCase { case, hashes, .. } = opened.case(&group.name, &name, &case)?;
-            if opened.hashes_of(&Content::of(&case)?) != hashes {
-                database.altered.insert(CasePath { group: group.name.clone(), name }, hashes);
+            found.push((case, hashes));
+        }
+        let is_altered = |(case, hashes): &(Case, BTreeMap<String, String>)| {
+            Ok(opened.hashes_of(&Content::of(case)?) != *hashes)
+        };
+        let altered: Vec<bool> = found.par_iter().map(is_altered).collect::<Result<_, Error>>()?;
+        let mut cases = Vec::with_capacity(found.len());
+        for ((case, hashes), altered) in found.into_iter().zip(altered) {
+            if altered {
+                database.altered.insert(CasePath::of(&case), hashes);
             }
             cases.push(case);
         }
@@ -663,13 +680,14 @@ fn numbers(group: &Group, name: &str, place: &Location<'_>) -> Result<Vec<f64>, 
     let dataset = group.dataset(name).map_err(failed)?;
     let bytes = declared_bytes(&dataset).map_err(failed)?;
     let left = &place.opened.left;
-    let Some(rest) = left.get().checked_sub(bytes) else {
+    let taken =
+        left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |left| left.checked_sub(bytes));
+    if taken.is_err() {
         return Err(format!(
             "{name}: it declares {} values, more than a file of this size holds: the file is damaged, or was not made by crumple build",
             bytes / 8
         ));
-    };
-    left.set(rest);
+    }
     // A reader without memory ends the process; here it is only reserved.
     let mut memory: Vec<u8> = Vec::new();
     if memory.try_reserve_exact(bytes.saturating_mul(2) as usize).is_err() {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use linfa::Dataset;
 use ndarray::{Array1, Array2};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::curve::body::{BodyMotion, body_motion};
@@ -299,10 +300,11 @@ impl TrainingSet {
         of_one_kind(cases.iter().copied())?;
         cases.sort_by(|a, b| a.id.name.cmp(&b.id.name));
         let features = features(&cases)?;
-        let mut training = replicates(&cases, &features)?
-            .into_iter()
+        let training: Vec<Result<TrainingCase, Error>> = replicates(&cases, &features)?
+            .into_par_iter()
             .map(|(features, runs)| TrainingCase::new(&runs, features))
-            .collect::<Result<Vec<_>, _>>()?;
+            .collect();
+        let mut training = training.into_iter().collect::<Result<Vec<_>, _>>()?;
         // By values, so that names and the order of the cases change nothing.
         training.sort_by(|a, b| a.key().partial_cmp(&b.key()).unwrap_or(Ordering::Equal));
         Ok(Self {
@@ -447,7 +449,7 @@ impl TrainingSet {
         if !may_tell {
             return None;
         }
-        let runs: Option<Vec<LoadingRun>> = self.cases.iter().map(loading_run).collect();
+        let runs: Option<Vec<LoadingRun>> = self.cases.par_iter().map(loading_run).collect();
         StoppedMass::fit(&runs?, self.masses.effective_kg())
     }
 }

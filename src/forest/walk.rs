@@ -257,18 +257,24 @@ impl<F: Float> TryFrom<StoredTree> for Tree<F> {
         if left.len() != nodes || number.len() != nodes {
             return Err("the node arrays of a tree differ in length".into());
         }
-        let mut tree = Self::empty();
-        for ((&feature, left), number) in stored.feature.iter().zip(left).zip(number) {
-            let number = F::cast(f64::from_le_bytes(*number));
-            let node = tree.push_leaf(number);
-            if feature != LEAF {
-                let left = u32::from_le_bytes(*left);
-                tree.feature[node] = feature;
-                (tree.threshold[node], tree.value[node]) = (number, F::zero());
-                (tree.left[node], tree.right[node]) = (left, left.saturating_add(1));
-            }
-        }
-        Ok(tree)
+        // A leaf has a value, another node a threshold and children.
+        let number = |of_leaf: bool| {
+            let here = stored.feature.iter().map(move |&feature| (feature == LEAF) == of_leaf);
+            let value = |(here, bytes): (bool, &[u8; 8])| {
+                if here { F::cast(f64::from_le_bytes(*bytes)) } else { F::zero() }
+            };
+            here.zip(number).map(value).collect()
+        };
+        let (value, threshold) = (number(true), number(false));
+        let child = |right: u32| {
+            let node = |(&feature, bytes): (&i32, &[u8; 4])| match feature {
+                LEAF => 0,
+                _ => u32::from_le_bytes(*bytes).saturating_add(right),
+            };
+            stored.feature.iter().zip(left).map(node).collect()
+        };
+        let (left, right) = (child(0), child(1));
+        Ok(Self { feature: stored.feature, threshold, left, right, value })
     }
 }
 

@@ -20,14 +20,14 @@ pub(crate) mod table;
 
 use std::io::Write;
 use std::path::Path;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::{fs, io};
 
 use crate::file;
-use crate::os::{allocate, write_all_at};
+use crate::os::{allocate, read_at, write_all_at};
 pub(crate) use hdf5_pure::{
     AttrValue, Dataset, DatasetBuilder, Error, File, FileAccessProperties, FileBuilder,
-    FileLocking, FormatError, Group, ReadSeekSource, Source,
+    FileLocking, FormatError, Group, Source,
 };
 use hdf5_pure::{Datatype, make_f32_type, make_f64_type};
 
@@ -65,18 +65,81 @@ impl Fault {
     }
 }
 
-/// A file that notes its fault.
-struct Noting(ReadSeekSource<fs::File>, Fault);
+/// A file that is read by whole blocks, because the library asks for a few bytes at a time; it notes its fault.
+struct Blocks {
+    file: fs::File,
+    length: u64,
+    /// The blocks read last, by their ordinals in the file, the latest at the end.
+    latest: Mutex<Vec<(u64, Vec<u8>)>>,
+    fault: Fault,
+}
 
-impl Source for Noting {
+impl Blocks {
+    const BYTES: u64 = 1 << 14;
+    /// Those of one case and of the tables that lead to it, for a few threads.
+    const KEPT: usize = 16;
+
+    fn read(&self, offset: u64, bytes: &mut [u8]) -> Result<(), FormatError> {
+        let mut filled = 0;
+        while filled < bytes.len() {
+            let failed = |detail: String| FormatError::Source(detail);
+            match read_at(&self.file, &mut bytes[filled..], offset + filled as u64) {
+                Ok(0) => return Err(failed("the file has become shorter".into())),
+                Ok(count) => filled += count,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(failed(error.to_string())),
+            }
+        }
+        Ok(())
+    }
+
+    /// Bytes within one block.
+    fn read_block(&self, offset: u64, bytes: &mut [u8]) -> Result<(), FormatError> {
+        let (number, from) = (offset / Self::BYTES, (offset % Self::BYTES) as usize);
+        let mut latest = self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        let block = match latest.iter().position(|(of, _)| *of == number) {
+            Some(k) => latest.remove(k),
+            None => {
+                let start = number * Self::BYTES;
+                let mut block = vec![0; Self::BYTES.min(self.length - start) as usize];
+                self.read(start, &mut block)?;
+                if latest.len() == Self::KEPT {
+                    latest.remove(0);
+                }
+                (number, block)
+            }
+        };
+        bytes.copy_from_slice(&block.1[from..from + bytes.len()]);
+        latest.push(block);
+        Ok(())
+    }
+}
+
+impl Source for Blocks {
     fn len(&self) -> u64 {
-        self.0.len()
+        self.length
     }
 
     fn read_at(&self, offset: u64, bytes: &mut [u8]) -> Result<(), FormatError> {
-        let read = self.0.read_at(offset, bytes);
+        let length = bytes.len() as u64;
+        let end =
+            offset.checked_add(length).ok_or(FormatError::OffsetOverflow { offset, length })?;
+        if end > self.length {
+            let [expected, available] =
+                [end, self.length].map(|n| usize::try_from(n).unwrap_or(usize::MAX));
+            return Err(FormatError::UnexpectedEof { expected, available });
+        }
+        let read = if length >= Self::BYTES {
+            self.read(offset, bytes)
+        } else {
+            let first = (Self::BYTES - offset % Self::BYTES).min(length) as usize;
+            let (head, tail) = bytes.split_at_mut(first);
+            self.read_block(offset, head).and_then(|()| {
+                if tail.is_empty() { Ok(()) } else { self.read_block(offset + first as u64, tail) }
+            })
+        };
         if let Err(FormatError::Source(fault)) = &read {
-            self.1.0.get_or_init(|| fault.clone());
+            self.fault.0.get_or_init(|| fault.clone());
         }
         read
     }
@@ -89,8 +152,9 @@ pub(crate) fn open(path: &Path) -> Result<(File, Fault), OpenError> {
         return Err(OpenError::NoSignature);
     }
     let fault = Fault::default();
-    let source = ReadSeekSource::new(file).map_err(|e| io::Error::other(e.to_string()))?;
-    let opened = File::from_source(Noting(source, fault.clone()));
+    let length = file.metadata()?.len();
+    let opened =
+        File::from_source(Blocks { file, length, latest: Mutex::default(), fault: fault.clone() });
     fault.check()?;
     match opened {
         Ok(file) => Ok((file, fault)),

@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use serde::de::DeserializeOwned;
-use serde_json::value::RawValue;
 
 use super::forest_options::ForestOptions;
 use super::{CaseCurve, CrushLaw, Surrogate};
@@ -39,7 +38,7 @@ pub(crate) struct ModelEntry {
 pub(super) type Fit = fn(&FitInput<'_>) -> Result<Arc<dyn Surrogate>, Error>;
 
 /// Makes a model of its parameters in a model file.
-pub(super) type Load = fn(Option<&RawValue>) -> Result<Arc<dyn Surrogate>, serde_json::Error>;
+pub(super) type Load = fn(Option<&str>) -> Result<Arc<dyn Surrogate>, serde_json::Error>;
 
 /// Input of a fit.
 pub(super) struct FitInput<'a> {
@@ -64,12 +63,9 @@ impl FitInput<'_> {
 }
 
 /// `parameters` of a model that has some.
-pub(super) fn loaded<T>(
-    parameters: Option<&RawValue>,
-) -> Result<Arc<dyn Surrogate>, serde_json::Error>
+pub(super) fn loaded<T>(parameters: Option<&str>) -> Result<Arc<dyn Surrogate>, serde_json::Error>
 where
     T: Surrogate + DeserializeOwned + 'static,
 {
-    let parameters = parameters.map_or("null", RawValue::get);
-    Ok(Arc::new(serde_json::from_str::<T>(parameters)?))
+    Ok(Arc::new(serde_json::from_str::<T>(parameters.unwrap_or("null"))?))
 }

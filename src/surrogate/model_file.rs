@@ -28,6 +28,9 @@ pub(super) const VERSION: u32 = 5;
 /// Maximum number of bytes of a model file: a forest of 50 trees has some millions, one of 200 runs a hundred.
 const MAX_BYTES: u64 = 1 << 30;
 
+/// Bytes of a model file from which its two forces are read at once.
+const LARGE: usize = 1 << 20;
+
 /// What identifies a model file.
 #[derive(Deserialize)]
 struct Head {
@@ -142,11 +145,19 @@ impl Model {
                 no_model(line, column, e.to_string())
             })
         };
+        let declared = || fitted(file.fitted);
+        let of_body = || file.fitted_body.map(fitted).transpose();
+        // Threads cost more than a small model.
+        let (declared, of_body) = if text.len() < LARGE {
+            (declared(), of_body())
+        } else {
+            rayon::join(declared, of_body)
+        };
         let damaged =
             |detail| error!(Model, "{path}: the model is damaged: {detail}", path = path.display());
         let model = Self {
-            fitted: fitted(file.fitted)?,
-            fitted_body: file.fitted_body.map(fitted).transpose()?,
+            fitted: declared?,
+            fitted_body: of_body?,
             curves: Curves::of(&file.cases).map_err(|e| damaged(e.to_string()))?,
             written_by: file.written_by,
             group: file.group,
@@ -324,9 +335,18 @@ fn fitted_of(kind: &ModelKind, raw: &RawValue) -> Result<Arc<dyn Surrogate>, ser
         let name: String = serde_json::from_str(raw.get())?;
         return if name == kind.name() { (kind.entry().load)(None) } else { Err(other(&name)) };
     }
+    // As this program writes it: its parameters, which may be large, are read once.
+    let own = raw.get().strip_prefix(&format!("{{\"{}\":", kind.name()));
+    if let Some(Ok(found)) =
+        own.and_then(|own| own.strip_suffix('}')).map(|own| (kind.entry().load)(Some(own)))
+    {
+        return Ok(found);
+    }
     let named: BTreeMap<String, &RawValue> = serde_json::from_str(raw.get())?;
     match named.first_key_value() {
-        Some((name, parameters)) if name == kind.name() => (kind.entry().load)(Some(parameters)),
+        Some((name, parameters)) if name == kind.name() => {
+            (kind.entry().load)(Some(parameters.get()))
+        }
         Some((name, _)) => Err(other(name)),
         None => Err(other("nothing")),
     }
