@@ -56,6 +56,20 @@ fn forest() {
     assert!((numbers(4)[0] * 6.0 - 1.0).abs() < 0.05, "{text}");
 }
 
+/// A forest of unpruned trees explains most of Friedman's function, and only its five features.
+#[test]
+fn linfa_forest() {
+    let text = example("linfa_forest", &[]);
+    let numbers = |line: usize| -> Vec<f64> {
+        let words = text.lines().nth(line).unwrap().split([' ', ',', '[', ']']);
+        words.filter_map(|word| word.parse().ok()).collect()
+    };
+    let (unseen, out_of_bag, importance) = (numbers(0)[0], numbers(1)[0], numbers(2));
+    assert!(unseen > 0.9 && (unseen - out_of_bag).abs() < 0.03, "{text}");
+    assert!(importance[..5].iter().all(|share| *share > 0.04), "{text}");
+    assert!(importance.len() == 10 && importance[5..].iter().all(|share| *share < 0.03), "{text}");
+}
+
 #[test]
 fn wall_impact() {
     let text = example("wall_impact", &[]);

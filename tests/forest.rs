@@ -400,3 +400,40 @@ fn wrong_parameters_and_data_are_refused() {
     ];
     cases.into_iter().for_each(|(params, x, y, expected)| t(params, x, y, expected));
 }
+
+/// The same sources as a crate of their own, without threads, give the same bits, in f32 too.
+#[test]
+fn the_crate_of_its_own_grows_the_same_forest() {
+    fn both<F: linfa::Float + serde::Serialize + serde::de::DeserializeOwned>() {
+        let data = data();
+        let x = data.records().mapv(F::cast);
+        let data = Dataset::new(x, data.targets().mapv(F::cast));
+        let params = |seed| {
+            let here = ForestParams::new(12).seed(seed).out_of_bag(true).quantiles(true);
+            let there = linfa_forest::RegressionForest::params(12).seed(seed);
+            (here, there.out_of_bag(true).quantiles(true))
+        };
+        for seed in [0, 7] {
+            let (here, there) = params(seed);
+            let (here, there) = (here.fit(&data).unwrap(), there.fit(&data).unwrap());
+            let text = serde_json::to_string(&here).unwrap();
+            assert_eq!(text, serde_json::to_string(&there).unwrap());
+            let (ours, theirs): (Array1<F>, Array1<F>) =
+                (here.predict(data.records()), there.predict(data.records()));
+            assert_eq!(ours, theirs);
+            // A few rows walk one by one.
+            let few = data.records().slice(ndarray::s![..2, ..]).to_owned();
+            let theirs: Array1<F> = there.predict(&few);
+            assert_eq!(theirs, ours.slice(ndarray::s![..2]));
+            assert_eq!(here.feature_importance(), there.feature_importance());
+            let (ours, theirs) =
+                (here.quantiles(few.view(), &[0.1]), there.quantiles(few.view(), &[0.1]));
+            assert_eq!(ours.unwrap(), theirs.unwrap());
+            let read: linfa_forest::RegressionForest<F> = serde_json::from_str(&text).unwrap();
+            read.check().unwrap();
+            assert_eq!(read, there);
+        }
+    }
+    both::<f32>();
+    both::<f64>();
+}

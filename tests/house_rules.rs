@@ -207,7 +207,7 @@ fn no_unwrap_outside_tests() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 78590), ("files", 303), ("public types", 163), ("error types", 9)];
+    [("lines", 78691), ("files", 304), ("public types", 164), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {
@@ -266,7 +266,8 @@ fn dependencies_have_fixed_minor_versions() {
     let manifest = fs::read_to_string(root().join("Cargo.toml")).unwrap();
     let manifest: toml::Table = manifest.parse().unwrap();
     for table in ["dependencies", "dev-dependencies"] {
-        for (name, entry) in manifest[table].as_table().unwrap() {
+        let all = manifest[table].as_table().unwrap().iter();
+        for (name, entry) in all.filter(|(_, entry)| entry.get("path").is_none()) {
             let version = entry.as_str().or_else(|| entry.get("version")?.as_str()).unwrap();
             assert!(version.matches('.').count() >= 1, "{name} = {version}");
         }

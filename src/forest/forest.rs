@@ -8,33 +8,41 @@ use std::cmp::Ordering;
 use linfa::Float;
 use linfa::dataset::{AsSingleTargets, DatasetBase};
 use linfa::traits::{Fit, PredictInplace};
-use ndarray::{Array1, Array2, ArrayBase, ArrayView1, ArrayView2, Axis, Data, Ix2, Zip};
-use rayon::prelude::*;
+use ndarray::{Array1, Array2, ArrayBase, ArrayView1, ArrayView2, Axis, Data, Ix2};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 use super::grow::{Table, grow};
-use super::params::{FeaturesPerSplit, ForestError, ForestValidParams, MOST_SAMPLES};
+use super::params::{FeaturesPerSplit, ForestError, ForestParams, ForestValidParams, MOST_SAMPLES};
+use super::threads::*;
 use super::walk::{BATCH, Rows, Tree, Walk, groups};
-use crate::error::{Error, error};
 use crate::stream::Stream;
 
 /// A fitted regression forest.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound(serialize = "F: Float + Serialize", deserialize = "F: Float + Deserialize<'de>"))]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound(serialize = "F: Float + Serialize", deserialize = "F: Float + Deserialize<'de>"))
+)]
 pub struct RegressionForest<F> {
     features: usize,
     params: ForestValidParams<F>,
     trees: Vec<Tree<F>>,
     out_of_bag: Option<OutOfBag>,
     /// Empty in files of programs that did not know it.
-    #[serde(default)]
+    #[cfg_attr(feature = "serde", serde(default))]
     importance: Vec<f64>,
-    #[serde(default = "Option::default", skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(
+        feature = "serde",
+        serde(default = "Option::default", skip_serializing_if = "Option::is_none")
+    )]
     pub(super) members: Option<Box<Members<F>>>,
 }
 
 /// Error on the samples that the trees did not see.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct OutOfBag {
     /// Root of the mean squared error, in the unit of the target.
     pub rmse: f64,
@@ -45,18 +53,23 @@ pub struct OutOfBag {
 }
 
 impl<F: Float> RegressionForest<F> {
+    /// Parameters of a forest of `trees` trees: see [`ForestParams::new`].
+    pub fn params(trees: usize) -> ForestParams<F> {
+        ForestParams::new(trees)
+    }
+
     /// The trees, in the order of their seeds.
     pub fn trees(&self) -> &[Tree<F>] {
         &self.trees
     }
 
     /// Number of features that it was fitted to.
-    pub(crate) fn features(&self) -> usize {
+    pub fn features(&self) -> usize {
         self.features
     }
 
     /// The parameters that it was fitted with.
-    pub(crate) fn params(&self) -> &ForestValidParams<F> {
+    pub fn fitted_with(&self) -> &ForestValidParams<F> {
         &self.params
     }
 
@@ -76,13 +89,17 @@ impl<F: Float> RegressionForest<F> {
     ///
     /// # Errors
     /// If a tree's arrays do not fit together.
-    pub fn check(&self) -> Result<(), Error> {
+    pub fn check(&self) -> Result<(), ForestError> {
         if self.trees.is_empty() || self.features == 0 {
-            return Err(error!(Other, "the node arrays differ in length or are empty"));
+            return Err(ForestError::Damaged(
+                "the node arrays differ in length or are empty".into(),
+            ));
         }
         self.trees.iter().try_for_each(|tree| tree.check(self.features))?;
         if !self.importance.is_empty() && self.importance.len() != self.features {
-            return Err(error!(Other, "the shares of the features do not fit their number"));
+            return Err(ForestError::Damaged(
+                "the shares of the features do not fit their number".into(),
+            ));
         }
         self.members.as_ref().map_or(Ok(()), |members| members.check(&self.trees))
     }
@@ -326,7 +343,8 @@ where
         let x = x.view();
         let nodes = self.trees.iter().map(Tree::nodes).max().unwrap_or(0);
         if x.nrows() * NODES_PACKED_AS_ROW_WALKS < nodes {
-            Zip::from(y).and(x.rows()).par_for_each(|y, record| *y = self.predict_one(&record));
+            let records = y.axis_iter_mut(Axis(0)).into_par_iter().zip(x.axis_iter(Axis(0)));
+            records.for_each(|(mut y, record)| y[()] = self.predict_one(&record));
             return;
         }
         let mut walk = Walk::new();
@@ -398,7 +416,8 @@ impl<F: Float> RegressionForest<F> {
 }
 
 /// The training samples of every leaf.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub(crate) struct Members<F> {
     /// Training targets in increasing order.
     targets: Vec<F>,
@@ -406,7 +425,8 @@ pub(crate) struct Members<F> {
 }
 
 /// The samples of one tree's leaves, as places among the training targets.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 struct Leaves {
     /// By node, and one more: where its members begin and those of the node before end.
     first: Vec<u32>,
@@ -451,7 +471,7 @@ impl<F: Float> Members<F> {
     }
 
     /// Checks members that were read from a file against the trees.
-    pub(crate) fn check(&self, trees: &[Tree<F>]) -> Result<(), Error> {
+    pub(crate) fn check(&self, trees: &[Tree<F>]) -> Result<(), ForestError> {
         let fits = |(leaves, tree): (&Leaves, &Tree<F>)| {
             leaves.first.len() == tree.nodes() + 1
                 && leaves.first[0] == 0
@@ -466,7 +486,7 @@ impl<F: Float> Members<F> {
         if whole {
             Ok(())
         } else {
-            Err(error!(Other, "the samples of the leaves do not fit the trees"))
+            Err(ForestError::Damaged("the samples of the leaves do not fit the trees".into()))
         }
     }
 

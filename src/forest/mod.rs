@@ -25,9 +25,12 @@ mod grow;
 mod onnx;
 mod params;
 mod splitter;
+mod threads;
 mod walk;
 
 pub use forest::{OutOfBag, RegressionForest};
-pub(crate) use onnx::OnnxDescription;
-pub use params::{FeaturesPerSplit, ForestError, ForestParams, StopRule, Thresholds, Ties};
+pub use onnx::OnnxDescription;
+pub use params::{
+    FeaturesPerSplit, ForestError, ForestParams, ForestValidParams, StopRule, Thresholds, Ties,
+};
 pub use walk::Tree;

@@ -3,12 +3,12 @@
 use std::iter::repeat_n;
 
 use super::forest::RegressionForest;
+use super::params::ForestError;
 use super::walk::Tree;
-use crate::error::{Error, error};
 
 /// What the model says of itself.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct OnnxDescription<'a> {
+pub struct OnnxDescription<'a> {
     /// Name of the graph.
     pub name: &'a str,
     /// For a reader of the model.
@@ -29,14 +29,14 @@ impl RegressionForest<f64> {
     /// N × 1. Splits and sums are double, so records take the same ways as here; the output
     /// is rounded to float, by 6e-8 of its value at most, because the operator has no
     /// other. NaN goes right, as here. Metadata `features` and `target` hold the names.
-    pub(crate) fn to_onnx(&self, description: &OnnxDescription<'_>) -> Result<Vec<u8>, Error> {
+    ///
+    /// # Errors
+    /// [`ForestError`] if features are not named one by one, or the file would be too large.
+    pub fn to_onnx(&self, description: &OnnxDescription<'_>) -> Result<Vec<u8>, ForestError> {
         let features = self.features();
         if description.features.len() != features {
             let named = description.features.len();
-            return Err(error!(
-                Export,
-                "{named} features are named, the forest was fitted to {features}"
-            ));
+            return Err(ForestError::FeatureNames { named, fitted: features });
         }
         let columns = description.features.join(",");
         let rows = Message::default().text(2, "N");
@@ -67,10 +67,7 @@ impl RegressionForest<f64> {
             .message(14, &entry("target", description.target));
         let bytes = model.0.len();
         if bytes > i32::MAX as usize {
-            return Err(error!(
-                Export,
-                "an ONNX file holds less than 2 GiB, this forest needs {bytes} bytes"
-            ));
+            return Err(ForestError::OnnxTooLarge { bytes });
         }
         Ok(model.0)
     }

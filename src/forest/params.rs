@@ -1,14 +1,15 @@
 //! Hyperparameters: a builder, checked once into the type that can fit.
 
 use linfa::{Float, ParamGuard};
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
 /// Samples of which the nodes of a tree, twice as many, can still be numbered in 31 bits.
 pub(super) const MOST_SAMPLES: usize = 1 << 30;
 
 /// How thresholds are chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "snake_case"))]
 pub enum Thresholds {
     /// Every midpoint between consecutive distinct values; the best one is taken.
     Midpoint,
@@ -17,8 +18,8 @@ pub enum Thresholds {
 }
 
 /// When a node is not split although it could be: its coefficient of variation is low.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "snake_case"))]
 pub enum StopRule {
     /// Never: grow until leaves are pure.
     Unpruned,
@@ -29,8 +30,8 @@ pub enum StopRule {
 }
 
 /// Which of equally good splits on different features is taken.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "snake_case"))]
 pub enum Ties {
     /// The feature with the lowest index (reference method).
     LowestFeature,
@@ -40,16 +41,14 @@ pub enum Ties {
 }
 
 /// How many features are candidates at a split.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize), serde(rename_all = "snake_case"))]
 pub enum FeaturesPerSplit {
     /// Every feature.
     All,
     /// This many that are not constant in the node, drawn without replacement.
     Count(usize),
 }
-
-crate::error::passes_on!(ForestError => Model);
 
 /// Why a forest cannot be fitted, or asked for quantiles.
 #[derive(Debug, thiserror::Error)]
@@ -138,13 +137,31 @@ pub enum ForestError {
         /// Number that the forest was fitted with.
         fitted: usize,
     },
+    /// A forest that was read from a file is not one; what is wrong in it.
+    #[error("{0}")]
+    Damaged(String),
+    /// As many names of features are needed for an ONNX model as the forest was fitted to.
+    #[error("{named} features are named, the forest was fitted to {fitted}")]
+    FeatureNames {
+        /// Number of names.
+        named: usize,
+        /// Number of features.
+        fitted: usize,
+    },
+    /// The ONNX model would be larger than protobuf allows.
+    #[error("an ONNX file holds less than 2 GiB, this forest needs {bytes} bytes")]
+    OnnxTooLarge {
+        /// Its size.
+        bytes: usize,
+    },
     /// An error of linfa itself.
     #[error(transparent)]
     Linfa(#[from] linfa::Error),
 }
 
 /// Checked hyperparameters; only these can fit.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
 pub struct ForestValidParams<F> {
     pub(super) trees: usize,
     pub(super) seed: u64,
@@ -157,15 +174,15 @@ pub struct ForestValidParams<F> {
     pub(super) ties: Ties,
     pub(super) out_of_bag: bool,
     /// Absent in files of programs that did not know it.
-    #[serde(default)]
+    #[cfg_attr(feature = "serde", serde(default))]
     pub(super) quantiles: bool,
-    #[serde(skip)]
+    #[cfg_attr(feature = "serde", serde(skip))]
     float: std::marker::PhantomData<F>,
 }
 
 impl<F> ForestValidParams<F> {
     /// How thresholds are chosen.
-    pub(crate) fn thresholds(&self) -> Thresholds {
+    pub fn thresholds(&self) -> Thresholds {
         self.thresholds
     }
 }

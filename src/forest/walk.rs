@@ -4,14 +4,15 @@
 //! because neighbours take nearly the same paths in every tree: 32 of them go as one while their ranges lie on one side of the
 //! thresholds, then eight in step. Sums are taken in the order of the trees, so the bits are those of one row by itself.
 
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD as BASE64;
+#[cfg(feature = "serde")]
+use base64::{Engine, prelude::BASE64_STANDARD as BASE64};
 use linfa::Float;
 use ndarray::ArrayView1;
-use rayon::prelude::*;
+#[cfg(feature = "serde")]
 use serde::{Deserialize, Serialize};
 
-use crate::error::{Error, error};
+use super::params::ForestError;
+use super::threads::*;
 
 /// Rows handed to a thread together.
 pub(crate) const BATCH: usize = 1024;
@@ -209,8 +210,12 @@ pub(crate) const LEAF: i32 = -1;
 /// A regression tree as flat arrays over its nodes; node 0 is the root.
 ///
 /// Invariant: children stand side by side after their parent, so every walk ends.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(bound = "F: Float", into = "StoredTree", try_from = "StoredTree")]
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(Serialize, Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    serde(bound = "F: Float", into = "StoredTree", try_from = "StoredTree")
+)]
 pub struct Tree<F> {
     /// Feature that the node splits on, or −1 for a leaf.
     pub(super) feature: Vec<i32>,
@@ -223,6 +228,7 @@ pub struct Tree<F> {
 }
 
 /// A tree in files: numbers as the Base64 of their bytes, which is shorter than their digits and read faster.
+#[cfg(feature = "serde")]
 #[derive(Serialize, Deserialize)]
 struct StoredTree {
     feature: Vec<i32>,
@@ -232,6 +238,7 @@ struct StoredTree {
     number: String,
 }
 
+#[cfg(feature = "serde")]
 impl<F: Float> From<Tree<F>> for StoredTree {
     fn from(tree: Tree<F>) -> Self {
         let left: Vec<u8> = tree.left.iter().flat_map(|left| left.to_le_bytes()).collect();
@@ -244,6 +251,7 @@ impl<F: Float> From<Tree<F>> for StoredTree {
     }
 }
 
+#[cfg(feature = "serde")]
 impl<F: Float> TryFrom<StoredTree> for Tree<F> {
     type Error = String;
 
@@ -338,27 +346,27 @@ impl<F: Float> Tree<F> {
     }
 
     /// Checks the invariant of stored arrays against the number of features.
-    pub(crate) fn check(&self, features: usize) -> Result<(), Error> {
+    pub(crate) fn check(&self, features: usize) -> Result<(), ForestError> {
+        let damaged = |what: String| Err(ForestError::Damaged(what));
         let nodes = self.nodes();
         let lengths = [self.feature.len(), self.threshold.len(), self.left.len(), self.right.len()];
         if nodes == 0 || lengths.iter().any(|&l| l != nodes) {
-            return Err(error!(Other, "the node arrays differ in length or are empty"));
+            return damaged("the node arrays differ in length or are empty".into());
         }
         for node in 0..nodes {
             if !(self.value[node].is_finite() && self.threshold[node].is_finite()) {
-                return Err(error!(Other, "node {node} holds a value that is not finite"));
+                return damaged(format!("node {node} holds a value that is not finite"));
             }
             let feature = self.feature[node];
             if feature == LEAF {
                 continue;
             }
             if feature < 0 || feature as usize >= features {
-                return Err(error!(Other, "node {node} splits on feature {feature} of {features}"));
+                return damaged(format!("node {node} splits on feature {feature} of {features}"));
             }
             let (left, right) = (self.left[node] as usize, self.right[node] as usize);
             if left <= node || right != left.saturating_add(1) || right >= nodes {
-                return Err(error!(
-                    Other,
+                return damaged(format!(
                     "node {node} has children that do not stand side by side after it"
                 ));
             }

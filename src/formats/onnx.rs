@@ -26,5 +26,8 @@ pub(crate) fn write(model: &Model) -> Result<Exported, Error> {
         .collect();
     let description =
         OnnxDescription { name: &model.group, text: &text, features: &features, target: "force_N" };
-    Ok(Exported::file("forest.onnx", forest.to_onnx(&description)?))
+    Ok(Exported::file(
+        "forest.onnx",
+        forest.to_onnx(&description).map_err(|e| error!(Export, "{e}"))?,
+    ))
 }

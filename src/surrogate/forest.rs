@@ -14,6 +14,8 @@ use crate::curve::ForceKind;
 use crate::dataset::TrainingSet;
 use crate::forest::{ForestError, RegressionForest, Thresholds};
 
+crate::error::passes_on!(ForestError => Model);
+
 pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "forest",
     about: "Random forest on speed and deflection (DDTCM)",
@@ -102,7 +104,7 @@ impl Surrogate for ForestSurrogate {
 
     fn warnings(&self, _: &[CaseCurve], at: &QueryPoint<'_>) -> Vec<Warning> {
         let speed_m_per_s = at.speed_m_per_s;
-        if self.forest.params().thresholds() == Thresholds::Random {
+        if self.forest.fitted_with().thresholds() == Thresholds::Random {
             return Vec::new();
         }
         let near = |pair: &&[f64]| {
