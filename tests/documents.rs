@@ -294,6 +294,10 @@ fn mlcroissant_reads_the_tables() {
     let output = python_of("CRUMPLE_PYTHON_TABLES").args(["-c", look]).current_dir(here).output();
     let output = output.unwrap();
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    // Tables that are written anew are not left with the description of those before.
+    crumple_ok(here, "db export curves.h5 --group lead-car-pair -o tables");
+    let text = std::fs::read_to_string(here.join("tables/croissant.json")).unwrap();
+    assert!(!text.contains("originals.csv") && text.contains("cases.csv"), "{text}");
 }
 
 /// silx, asked for the file's picture, draws force over deflection: also after a case was added to a file that

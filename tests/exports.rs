@@ -677,6 +677,9 @@ fn groups_and_several_speeds_are_exported_at_once() {
     // A case and a prediction have the same keys.
     export(here, "curves.h5", "case.json", &["--group", "lead-car-wall", "--case", "36kmh"]);
     let case = read_json(&here.join("case.json"));
+    // The same by its whole name, which needs no group; a name that two groups have is not one.
+    export(here, "curves.h5", "whole.json", &["--case", "lead-car-wall/36kmh"]);
+    assert_eq!(read_json(&here.join("whole.json")), case);
     for key in ["deflection_m", "force_N", "unloading_stiffness_N_per_m", "provenance", "energy_J"]
     {
         assert!(!case[key].is_null(), "{key}");
@@ -691,6 +694,7 @@ fn groups_and_several_speeds_are_exported_at_once() {
         (2, &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv", "-o", "all.csv"][..], "this export gives 7 files: name a folder"),
         (2, &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv"][..], "gives 7 files"),
         (2, &["export", "curves.h5", "--group", "lead-car-wall", "--speed", "37km/h", "--to", "csv"][..], "has no case at 37 km/h: it has 12 km/h"),
+        (1, &["export", "curves.h5", "--case", "36kmh", "--to", "csv"][..], "several groups have a case \"36kmh\": choose one with --group, or write lead-car-pair/36kmh or lead-car-wall/36kmh"),
         (2, &["export", "lead50.json", "--to", "csv", "--speed", "50km/h"][..], "has one speed and mass"),
         (1, &["export", "lead50.json", "--to", "mat", "--units", UNITS][..], "mat is always in SI"),
         (1, &["export", "lead.model", "--speed", "36km/h,50km/h", "--to", "lsdyna", "--deck"][..], "one curve"),

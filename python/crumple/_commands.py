@@ -72,7 +72,7 @@ def _ended(child, command):
                 lines.append(line)
         child.wait()
     except KeyboardInterrupt:
-        # A terminal has told the program too; it ends when what it writes is whole.
+        # The terminal has sent it to the program as well; it ends when what it writes is whole.
         if child.poll() is None and os.name != "nt":
             child.send_signal(signal.SIGINT)
         try:

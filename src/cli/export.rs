@@ -75,7 +75,7 @@ pub(super) struct Which {
     /// Group of a database (default: the only one)
     #[arg(long)]
     pub group: Option<String>,
-    /// Case of the group (default: all); may be repeated
+    /// Case of the group, or GROUP/CASE (default: all); may be repeated
     #[arg(long)]
     pub case: Vec<String>,
 }

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::curate::Selection;
 use crate::curve::{Case, Quality};
 use crate::database::Database;
 use crate::dataset::is_same_speed;
@@ -169,26 +170,28 @@ impl Which {
                 "--mass, --max-crush, --extrapolate and --parameter are for a model: a recorded case has its own mass and crush",
             );
         }
-        let (group, cases) = database.group_or_only(path, self.group.as_deref())?;
-        for name in &self.case {
-            database.case(path, group, name)?;
-        }
+        let cases: Vec<&Case> = if self.case.is_empty() {
+            database.group_or_only(path, self.group.as_deref())?.1.iter().collect()
+        } else {
+            let groups = self.group.iter().cloned().collect();
+            let named = Selection { groups, cases: self.case.clone(), ..Selection::default() };
+            named.find(path, database)?
+        };
         let has_speed = |case: &Case, v: f64| is_same_speed(case.conditions.speed.m_per_s, v);
         if let Some(&v) = self.speed.iter().find(|&&v| !cases.iter().any(|c| has_speed(c, v))) {
             let known: Vec<String> =
                 cases.iter().map(|c| km_per_h(c.conditions.speed.m_per_s)).collect();
             return usage(format!(
-                "group {group} has no case at {}: it has {}; a model gives curves at other speeds",
+                "group {} has no case at {}: it has {}; a model gives curves at other speeds",
+                cases[0].id.group,
                 km_per_h(v),
                 known.join(", ")
             ));
         }
-        let is_chosen = |case: &&Case| {
-            let by_name = self.case.is_empty() || self.case.contains(&case.id.name);
-            let speeds = &self.speed;
-            by_name && (speeds.is_empty() || speeds.iter().any(|&v| has_speed(case, v)))
-        };
-        Ok(cases.iter().filter(is_chosen).cloned().collect())
+        let speeds = &self.speed;
+        let is_chosen =
+            |case: &&Case| speeds.is_empty() || speeds.iter().any(|&v| has_speed(case, v));
+        Ok(cases.into_iter().filter(is_chosen).cloned().collect())
     }
 }
 

@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::file::{self, not_written, write_at};
 
 /// Name of the document.
-const FILE: &str = "croissant.json";
+pub(crate) const FILE: &str = "croissant.json";
 /// Columns that are texts; parameters that are categories join them.
 const TEXTS: [&str; 12] = [
     "group",

@@ -11,6 +11,7 @@ mod labels;
 mod selection;
 mod tables;
 
+pub(crate) use croissant::FILE as DESCRIPTION;
 pub(crate) use join::{Joined, JoinedCase, OnConflict, copy, merge};
 pub(crate) use labels::{Labels, label, remove, rename_case, rename_group};
 pub(crate) use selection::{Selection, SpeedRange};

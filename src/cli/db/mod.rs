@@ -225,7 +225,8 @@ struct ExportArgs {
     /// Also write originals.csv, the curves at the solver's rate
     #[arg(long)]
     originals: bool,
-    /// Also write croissant.json, which describes the tables for machine-learning tools (Croissant 1.0)
+    /// Also write croissant.json, which describes the tables for machine-learning tools (Croissant 1.0); one that is there is
+    /// always written anew
     #[arg(long)]
     croissant: bool,
 }
@@ -235,7 +236,9 @@ fn export(args: &ExportArgs, options: GlobalOptions) -> CommandResult {
     let selection = args.chosen.selection();
     let cases: Vec<&Case> = selection.find(&args.database, &database)?;
     let name = args.database.file_stem().unwrap_or_default().to_string_lossy();
-    let described_as = args.croissant.then_some(&*name);
+    // A description that is there would be of other tables.
+    let is_described = args.croissant || args.output.join(curate::DESCRIPTION).exists();
+    let described_as = is_described.then_some(&*name);
     let files = curate::write_tables(&cases, &args.output, args.originals, described_as)?;
     let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     let database = args.database.display().to_string();
