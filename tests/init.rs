@@ -1061,6 +1061,15 @@ fn build_needs_no_arguments_beside_a_study() {
         &error,
         "there is no study.toml in this folder: name a study, or let crumple init write one",
     );
+    // A folder of runs stands for the study in it, if there is one.
+    fs::create_dir(here.join("runs")).unwrap();
+    says(
+        &crumple_fails(&here, 2, "build runs -o a.h5"),
+        "runs is a folder without a study.toml: crumple init runs writes one",
+    );
+    let bundled = fixture("fe/lead-car-pair");
+    let build = ["build", bundled.to_str().unwrap(), "-o", "b.h5"];
+    crumple_ok(&here, &build);
     crumple_ok(&here, "init");
     let printed = crumple_ok(&here, "build");
     assert!(printed.ends_with("wrote curves.h5 (group lead-car-wall)\n"), "{printed}");

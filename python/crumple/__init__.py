@@ -1,6 +1,24 @@
 """Force-deflection curves for multi-body crash models, from the histories of FE runs.
 
-Values of databases, models and runs are SI: m, s, N, kg, J. Histories are in the units of their file.
+From folders of runs to a curve at a speed that was never run:
+
+    import crumple
+
+    crumple.init("runs", "study.toml")                # looks at the runs, and writes what it found as a study
+    crumple.build("study.toml", "curves.h5")          # the curve of each run
+    database = crumple.Database("curves.h5")          # database["runs"]["36kmh"].force
+    database.validate()                               # each speed left out, predicted, and compared with FE
+    model = database.train("runs.model")
+    curve = model.predict("50km/h")                   # curve.deflection, curve.force, curve.body_force, curve.band
+    curve.to_pandas().to_csv("curve.csv")
+    curve.export("curve.k", units="mm-t-s")           # for another tool
+
+Numbers of databases, models, curves and multi-body runs are SI: m, s, N, kg, J, speeds m/s. What `read` gives is in the units
+of its file.
+
+`init`, `build`, `validate`, `train`, `sweep`, `rate` and `run` are the program's commands. Their options are keyword
+arguments: `--nsdm-seeds 3` is `nsdm_seeds=3`, a flag such as `--extrapolate` is `extrapolate=True`. `crumple build --help` in
+a shell, or `python -m crumple build --help`, describes them. They return the document that `--json` prints, as a dict.
 """
 
 import json
@@ -130,7 +148,7 @@ class Section(_Mapping):
                 yield component.name, entity, values
 
     def to_pandas(self):
-        """A DataFrame over time with columns (component, id)."""
+        """A DataFrame over time with columns (component, id), in the file's units: `frame["x_velocity", 900001]`."""
         import pandas as pd
 
         columns = {(component, "" if entity is None else entity): values for component, entity, values in self._columns()}
@@ -167,7 +185,10 @@ class Section(_Mapping):
 
 
 class Histories(_Mapping):
-    """What a solver wrote: sections by name. A text file has one, named after its format."""
+    """What a solver wrote, in its units: sections by name. A text file has one, named after its format.
+
+    `histories["nodout"]["x_velocity"][900001]` is an array over time; `to_pandas()` a table of all.
+    """
 
     _what = "section"
 
@@ -187,20 +208,20 @@ class Histories(_Mapping):
         return next(iter(self.values()))
 
     def to_pandas(self):
-        """Of the only section."""
+        """`Section.to_pandas` of the only section: a DataFrame over time with columns (component, id)."""
         return self.only().to_pandas()
 
     def to_polars(self):
-        """Of the only section."""
+        """`Section.to_polars` of the only section."""
         return self.only().to_polars()
 
     def to_xarray(self):
-        """Of the only section."""
+        """`Section.to_xarray` of the only section."""
         return self.only().to_xarray()
 
 
 def read(path, ids=None, components=None, section=None, format=None):
-    """Read a solver's file: any that the program reads (nodout, rcforc, binout, T01, ...).
+    """Read a solver's file: any that the program reads (nodout, rcforc, binout, T01, ...). Values are in the file's units.
 
     Only what is selected is parsed: `ids` (numbers, or texts such as "3:surfa"), `components` (named as in binout), one or
     several, a `section` of a binout. Damage is not an error: `problems` names it.
@@ -212,7 +233,8 @@ def read(path, ids=None, components=None, section=None, format=None):
 
 
 class Case:
-    """One FE run of a database. Arrays have shape (states,), from contact on.
+    """One FE run of a database. Arrays have shape (states,), from contact to the end of the record: after the largest
+    deflection they go back along the unloading.
 
     `time` in s, `deflection` in m, `force` in N (which one says `force_kind`), `closing_speed` in m/s; `speed` in m/s is
     measured against what `speed_kind` says, masses are in kg.
@@ -223,6 +245,13 @@ class Case:
         (self.mass, self.other_mass), self.force_kind = masses, force_kind
         self.time, self.deflection, self.force, self.closing_speed = map(_array, curves)
         self.tags, self.warnings = tags, warnings
+
+    def to_pandas(self):
+        """A DataFrame over time: deflection, force, closing_speed, in SI."""
+        import pandas as pd
+
+        columns = {"deflection": self.deflection, "force": self.force, "closing_speed": self.closing_speed}
+        return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
 
     def __repr__(self):
         return f"<Case {self.name}: {self.speed * 3.6:.4g} km/h ({self.speed_kind})>"
@@ -288,12 +317,22 @@ class Model:
         self._model = _crumple.TrainedModel(os.fspath(path))
         self.group, self.name, self.range = self._model.facts()
 
-    def predict(self, speed, extrapolate=False):
-        """The curve at a speed in m/s.
+    def predict(self, speed=None, extrapolate=False, **options):
+        """The curve at a speed: a number in m/s, or text with a unit, "50km/h".
 
-        Raises `crumple.Error` outside the speeds of the runs, unless `extrapolate`.
+        Options are those of `crumple predict`, with units: `mass="30t"`, `max_crush="energy"`, `parameter="angle_deg=10"`,
+        `energy_correct=True`; `crush="620mm"` in place of the speed finds the one that gives this crush.
+
+        Raises `crumple.Error` far outside the speeds of the runs (`range`, in m/s), unless `extrapolate`.
         """
-        return Curve(json.loads(self._model.predict(float(speed), extrapolate)))
+        if not options and speed is not None and not isinstance(speed, str):
+            return Curve(json.loads(self._model.predict(float(speed), extrapolate)))
+        from crumple._commands import _options
+
+        if speed is not None and not isinstance(speed, str):
+            speed = f"{float(speed)!r}m/s"
+        named = {"speed": speed, "extrapolate": extrapolate, **options}
+        return Curve(run("predict", *_options(named), "--", self.path))
 
     def __reduce__(self):
         return (type(self), (self.path.resolve(),))
@@ -304,7 +343,16 @@ class Model:
 
 
 class Curve:
-    """A predicted curve. `deflection` in m, `force` and `body_force` in N, `band` a pair of arrays in N, or None.
+    """A predicted curve, up to its largest deflection `max_deflection` in m.
+
+    `deflection` in m. `force` in N is of the kind that `force_kind` names: "contact", the force on the obstacle, or "body",
+    that which slows the body down; `body_force` is the latter, or None if it is not known. They differ where the crush
+    zone has mass of its own.
+
+    `band` and `body_band` are pairs of arrays in N, low and high, or None: at each deflection by itself, FE's force is
+    expected within them with the probability `band_level` (0.9), by how far left-out runs were off. A whole curve leaves such a
+    band somewhere more often than that: `document["provenance"]["band"]` has `whole_curves`, the share of left-out curves
+    that stayed within it, and `simultaneous_share`, the half width, as a share of the force, for whole curves.
 
     `document` is what `crumple predict --json` prints.
     """
@@ -317,14 +365,33 @@ class Curve:
         self.speed, self.max_deflection = document["speed_m_per_s"], document["max_deflection_m"]
         self.deflection, self.force = array("deflection_m"), array("force_N")
         self.body_force = array("body_force_N")
-        low, high = array("force_low_N"), array("force_high_N")
-        self.band = None if low is None or high is None else (low, high)
+        self.force_kind = document["provenance"]["force_kind"]
+
+        def band(low, high):
+            return None if low is None or high is None else (low, high)
+
+        self.band = band(array("force_low_N"), array("force_high_N"))
+        self.body_band = band(array("body_force_low_N"), array("body_force_high_N"))
+        of = document["provenance"].get("band")
+        self.band_level = None if of is None else of["level"]
         self.warnings = document.get("warnings", [])
+
+    def to_pandas(self):
+        """A DataFrame over deflection: force, body_force and their bands (force_low, ...), where they are known."""
+        import pandas as pd
+
+        columns = {"force": self.force, "body_force": self.body_force}
+        for name, band in [("force", self.band), ("body_force", self.body_band)]:
+            columns |= {} if band is None else {f"{name}_low": band[0], f"{name}_high": band[1]}
+        known = {name: values for name, values in columns.items() if values is not None}
+        return pd.DataFrame(known, index=pd.Index(self.deflection, name="deflection"))
 
     def export(self, output, to=None, **options):
         """Write the curve for another tool; the format is that of the extension, or `to`: lsdyna, modelica, fmi3, ...
 
-        Options are those of `crumple export`: `force="contact"`, `units="mm-t-s"`.
+        Options are those of `crumple export`: `force="body"`, the default, is what drives a body of one mass, `force="contact"` is for
+        bodies whose crush zone is a separate mass; `units="mm-t-s"`. The file goes on beyond `max_deflection` by an assumption,
+        which it states, so that a run that crushes further has a force.
         """
         from crumple._commands import _options, _output
 

@@ -110,6 +110,7 @@ class Case:
         tags: list[str],
         warnings: list[str],
     ) -> None: ...
+    def to_pandas(self) -> pd.DataFrame: ...
 
 class Group(_Mapping[str, Case]):
     path: Path
@@ -131,7 +132,7 @@ class Model:
     name: str
     range: tuple[float, float]
     def __init__(self, path: _Path) -> None: ...
-    def predict(self, speed: float, extrapolate: bool = False) -> Curve: ...
+    def predict(self, speed: float | str | None = None, extrapolate: bool = False, **options: object) -> Curve: ...
     def __reduce__(self) -> tuple[type[Model], tuple[Path]]: ...
 
 class Curve:
@@ -141,9 +142,13 @@ class Curve:
     deflection: _Array
     force: _Array
     body_force: _Array | None
+    force_kind: str
     band: tuple[_Array, _Array] | None
+    body_band: tuple[_Array, _Array] | None
+    band_level: float | None
     warnings: list[Any]
     def __init__(self, document: dict[str, Any]) -> None: ...
+    def to_pandas(self) -> pd.DataFrame: ...
     def export(self, output: _Path, to: str | None = None, **options: object) -> Any: ...
 
 class Run(_Mapping[str, _Array]):

@@ -135,23 +135,39 @@ def _output(path):
 
 
 def build(study, output, **options):
-    """Build a study (TOML) into a database; only changed runs are read again."""
+    """Build a study (TOML) into a database, a file of HDF5; only changed runs are read again.
+
+    Options are those of `crumple build`: `run="36kmh"`.
+    """
     return run("build", *_output(output), *_options(options), "--", study)
 
 
 def init(runs, output=None, **options):
-    """Examine run folders and write a study of them."""
+    """Examine run folders and write a study of them (study.toml in the working folder if `output` is None), which `build` takes.
+
+    Options are those of `crumple init`, where something is not found by itself: `node=900001`, `units="mm-t-s"`, `mass="24t"`.
+    Returns what was found, and from what.
+    """
     runs = [runs] if isinstance(runs, (str, os.PathLike)) else list(runs)
     return run("init", *_output(output), *_options(options), "--", *runs)
 
 
 def validate(database, group=None, **options):
-    """Leave out every speed in turn, predict it with every model, and compare with FE."""
+    """Leave out every speed in turn, predict it with every model, and compare with FE.
+
+    Of each of `["groups"]`, `chosen` is the model that `train` takes, `means` has each model's mean errors: `force_l1`, `velocity_l1` and
+    `acceleration_l1` are mean absolute differences over the mean absolute value of FE, `max_crush_error` and `energy_error` relative. `inner`
+    marks speeds between others, of which the means are; `floors` say what FE's own curve leaves of the motion.
+    Options are those of `crumple validate`: `against="old.json"`.
+    """
     return run("validate", *_options({"group": group, **options}), "--", database)
 
 
 def train(database, output, group=None, **options):
-    """Train a model and write it; gives the model."""
+    """Train a model on a group, write it, and give it.
+
+    Options are those of `crumple train`: `model="linear"`, else the one that `validate` chooses.
+    """
     from crumple import Model
 
     run("train", *_output(output), *_options({"group": group, **options}), "--", database)
@@ -159,10 +175,16 @@ def train(database, output, group=None, **options):
 
 
 def sweep(scenario, output, **options):
-    """Run a scenario many times; the rows are in `output`, the report is returned."""
+    """Run a scenario (TOML with a plan) many times; the rows are in `output` (.csv or .h5), the report is returned.
+
+    Options are those of `crumple sweep`: `plan="plan.toml"`, `restart=True`, `shard="1/8"`.
+    """
     return run("sweep", *_output(output), *_options(options), "--", scenario)
 
 
 def rate(reference, prediction, **options):
-    """Rate a prediction against a reference by every measure."""
+    """Rate a prediction against a reference, two files with histories, by every measure.
+
+    Options are those of `crumple rate`.
+    """
     return run("rate", *_options(options), "--", reference, prediction)

@@ -119,6 +119,20 @@ def test_databases_models_and_curves(tmp_path):
     with pytest.raises(crumple.Error, match="above the highest training speed") as raised:
         model.predict(30.0)
     assert raised.value.code == "prediction"
+    # The text is the program's; how Python says it stands beside it.
+    assert raised.value.__notes__ == ["In Python, options are keyword arguments: extrapolate=..., or extrapolate=True for a flag."]
+    assert (curve.force_kind, curve.band_level) == ("contact", 0.9)
+    assert curve.body_band[0].shape == curve.body_force.shape and (curve.body_band[0] <= curve.body_force + 1e-6).all()
+    frame = curve.to_pandas()
+    assert np.array_equal(frame.index, curve.deflection) and np.array_equal(frame["body_force_high"], curve.body_band[1])
+    assert list(case.to_pandas()) == ["deflection", "force", "closing_speed"] and len(case.to_pandas()) == len(case.time)
+    # Speeds with units, and what else the command takes.
+    assert np.array_equal(model.predict("50km/h").force, curve.force)
+    with pytest.warns(crumple.Warned, match="26.00 t differs"):
+        assert model.predict(50 / 3.6, mass="26t").max_deflection > curve.max_deflection
+    assert math.isclose(model.predict(crush="620mm").max_deflection, 0.62, abs_tol=1e-3)
+    with pytest.raises(crumple.Error, match="unit"):
+        model.predict("50")
     with pytest.raises(ValueError):
         model.predict(-1.0)
     exported = curve.export(tmp_path / "curve.k", units="mm-t-s")

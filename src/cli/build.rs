@@ -25,7 +25,7 @@ Only runs that changed since the last build are read again. A run that cannot be
 reported and left out (exit code 1); the others are built. W/E is the work of a curve over the
 energy of its impact: within 5 % of 1 is usual; more points to a wrong mass, speed or unit.")]
 pub(super) struct Args {
-    /// Study manifest (TOML); study.toml if absent
+    /// Study manifest (TOML), or a folder with a study.toml; study.toml if absent
     study: Option<PathBuf>,
     /// Database to write or to update; curves.h5 next to the study if absent
     #[arg(short, long)]
@@ -43,6 +43,16 @@ impl Args {
     /// The study and the database.
     fn files(&self) -> Result<(PathBuf, PathBuf), Failure> {
         let study = match &self.study {
+            Some(folder) if folder.is_dir() => {
+                let study = folder.join(STUDY);
+                if !study.is_file() {
+                    let folder = folder.display();
+                    return usage(format!(
+                        "{folder} is a folder without a {STUDY}: crumple init {folder} writes one"
+                    ));
+                }
+                study
+            }
             Some(study) => study.clone(),
             None if Path::new(STUDY).is_file() => STUDY.into(),
             None => {
