@@ -239,6 +239,36 @@ fn every_kind_of_file_is_drawn() {
     }
 }
 
+/// A sweep is drawn alike from both files that it can be written to, also a sample of its rows.
+#[test]
+fn sweeps_are_drawn_from_csv_and_hdf5() {
+    let folder = demo_folder();
+    let folder = folder.path();
+    for (samples, over) in [(50, "speed_m_per_s[A]"), (21_000, "force_factor[nose]")] {
+        let plan = format!(
+            "[sweep]\nsamples = {samples}\nvary = [ {{ what = \"speed\", train = \"A\", distribution = \"uniform\", from = \"30km/h\", to = \"40km/h\" }}, {{ what = \"force\", curve = \"nose\", distribution = \"normal\", mean = 1, sd = 0.1 }} ]\n"
+        );
+        fs::write(folder.join("plan.toml"), plan).unwrap();
+        let scenario = fs::read_to_string(folder.join("scenario.toml")).unwrap();
+        let own = scenario.split("[sweep]").next().unwrap().replace("300ms", "30ms");
+        fs::write(folder.join("own.toml"), own).unwrap();
+        for (file, picture) in [("same.csv", "a.svg"), ("same.h5", "b.svg")] {
+            crumple_ok(folder, &format!("sweep own.toml --plan plan.toml -o {file} --restart -q"));
+            crumple_ok(
+                folder,
+                &format!("plot {file} --over {over} --result peak_force -o {picture}"),
+            );
+        }
+        let [a, b] = ["a.svg", "b.svg"].map(|name| fs::read_to_string(folder.join(name)).unwrap());
+        assert!(a == b && a.contains("peak force"));
+    }
+    // Cut, it is no table of a sweep.
+    let whole = fs::read(folder.join("same.h5")).unwrap();
+    fs::write(folder.join("cut.h5"), &whole[..whole.len() / 2]).unwrap();
+    crumple_fails(folder, 1, "plot cut.h5 -o c.svg");
+    crumple_ok(folder, "db ls curves.h5 -q");
+}
+
 #[test]
 fn wrong_wishes_are_refused() {
     let folder = demo_folder();

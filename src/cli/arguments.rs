@@ -13,6 +13,7 @@ use crate::formats::read::ReadOptions;
 use crate::import::Settings;
 use crate::solver::{Selection, WantedId};
 use crate::surrogate::max_crush::MaxCrushRule;
+use crate::sweep;
 use crate::unit::{LENGTH, MASS, SPEED, STIFFNESS, SpeedKind, UnitSystem};
 
 /// A speed with its unit, in m/s.
@@ -203,7 +204,7 @@ impl FileKind {
             .and_then(|f| f.take(HEAD).read_to_end(&mut head))
             .map_err(|e| error!(CurveFile, "{path}: {e}", path = path.display()).caused_by(e))?;
         if head.starts_with(HDF5) {
-            return Ok(Self::Database);
+            return Ok(if sweep::is_table(path) { Self::Sweep } else { Self::Database });
         }
         let text = String::from_utf8_lossy(&head);
         let text = text.trim_start_matches('\u{feff}');

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use super::row::{FORMAT, Line, ShardFile, bad_row};
+use super::row::{FORMAT, Line, ShardFile, ShardHeader, bad_row};
 use super::statistics::{result_of, sample_threshold};
+use super::to_hdf5::{FinishedTable, is_hdf5};
 use crate::error::{Error, error};
 use crate::stream::mix;
 
@@ -27,35 +28,60 @@ pub(crate) struct SweepColumns {
 }
 
 impl SweepColumns {
-    /// Reads the CSV file of a sweep; of one with more than 20 000 rows about as many, chosen by their item.
+    /// Reads the file of a sweep, CSV or HDF5; of one with more than 20 000 rows about as many, chosen by their item.
     ///
     /// # Errors
     /// If the file is not a finished sweep, or a row is damaged.
     pub(crate) fn read(path: &Path) -> Result<Self, Error> {
+        if is_hdf5(path) {
+            let table = FinishedTable::open(path)?;
+            let mut columns = Self::none(&table.head);
+            table.numbers(|item, numbers| {
+                if columns.has_room(item) {
+                    columns.take(numbers);
+                }
+            })?;
+            return Ok(columns.sorted());
+        }
         let file = ShardFile::read_head(path)?.ok_or_else(|| {
             error!(Sweep, "{}: expected \"# {FORMAT}\" in the first line and a whole head: run its sweep again with --restart", path.display())
         })?;
-        let numbers: Vec<usize> = file.head.number_columns().collect();
-        let column =
-            |&k: &usize| ResultColumn { name: file.head.columns[k].clone(), values: Vec::new() };
-        let mut columns: Vec<ResultColumn> = numbers.iter().map(column).collect();
-        let threshold = sample_threshold(file.head.count());
+        let mut columns = Self::none(&file.head);
         let mut next = file.head.rows().start;
         file.rows(|line| {
             let item = next;
             next += 1;
             let parsed = Line::parse(line, file.head.columns.len());
             let Some(line) = parsed.filter(|line| line.item == item) else { return Ok(false) };
-            if mix(item) > threshold {
+            if !columns.has_room(item) {
                 return Ok(true);
             }
-            for (column, k) in columns.iter_mut().zip(&numbers) {
-                let number = line.values.get(k - 1).and_then(|field| Line::number(field));
-                column.values.push(number.ok_or_else(|| bad_row(path, item))?);
-            }
+            let number = |k: usize| Line::number(line.values.get(k - 1)?);
+            let numbers: Option<Vec<f64>> = file.head.number_columns().map(number).collect();
+            columns.take(&numbers.ok_or_else(|| bad_row(path, item))?);
             Ok(true)
         })?;
-        let (results, varied) = columns.into_iter().partition(|c| result_of(&c.name).is_some());
-        Ok(Self { varied, results, rows: file.head.count() })
+        Ok(columns.sorted())
+    }
+
+    /// The columns of numbers without rows yet, all among the results.
+    fn none(head: &ShardHeader) -> Self {
+        let column = |k: usize| ResultColumn { name: head.columns[k].clone(), values: Vec::new() };
+        let results = head.number_columns().map(column).collect();
+        Self { varied: Vec::new(), results, rows: head.count() }
+    }
+
+    fn has_room(&self, item: u64) -> bool {
+        mix(item) <= sample_threshold(self.rows)
+    }
+
+    fn take(&mut self, numbers: &[f64]) {
+        self.results.iter_mut().zip(numbers).for_each(|(column, &n)| column.values.push(n));
+    }
+
+    fn sorted(self) -> Self {
+        let all = self.results.into_iter();
+        let (results, varied) = all.partition(|c| result_of(&c.name).is_some());
+        Self { varied, results, ..self }
     }
 }

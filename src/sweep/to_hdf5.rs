@@ -153,20 +153,25 @@ impl<'a, 'p> Block<'a, 'p> {
     }
 }
 
+/// Whether a file is the HDF5 table of a sweep.
+pub(crate) fn is_table(path: &Path) -> bool {
+    is_hdf5(path) && Table::open(path, FORMAT).is_ok()
+}
+
 fn pad(out: &mut Vec<u8>, text: &str, width: usize) {
     let end = out.len() + width;
     out.extend(text.as_bytes());
     out.resize(end, 0);
 }
 
-struct FinishedTable {
+pub(super) struct FinishedTable {
     path: PathBuf,
     table: Table,
-    head: ShardHeader,
+    pub head: ShardHeader,
 }
 
 impl FinishedTable {
-    fn open(path: &Path) -> Result<Self, Error> {
+    pub fn open(path: &Path) -> Result<Self, Error> {
         let table = Table::open(path, FORMAT).map_err(|e| e.coded(ErrorCode::Sweep))?;
         let head = head(&table)?.ok_or_else(|| {
             damaged(path, "its attributes are not those of a sweep of this layout")
@@ -188,6 +193,24 @@ impl FinishedTable {
             return Err(damaged(path, &what));
         }
         Ok(Self { path: path.into(), table, head })
+    }
+
+    /// Calls `see` with each item and its numbers, in the order of their columns.
+    pub fn numbers(&self, mut see: impl FnMut(u64, &[f64])) -> Result<(), Error> {
+        let items = self.head.rows();
+        for first in items.clone().step_by(ROWS as usize) {
+            let (row, rows) = (first - items.start, ROWS.min(items.end - first));
+            let columns: Vec<Vec<u8>> = self
+                .head
+                .number_columns()
+                .map(|c| self.table.read(c, row, rows))
+                .collect::<Result<_, _>>()?;
+            for (item, at) in (first..first + rows).zip((0..).step_by(size_of::<f64>())) {
+                let number = |bytes: &Vec<u8>| f64::from_le_bytes(eight(&bytes[at..at + 8]));
+                see(item, &columns.iter().map(number).collect::<Vec<_>>());
+            }
+        }
+        Ok(())
     }
 
     fn tally(&self, tally: &mut Tally) -> Result<(), Error> {
