@@ -30,6 +30,11 @@
 #![deny(missing_docs)]
 #![warn(unreachable_pub)]
 
+#[cfg(not(all(feature = "rayon", feature = "serde")))]
+compile_error!(
+    "crumple needs its features rayon and serde: only the sources of the forest do without them, elsewhere"
+);
+
 pub mod error;
 pub use error::Error;
 

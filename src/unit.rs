@@ -128,6 +128,22 @@ impl Shown {
     }
 }
 
+/// A speed in m/s, of a text with its unit such as "36km/h".
+///
+/// # Errors
+/// If it is not a number with a unit of speed, or not above 0.
+pub fn speed_m_per_s(text: &str) -> Result<f64, Error> {
+    SPEED.parse_positive(text)
+}
+
+/// A mass in kg, of a text with its unit such as "24t".
+///
+/// # Errors
+/// If it is not a number with a unit of mass, or not above 0.
+pub fn mass_kg(text: &str) -> Result<f64, Error> {
+    MASS.parse_positive(text)
+}
+
 /// A speed as people in the field read it: `36 km/h`, at most two decimals.
 pub fn km_per_h(m_per_s: f64) -> String {
     let rounded = (m_per_s / M_PER_S_PER_KM_PER_H * 100.0).round() / 100.0;

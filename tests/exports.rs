@@ -694,6 +694,8 @@ fn groups_and_several_speeds_are_exported_at_once() {
         (2, &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv", "-o", "all.csv"][..], "this export gives 7 files: name a folder"),
         (2, &["export", "curves.h5", "--group", "lead-car-wall", "--to", "csv"][..], "gives 7 files"),
         (2, &["export", "curves.h5", "--group", "lead-car-wall", "--speed", "37km/h", "--to", "csv"][..], "has no case at 37 km/h: it has 12 km/h"),
+        (2, &["export", "curves.h5", "--case", "lead-car-wall/36kmh", "--speed", "12km/h", "--to", "csv"][..], "none of the cases of --case is at 12 km/h: they are at 36 km/h"),
+        (1, &["export", "curves.h5", "--group", "lead-car-wall", "--case", "36kmmh", "--to", "csv"][..], "; did you mean \"36kmh\"?"),
         (1, &["export", "curves.h5", "--case", "36kmh", "--to", "csv"][..], "several groups have a case \"36kmh\": choose one with --group, or write lead-car-pair/36kmh or lead-car-wall/36kmh"),
         (2, &["export", "lead50.json", "--to", "csv", "--speed", "50km/h"][..], "has one speed and mass"),
         (1, &["export", "lead50.json", "--to", "mat", "--units", UNITS][..], "mat is always in SI"),

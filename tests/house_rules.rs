@@ -35,7 +35,7 @@ const MAY_NAME: [(&str, &str); 38] = [
     ("dataset", "curve unit"),
     ("database", "guess dataset curve signal history hdf5 file unit"),
     ("build", "guess study database curve manifest file clock"),
-    ("curate", "dataset database curve signal file unit"),
+    ("curate", "guess dataset database curve signal file unit"),
     ("surrogate", "guess plural dataset forest curve signal piecewise file unit"),
     ("multibody", "curve piecewise unit"),
     ("nsdm", "curve signal piecewise stream"),
@@ -207,7 +207,7 @@ fn no_unwrap_outside_tests() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 78759), ("files", 304), ("public types", 164), ("error types", 9)];
+    [("lines", 78875), ("files", 304), ("public types", 164), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {

@@ -1065,8 +1065,19 @@ fn build_needs_no_arguments_beside_a_study() {
     fs::create_dir(here.join("runs")).unwrap();
     says(
         &crumple_fails(&here, 2, "build runs -o a.h5"),
-        "runs is a folder without a study.toml: crumple init runs writes one",
+        "runs is a folder without a study.toml: crumple init runs -o runs/study.toml writes one",
     );
+    // As it says.
+    for speed in ["12kmh", "18kmh", "25kmh"] {
+        let run = here.join("runs").join(speed);
+        fs::create_dir(&run).unwrap();
+        for name in ["nodout", "rwforc"] {
+            fs::copy(fixture("fe/lead-car-wall").join(speed).join(name), run.join(name)).unwrap();
+        }
+    }
+    crumple_ok(&here, "init runs -o runs/study.toml");
+    assert!(crumple_ok(&here, "build runs").ends_with("wrote runs/curves.h5 (group runs)\n"));
+    fs::remove_dir_all(here.join("runs")).unwrap();
     let bundled = fixture("fe/lead-car-pair");
     let build = ["build", bundled.to_str().unwrap(), "-o", "b.h5"];
     crumple_ok(&here, &build);

@@ -262,11 +262,28 @@ fn sweeps_are_drawn_from_csv_and_hdf5() {
         let [a, b] = ["a.svg", "b.svg"].map(|name| fs::read_to_string(folder.join(name)).unwrap());
         assert!(a == b && a.contains("peak force"));
     }
-    // Cut, it is no table of a sweep.
+    // By its content, whatever its name; an item or a status that is none is found, and so are values without bytes.
+    fs::copy(folder.join("same.h5"), folder.join("same.data")).unwrap();
+    crumple_ok(folder, "plot same.data --result peak_force -o c.svg");
+    says(
+        &crumple_fails(folder, 2, "export same.h5 --to csv"),
+        "is a sweep's result, which holds no curve",
+    );
     let whole = fs::read(folder.join("same.h5")).unwrap();
+    let spoil = |from: &[u8], to: &[u8]| {
+        let at = whole.windows(from.len()).position(|bytes| bytes == from).unwrap();
+        let mut bytes = whole.clone();
+        bytes[at..at + to.len()].copy_from_slice(to);
+        fs::write(folder.join("bad.h5"), bytes).unwrap();
+        crumple_fails(folder, 1, "plot bad.h5 --result peak_force -o c.svg")
+    };
+    let items = [7u64.to_le_bytes(), 8u64.to_le_bytes(), 9u64.to_le_bytes()].concat();
+    says(&spoil(&items, &[0; 8]), "the row of item 7 is missing or damaged");
+    let states = [&b"okokok"[..], b"warnedwarned"];
+    let state = states.into_iter().find(|of| whole.windows(of.len()).any(|bytes| bytes == *of));
+    says(&spoil(state.unwrap(), b"xx"), "is missing or damaged");
     fs::write(folder.join("cut.h5"), &whole[..whole.len() / 2]).unwrap();
     crumple_fails(folder, 1, "plot cut.h5 -o c.svg");
-    crumple_ok(folder, "db ls curves.h5 -q");
 }
 
 #[test]

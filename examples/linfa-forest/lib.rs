@@ -1,4 +1,4 @@
-//! The forest of `src/forest` as a crate of its own: it needs linfa and ndarray, and nothing of crumple.
+//! The forest of `src/forest` as a crate of its own, with the file of its random numbers: it needs nothing else of crumple.
 
 #[path = "../../src/forest/mod.rs"]
 mod forest;

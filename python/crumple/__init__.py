@@ -78,8 +78,8 @@ class _Mapping(Mapping):
         try:
             return self._items[name]
         except KeyError:
-            known = ", ".join(map(str, self._items))
-            raise KeyError(f"there is no {self._what} {name!r}: expected one of {known}") from None
+            known = "expected one of " + ", ".join(map(str, self._items)) if self._items else "there is none at all"
+            raise KeyError(f"there is no {self._what} {name!r}: {known}") from None
 
     def __iter__(self):
         return iter(self._items)
@@ -317,22 +317,20 @@ class Model:
         self._model = _crumple.TrainedModel(os.fspath(path))
         self.group, self.name, self.range = self._model.facts()
 
-    def predict(self, speed=None, extrapolate=False, **options):
+    def predict(self, speed, extrapolate=False, *, mass=None, max_crush=None, parameters=None, energy_correct=False):
         """The curve at a speed: a number in m/s, or text with a unit, "50km/h".
 
-        Options are those of `crumple predict`, with units: `mass="30t"`, `max_crush="energy"`, `parameter="angle_deg=10"`,
-        `energy_correct=True`; `crush="620mm"` in place of the speed finds the one that gives this crush.
+        `mass` (kg, or "30t") is that of the body if it is not the runs'; `max_crush` the rule for the largest deflection: "spline",
+        "monotone", "energy" or "motion" (default: the one that was best when speeds were left out); `parameters` a dict of
+        the model's further parameters; `energy_correct` scales the force so that the curve takes up the impact's energy.
+
+        What the program would warn of is in `Curve.warnings`.
 
         Raises `crumple.Error` far outside the speeds of the runs (`range`, in m/s), unless `extrapolate`.
         """
-        if not options and speed is not None and not isinstance(speed, str):
-            return Curve(json.loads(self._model.predict(float(speed), extrapolate)))
-        from crumple._commands import _options
-
-        if speed is not None and not isinstance(speed, str):
-            speed = f"{float(speed)!r}m/s"
-        named = {"speed": speed, "extrapolate": extrapolate, **options}
-        return Curve(run("predict", *_options(named), "--", self.path))
+        further = list((parameters or {}).items())
+        document = self._model.predict(speed, extrapolate, mass, max_crush, further, energy_correct)
+        return Curve(json.loads(document))
 
     def __reduce__(self):
         return (type(self), (self.path.resolve(),))
@@ -351,8 +349,9 @@ class Curve:
 
     `band` and `body_band` are pairs of arrays in N, low and high, or None: at each deflection by itself, FE's force is
     expected within them with the probability `band_level` (0.9), by how far left-out runs were off. A whole curve leaves such a
-    band somewhere more often than that: `document["provenance"]["band"]` has `whole_curves`, the share of left-out curves
-    that stayed within it, and `simultaneous_share`, the half width, as a share of the force, for whole curves.
+    band somewhere more often than that. `document["provenance"]` has `band` and `body_band`, which say what they rest on:
+    `pointwise_share`, the half width as a share of the level of the force around a deflection; `simultaneous_share`, how
+    wide it would be to hold whole curves; `whole_curves`, the share of left-out curves that such a wide one held.
 
     `document` is what `crumple predict --json` prints.
     """

@@ -132,7 +132,16 @@ class Model:
     name: str
     range: tuple[float, float]
     def __init__(self, path: _Path) -> None: ...
-    def predict(self, speed: float | str | None = None, extrapolate: bool = False, **options: object) -> Curve: ...
+    def predict(
+        self,
+        speed: float | str,
+        extrapolate: bool = False,
+        *,
+        mass: float | str | None = None,
+        max_crush: str | None = None,
+        parameters: Mapping[str, float | str] | None = None,
+        energy_correct: bool = False,
+    ) -> Curve: ...
     def __reduce__(self) -> tuple[type[Model], tuple[Path]]: ...
 
 class Curve:

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -110,7 +111,10 @@ def run(*arguments, check=True):
         document = None
     failed = isinstance(document, dict) and set(document) == {"error"}
     if check and failed:
-        raise Error.of_document(printed)
+        error = Error.of_document(printed)
+        if re.search(r"(^|[\s'(])--[a-z]", str(error)):
+            error.add_note("In Python, options are keyword arguments: --nsdm-seeds 3 is nsdm_seeds=3, --overwrite is overwrite=True.")
+        raise error
     if check and document is None:
         raise Error("\n".join(said).strip() or f"crumple ended with code {child.returncode}")
     return document

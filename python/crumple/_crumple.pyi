@@ -25,7 +25,15 @@ def main(arguments: list[str]) -> int: ...
 class TrainedModel:
     def __new__(cls, path: str) -> TrainedModel: ...
     def facts(self) -> tuple[str, str, tuple[float, float]]: ...
-    def predict(self, speed_m_per_s: float, extrapolate: bool) -> str: ...
+    def predict(
+        self,
+        speed: float | str,
+        extrapolate: bool,
+        mass: float | str | None,
+        max_crush: str | None,
+        parameters: list[tuple[str, float | str]],
+        energy_correct: bool,
+    ) -> str: ...
 
 @final
 class Forest:

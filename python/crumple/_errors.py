@@ -1,7 +1,6 @@
 """The error of crumple: the program's own text, its code, and its place in a file."""
 
 import json
-import re
 
 
 class Error(Exception):
@@ -19,12 +18,7 @@ class Error(Exception):
     @classmethod
     def of_document(cls, document):
         """Of the JSON document that a command prints when it fails."""
-        error = cls(**json.loads(document)["error"])
-        option = re.search("--([a-z][a-z-]+)", str(error))
-        if option is not None:
-            keyword = option[1].replace("-", "_")
-            error.add_note(f"In Python, options are keyword arguments: {keyword}=..., or {keyword}=True for a flag.")
-        return error
+        return cls(**json.loads(document)["error"])
 
     def __reduce__(self):
         args = (str(self), self.code, self.file, self.line, self.column, self.hint, self.causes)

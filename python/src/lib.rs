@@ -8,14 +8,15 @@ use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Duration;
 
-use crumple::curve::Case;
+use crumple::curve::{Case, Parameter};
 use crumple::database::Database;
 use crumple::failure::error_json;
 use crumple::forest::{
     FeaturesPerSplit, ForestError, ForestParams, RegressionForest, Thresholds, Ties,
 };
 use crumple::solver::{self, Selection, SolverFile, WantedId};
-use crumple::surrogate::{Model, Query, predict};
+use crumple::surrogate::{MaxCrushRule, Model, Query, predict};
+use crumple::unit::{mass_kg, speed_m_per_s};
 use linfa::prelude::*;
 use ndarray::{Array1, Array2};
 use pyo3::exceptions::{PyBufferError, PyRuntimeError, PyValueError};
@@ -207,6 +208,38 @@ fn read_case(py: Python<'_>, path: PathBuf, group: String, name: String) -> PyRe
     read.map(|read| case(&read)).map_err(|error| failed(py, &error))
 }
 
+/// A number in SI, or a text.
+#[derive(FromPyObject)]
+enum Quantity {
+    Number(f64),
+    Text(String),
+}
+
+impl Quantity {
+    /// Its value in SI, above 0.
+    fn in_si(
+        self,
+        py: Python<'_>,
+        what: &str,
+        parse: fn(&str) -> Result<f64, crumple::Error>,
+    ) -> PyResult<f64> {
+        match self {
+            Self::Text(text) => parse(&text).map_err(|error| failed(py, &error)),
+            Self::Number(number) if number > 0.0 && number.is_finite() => Ok(number),
+            Self::Number(number) => {
+                Err(PyValueError::new_err(format!("{what} {number}: expected a number above 0")))
+            }
+        }
+    }
+
+    fn parameter(self) -> Parameter {
+        match self {
+            Self::Number(number) => Parameter::Number(number),
+            Self::Text(text) => Parameter::Category(text),
+        }
+    }
+}
+
 /// A trained model.
 #[pyclass(frozen, module = "crumple._crumple")]
 struct TrainedModel(Model);
@@ -224,15 +257,35 @@ impl TrainedModel {
         (self.0.group.clone(), self.0.kind.name(), self.0.range_m_per_s())
     }
 
-    /// The curve at a speed in m/s, as the document of `predict --json`.
-    #[pyo3(signature = (speed_m_per_s, extrapolate))]
-    fn predict(&self, py: Python<'_>, speed_m_per_s: f64, extrapolate: bool) -> PyResult<String> {
-        if !(speed_m_per_s > 0.0 && speed_m_per_s.is_finite()) {
-            return Err(PyValueError::new_err(format!(
-                "speed of {speed_m_per_s} m/s: expected a number above 0"
-            )));
-        }
-        let query = Query { extrapolate, ..Query::at(speed_m_per_s) };
+    /// The curve at a speed, as the document of `predict --json`. Speed and mass are numbers in m/s and kg, or texts with
+    /// units.
+    #[pyo3(signature = (speed, extrapolate, mass, max_crush, parameters, energy_correct))]
+    #[allow(clippy::too_many_arguments)]
+    fn predict(
+        &self,
+        py: Python<'_>,
+        speed: Quantity,
+        extrapolate: bool,
+        mass: Option<Quantity>,
+        max_crush: Option<String>,
+        parameters: Vec<(String, Quantity)>,
+        energy_correct: bool,
+    ) -> PyResult<String> {
+        let parameters = parameters.into_iter().map(|(name, value)| (name, value.parameter()));
+        let rule = max_crush.map(|name| {
+            let named = MaxCrushRule::ALL.into_iter().find(|rule| rule.name() == name);
+            let known = MaxCrushRule::ALL.map(MaxCrushRule::name).join(", ");
+            let unknown = || format!("max_crush {name:?}: expected one of {known}");
+            named.ok_or_else(|| PyValueError::new_err(unknown()))
+        });
+        let query = Query {
+            mass_kg: mass.map(|mass| mass.in_si(py, "mass", mass_kg)).transpose()?,
+            rule: rule.transpose()?,
+            parameters: parameters.collect(),
+            energy_correct,
+            extrapolate,
+            ..Query::at(speed.in_si(py, "speed", speed_m_per_s)?)
+        };
         let curve = py.detach(|| predict(&self.0, &query)).map_err(|error| failed(py, &error))?;
         serde_json::to_string(&curve).map_err(|error| PyValueError::new_err(error.to_string()))
     }

@@ -119,8 +119,6 @@ def test_databases_models_and_curves(tmp_path):
     with pytest.raises(crumple.Error, match="above the highest training speed") as raised:
         model.predict(30.0)
     assert raised.value.code == "prediction"
-    # The text is the program's; how Python says it stands beside it.
-    assert raised.value.__notes__ == ["In Python, options are keyword arguments: extrapolate=..., or extrapolate=True for a flag."]
     assert (curve.force_kind, curve.band_level) == ("contact", 0.9)
     assert curve.body_band[0].shape == curve.body_force.shape and (curve.body_band[0] <= curve.body_force + 1e-6).all()
     frame = curve.to_pandas()
@@ -128,11 +126,25 @@ def test_databases_models_and_curves(tmp_path):
     assert list(case.to_pandas()) == ["deflection", "force", "closing_speed"] and len(case.to_pandas()) == len(case.time)
     # Speeds with units, and what else the command takes.
     assert np.array_equal(model.predict("50km/h").force, curve.force)
-    with pytest.warns(crumple.Warned, match="26.00 t differs"):
-        assert model.predict(50 / 3.6, mass="26t").max_deflection > curve.max_deflection
-    assert math.isclose(model.predict(crush="620mm").max_deflection, 0.62, abs_tol=1e-3)
-    with pytest.raises(crumple.Error, match="unit"):
-        model.predict("50")
+    heavier = model.predict("50km/h", mass="26t")
+    assert heavier.max_deflection > curve.max_deflection and "26.00 t differs" in str(heavier.warnings)
+    assert np.array_equal(model.predict("50km/h", mass=26e3).force, heavier.force)
+    assert model.predict("50km/h", max_crush="spline").document["provenance"]["max_crush_rule"] == "spline"
+    for wrong, what in [({"speed": "50"}, "unit"), ({"speed": "50km/h", "mass": "3m"}, "unit"), ({"speed": 14.0, "max_crush": "no"}, "expected one of spline")]:
+        with pytest.raises((crumple.Error, ValueError), match=what):
+            model.predict(**wrong)
+    with pytest.raises(crumple.Error, match="angle"):
+        model.predict(14.0, parameters={"angle_deg": 10.0})
+    # The model that was read answers, whatever becomes of its file.
+    own = tmp_path / "own2.model"
+    shutil.copy(DEMO / "lead.model", own)
+    loaded = crumple.Model(own)
+    shutil.copy(DEMO / "vehicle.model", own)
+    assert np.array_equal(loaded.predict("50km/h").force, curve.force)
+    # The text is the program's; how Python says it stands beside it.
+    with pytest.raises(crumple.Error, match="unexpected argument '--nodes'") as raised:
+        crumple.init(tmp_path, nodes=1)
+    assert "nsdm_seeds=3" in raised.value.__notes__[0]
     with pytest.raises(ValueError):
         model.predict(-1.0)
     exported = curve.export(tmp_path / "curve.k", units="mm-t-s")

@@ -48,7 +48,7 @@ impl Args {
                 if !study.is_file() {
                     let folder = folder.display();
                     return usage(format!(
-                        "{folder} is a folder without a {STUDY}: crumple init {folder} writes one"
+                        "{folder} is a folder without a {STUDY}: crumple init {folder} -o {folder}/{STUDY} writes one"
                     ));
                 }
                 study

@@ -33,9 +33,11 @@ impl Input {
             FileKind::Database => Self::Database(path.into(), Database::read(path)?),
             FileKind::Model => Self::Model(Box::new(Model::read(path)?)),
             FileKind::Curve => Self::Curve(Box::new(json::predicted(path)?)),
-            FileKind::Scenario | FileKind::Result | FileKind::Sweep | FileKind::Solver => {
-                Self::File(path.into())
+            FileKind::Sweep => {
+                let (path, of) = (path.display(), "give a curve, a model or a database");
+                return usage(format!("{path} is a sweep's result, which holds no curve: {of}"));
             }
+            FileKind::Scenario | FileKind::Result | FileKind::Solver => Self::File(path.into()),
         })
     }
 
@@ -181,12 +183,14 @@ impl Which {
         if let Some(&v) = self.speed.iter().find(|&&v| !cases.iter().any(|c| has_speed(c, v))) {
             let known: Vec<String> =
                 cases.iter().map(|c| km_per_h(c.conditions.speed.m_per_s)).collect();
-            return usage(format!(
-                "group {} has no case at {}: it has {}; a model gives curves at other speeds",
-                cases[0].id.group,
-                km_per_h(v),
-                known.join(", ")
-            ));
+            let (group, v, known) = (&cases[0].id.group, km_per_h(v), known.join(", "));
+            return usage(if self.case.is_empty() {
+                format!(
+                    "group {group} has no case at {v}: it has {known}; a model gives curves at other speeds"
+                )
+            } else {
+                format!("none of the cases of --case is at {v}: they are at {known}")
+            });
         }
         let speeds = &self.speed;
         let is_chosen =

@@ -1,6 +1,7 @@
 //! Choosing cases of a database: by group, name, speed and tag.
 
 use crate::error::{Error, error};
+use crate::guess::hint;
 use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
@@ -146,7 +147,9 @@ fn one_named<'a>(path: &Path, name: &str, cases: &[&'a Case]) -> Result<&'a Case
         [case] => Ok(case),
         [] => {
             let (path, known) = (path.display(), listed(cases));
-            Err(error!(Database, "{path}: there is no case \"{name}\": there are {known}"))
+            let names: Vec<&str> = cases.iter().map(|case| case.id.name.as_str()).collect();
+            let hint = hint(name.rsplit('/').next().unwrap_or(name), &names.join(", "));
+            Err(error!(Database, "{path}: there is no case \"{name}\": there are {known}{hint}"))
         }
         _ => {
             let known: Vec<String> = found.iter().map(|c| CasePath::of(c).to_string()).collect();

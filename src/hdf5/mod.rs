@@ -76,7 +76,7 @@ struct Blocks {
 
 impl Blocks {
     const BYTES: u64 = 1 << 14;
-    /// Those of one case and of the tables that lead to it, for a few threads.
+    /// Those of one case and of the tables that lead to it.
     const KEPT: usize = 16;
 
     fn read(&self, offset: u64, bytes: &mut [u8]) -> Result<(), FormatError> {
@@ -277,6 +277,40 @@ impl Write for Sink<'_> {
 mod tests {
     use super::*;
     use crate::hdf5;
+
+    /// Whatever is asked for, in one block, over several, at the end or behind it.
+    #[test]
+    fn blocks_hold_the_bytes_of_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        let size = Blocks::BYTES as usize;
+        for length in [0, 1, size - 1, size, 20 * size, 20 * size + 7] {
+            let bytes: Vec<u8> = (0..length).map(|i| (i * 31 % 251) as u8).collect();
+            fs::write(&path, &bytes).unwrap();
+            let file = fs::File::open(&path).unwrap();
+            let (latest, fault) = (Mutex::default(), Fault::default());
+            let blocks = Blocks { file, length: length as u64, latest, fault: fault.clone() };
+            let near = |at: usize| [at.saturating_sub(1), at, at + 1];
+            for offset in [0, size, 3 * size, 19 * size, length].into_iter().flat_map(near) {
+                for count in [0, 1, 2, size - 1, size, size + 1, 2 * size] {
+                    let mut found = vec![0; count];
+                    let read = blocks.read_at(offset as u64, &mut found);
+                    match bytes.get(offset..offset + count) {
+                        Some(expected) => assert!(read.is_ok() && found == expected),
+                        None => assert!(matches!(read, Err(FormatError::UnexpectedEof { .. }))),
+                    }
+                }
+            }
+            assert!(blocks.latest.lock().unwrap().len() <= Blocks::KEPT);
+            fault.check().unwrap();
+            // Cut meanwhile, it is a fault of the file.
+            fs::write(&path, &bytes[..length / 2]).unwrap();
+            blocks.latest.lock().unwrap().clear();
+            let mut all = vec![0; length];
+            assert_eq!(blocks.read_at(0, &mut all).is_ok(), length == 0);
+            assert_eq!(fault.check().is_ok(), length == 0);
+        }
+    }
 
     /// What the module rests on: if this fails after an update of hdf5-pure, the encoder does not
     /// hand over the values of a dataset in one piece any more. Then histories go through memory

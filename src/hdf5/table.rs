@@ -174,6 +174,18 @@ fn dataset_names(columns: &[&str]) -> Vec<String> {
     columns.iter().map(&mut name).collect()
 }
 
+/// Whether a file is HDF5 and its root attribute `format` is `format`.
+pub(crate) fn has_format(path: &Path, format: &str) -> bool {
+    let attributes = super::open(path).ok().and_then(|(file, _)| file.root().attrs().ok());
+    let found = attributes.and_then(|mut all| all.remove("format"));
+    found.is_some_and(|found| found.as_str() == Some(format))
+}
+
+/// Bytes of values that a table may declare for each byte of its file, if another program has compressed it, and
+/// beside that: an empty dataset of any length takes none.
+const DECLARED_PER_BYTE: u64 = 32;
+const DECLARED_BYTES: u64 = 64 << 20;
+
 /// An open table.
 pub(crate) struct Table {
     path: PathBuf,
@@ -211,6 +223,13 @@ impl Table {
             let dataset = dataset.map_err(|e| table.damaged(name, e.to_string()))?;
             table.columns.push(table.column(name, &dataset)?);
             table.datasets.push(dataset);
+        }
+        let declared = |column: &Column| column.rows.saturating_mul(column.values.size() as u64);
+        let declared = table.columns.iter().map(declared).fold(0, u64::saturating_add);
+        let most = DECLARED_BYTES + DECLARED_PER_BYTE.saturating_mul(table.file.file_size());
+        if declared > most {
+            let what = "it declares more values than a file of this size holds";
+            return Err(table.damaged(COLUMNS, what.into()));
         }
         Ok(table)
     }

@@ -59,16 +59,18 @@ impl OfCrushLaw {
 
     /// Closing speeds in m/s at increasing deflections, of a body that the law itself slows down from the
     /// speed of the query: trapezoids, each end's force once corrected by the speed that it leads to.
+    /// `per_crush` is that of a body of one mass at each deflection.
     fn closing_m_per_s(
         &self,
         standing_n: &[f64],
+        per_crush: &[f64],
         at: &QueryPoint<'_>,
         along_m: &[f64],
     ) -> Vec<f64> {
         let mut squared = at.speed_m_per_s * at.speed_m_per_s;
         let force_n = |i: usize, squared: f64| {
             let force = standing_n[i] * self.law.factor(squared.max(0.0).sqrt());
-            force * self.per_crush_force(along_m[i], at.mass_kg)
+            force * per_crush[i]
         };
         let mut closing = Vec::with_capacity(along_m.len());
         for i in 0..along_m.len() {
@@ -91,11 +93,16 @@ impl Surrogate for OfCrushLaw {
             return vec![f64::NAN; deflection_m.len()];
         }
         let standing_n = self.law.standing_n(cases, at.speed_m_per_s, deflection_m);
+        let per_crush = || -> Vec<f64> {
+            deflection_m.iter().map(|&d| self.per_crush_force(d, at.mass_kg)).collect()
+        };
         let own;
+        let mut per = Vec::new();
         let closing = match at.closing_m_per_s {
             Some(closing) => closing,
             None => {
-                own = self.closing_m_per_s(&standing_n, at, deflection_m);
+                per = per_crush();
+                own = self.closing_m_per_s(&standing_n, &per, at, deflection_m);
                 &own
             }
         };
@@ -109,11 +116,18 @@ impl Surrogate for OfCrushLaw {
                 mean_over(deflection_m, &crush_n, |i| 0.5 * self.interval_s * closing[i])
             }
         };
-        let force = |((&d, &crush_n), &u): ((&f64, &f64), &f64)| match self.force {
-            ForceKind::Contact => crush_n + self.law.stopped.rate_kg_per_m(d) * u * u,
-            ForceKind::Body => crush_n * self.per_crush_force(d, at.mass_kg),
-        };
-        deflection_m.iter().zip(&crush_n).zip(closing).map(force).collect()
+        match self.force {
+            ForceKind::Contact => {
+                let force = |((&d, crush_n), &u): ((&f64, &f64), &f64)| {
+                    crush_n + self.law.stopped.rate_kg_per_m(d) * u * u
+                };
+                deflection_m.iter().zip(&crush_n).zip(closing).map(force).collect()
+            }
+            ForceKind::Body => {
+                let per = if per.is_empty() { per_crush() } else { per };
+                crush_n.iter().zip(per).map(|(crush_n, per)| crush_n * per).collect()
+            }
+        }
     }
 
     fn parameters(&self) -> Option<Result<Box<RawValue>, serde_json::Error>> {

@@ -2,8 +2,10 @@
 //! (`schemas/model.md`).
 
 use std::collections::BTreeMap;
+use std::panic::resume_unwind;
 use std::path::Path;
 use std::sync::Arc;
+use std::thread;
 
 use serde::{Deserialize, Serialize};
 use serde_json::value::{RawValue, to_raw_value};
@@ -147,11 +149,14 @@ impl Model {
         };
         let declared = || fitted(file.fitted);
         let of_body = || file.fitted_body.map(fitted).transpose();
-        // Threads cost more than a small model.
+        // A thread costs more than a small model; one of rayon's pool would be missing in a process that was forked.
         let (declared, of_body) = if text.len() < LARGE {
             (declared(), of_body())
         } else {
-            rayon::join(declared, of_body)
+            thread::scope(|scope| {
+                let of_body = scope.spawn(of_body);
+                (declared(), of_body.join().unwrap_or_else(|panic| resume_unwind(panic)))
+            })
         };
         let damaged =
             |detail| error!(Model, "{path}: the model is damaged: {detail}", path = path.display());
@@ -335,8 +340,9 @@ fn fitted_of(kind: &ModelKind, raw: &RawValue) -> Result<Arc<dyn Surrogate>, ser
         let name: String = serde_json::from_str(raw.get())?;
         return if name == kind.name() { (kind.entry().load)(None) } else { Err(other(&name)) };
     }
-    // As this program writes it: its parameters, which may be large, are read once.
-    let own = raw.get().strip_prefix(&format!("{{\"{}\":", kind.name()));
+    // As this program writes a forest: it is large, and so read once. What follows it would be an error of its own.
+    let is_forest = kind.entry().forest.is_some();
+    let own = raw.get().strip_prefix(&format!("{{\"{}\":", kind.name())).filter(|_| is_forest);
     if let Some(Ok(found)) =
         own.and_then(|own| own.strip_suffix('}')).map(|own| (kind.entry().load)(Some(own)))
     {

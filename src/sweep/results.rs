@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::row::{FORMAT, Line, ShardFile, ShardHeader, bad_row};
 use super::statistics::{result_of, sample_threshold};
-use super::to_hdf5::{FinishedTable, is_hdf5};
+use super::to_hdf5::{FinishedTable, is_table};
 use crate::error::{Error, error};
 use crate::stream::mix;
 
@@ -33,27 +33,25 @@ impl SweepColumns {
     /// # Errors
     /// If the file is not a finished sweep, or a row is damaged.
     pub(crate) fn read(path: &Path) -> Result<Self, Error> {
-        if is_hdf5(path) {
+        if is_table(path) {
             let table = FinishedTable::open(path)?;
             let mut columns = Self::none(&table.head);
-            table.numbers(|item, numbers| {
-                if columns.has_room(item) {
-                    columns.take(numbers);
-                }
-            })?;
+            let threshold = sample_threshold(columns.rows);
+            table.numbers(|item| mix(item) <= threshold, |numbers| columns.take(numbers))?;
             return Ok(columns.sorted());
         }
         let file = ShardFile::read_head(path)?.ok_or_else(|| {
             error!(Sweep, "{}: expected \"# {FORMAT}\" in the first line and a whole head: run its sweep again with --restart", path.display())
         })?;
         let mut columns = Self::none(&file.head);
+        let threshold = sample_threshold(columns.rows);
         let mut next = file.head.rows().start;
         file.rows(|line| {
             let item = next;
             next += 1;
             let parsed = Line::parse(line, file.head.columns.len());
             let Some(line) = parsed.filter(|line| line.item == item) else { return Ok(false) };
-            if !columns.has_room(item) {
+            if mix(item) > threshold {
                 return Ok(true);
             }
             let number = |k: usize| Line::number(line.values.get(k - 1)?);
@@ -69,10 +67,6 @@ impl SweepColumns {
         let column = |k: usize| ResultColumn { name: head.columns[k].clone(), values: Vec::new() };
         let results = head.number_columns().map(column).collect();
         Self { varied: Vec::new(), results, rows: head.count() }
-    }
-
-    fn has_room(&self, item: u64) -> bool {
-        mix(item) <= sample_threshold(self.rows)
     }
 
     fn take(&mut self, numbers: &[f64]) {

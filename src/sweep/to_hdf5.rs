@@ -8,7 +8,7 @@ use super::statistics::Tally;
 use super::{Shard, damaged, foreign};
 use crate::error::{Error, ErrorCode};
 use crate::file::not_written;
-use crate::hdf5::table::{Attribute, Column, Put, Table, Values, write_table};
+use crate::hdf5::table::{self, Attribute, Column, Put, Table, Values, write_table};
 
 pub(super) fn is_hdf5(path: &Path) -> bool {
     path.extension().is_some_and(|e| e == "h5" || e == "hdf5")
@@ -153,9 +153,9 @@ impl<'a, 'p> Block<'a, 'p> {
     }
 }
 
-/// Whether a file is the HDF5 table of a sweep.
+/// Whether a file is the HDF5 table of a sweep, whatever its name and its state.
 pub(crate) fn is_table(path: &Path) -> bool {
-    is_hdf5(path) && Table::open(path, FORMAT).is_ok()
+    table::has_format(path, FORMAT)
 }
 
 fn pad(out: &mut Vec<u8>, text: &str, width: usize) {
@@ -167,11 +167,11 @@ fn pad(out: &mut Vec<u8>, text: &str, width: usize) {
 pub(super) struct FinishedTable {
     path: PathBuf,
     table: Table,
-    pub head: ShardHeader,
+    pub(super) head: ShardHeader,
 }
 
 impl FinishedTable {
-    pub fn open(path: &Path) -> Result<Self, Error> {
+    pub(super) fn open(path: &Path) -> Result<Self, Error> {
         let table = Table::open(path, FORMAT).map_err(|e| e.coded(ErrorCode::Sweep))?;
         let head = head(&table)?.ok_or_else(|| {
             damaged(path, "its attributes are not those of a sweep of this layout")
@@ -195,9 +195,14 @@ impl FinishedTable {
         Ok(Self { path: path.into(), table, head })
     }
 
-    /// Calls `see` with each item and its numbers, in the order of their columns.
-    pub fn numbers(&self, mut see: impl FnMut(u64, &[f64])) -> Result<(), Error> {
-        let items = self.head.rows();
+    /// Calls `see` with each item that `takes` and its numbers, in the order of their columns.
+    pub(super) fn numbers(
+        &self,
+        takes: impl Fn(u64) -> bool,
+        mut see: impl FnMut(&[f64]),
+    ) -> Result<(), Error> {
+        let (items, status) = (self.head.rows(), self.head.columns.len() - 2);
+        let width = self.table.columns[status].values.size();
         for first in items.clone().step_by(ROWS as usize) {
             let (row, rows) = (first - items.start, ROWS.min(items.end - first));
             let columns: Vec<Vec<u8>> = self
@@ -205,9 +210,19 @@ impl FinishedTable {
                 .number_columns()
                 .map(|c| self.table.read(c, row, rows))
                 .collect::<Result<_, _>>()?;
-            for (item, at) in (first..first + rows).zip((0..).step_by(size_of::<f64>())) {
-                let number = |bytes: &Vec<u8>| f64::from_le_bytes(eight(&bytes[at..at + 8]));
-                see(item, &columns.iter().map(number).collect::<Vec<_>>());
+            let (numbers, states) =
+                (self.table.read(0, row, rows)?, self.table.read(status, row, rows)?);
+            for (k, item) in (first..first + rows).enumerate() {
+                let eighth = |bytes: &[u8]| eight(&bytes[8 * k..8 * (k + 1)]);
+                let state = text(&states[width * k..width * (k + 1)]);
+                let is_whole = Status::ALL.into_iter().any(|of| of.name() == state);
+                if i64::from_le_bytes(eighth(&numbers)) != item as i64 || !is_whole {
+                    return Err(bad_row(&self.path, item));
+                }
+                if takes(item) {
+                    let number = |bytes: &Vec<u8>| f64::from_le_bytes(eighth(bytes));
+                    see(&columns.iter().map(number).collect::<Vec<_>>());
+                }
             }
         }
         Ok(())

@@ -225,8 +225,7 @@ struct ExportArgs {
     /// Also write originals.csv, the curves at the solver's rate
     #[arg(long)]
     originals: bool,
-    /// Also write croissant.json, which describes the tables for machine-learning tools (Croissant 1.0); one that is there is
-    /// always written anew
+    /// Also write croissant.json, which describes the tables for machine-learning tools (Croissant 1.0)
     #[arg(long)]
     croissant: bool,
 }
@@ -236,12 +235,19 @@ fn export(args: &ExportArgs, options: GlobalOptions) -> CommandResult {
     let selection = args.chosen.selection();
     let cases: Vec<&Case> = selection.find(&args.database, &database)?;
     let name = args.database.file_stem().unwrap_or_default().to_string_lossy();
-    // A description that is there would be of other tables.
-    let is_described = args.croissant || args.output.join(curate::DESCRIPTION).exists();
-    let described_as = is_described.then_some(&*name);
+    let described_as = args.croissant.then_some(&*name);
     let files = curate::write_tables(&cases, &args.output, args.originals, described_as)?;
     let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
+    let description = args.output.join(curate::DESCRIPTION);
+    let is_old = !args.croissant && description.exists();
+    let warning = is_old.then(|| {
+        let old = description.display();
+        format!("{old} was there before and may describe other tables: --croissant writes it anew")
+    });
+    let outcome = options.warn_all(&warning);
     let database = args.database.display().to_string();
     let document = document! { database: database, cases: cases.len(), files: &files };
-    options.show(&document, |out| files.iter().try_for_each(|file| writeln!(out, "wrote {file}")))
+    options
+        .show(&document, |out| files.iter().try_for_each(|file| writeln!(out, "wrote {file}")))?;
+    Ok(outcome)
 }
