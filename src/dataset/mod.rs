@@ -344,7 +344,7 @@ impl TrainingSet {
         self.table_of(kind, self.force_kind, None)
     }
 
-    /// The same table of the declared force or of the body's; of so many rows at most, every so manieth of each case.
+    /// The same table of the declared force or of the body's; with at most `most_rows` rows, evenly thinned in each case.
     pub(crate) fn table_of(
         &self,
         kind: TableKind,

@@ -111,7 +111,7 @@ FMI2(GetReal)(component_t c, const reference_t vr[], size_t n, double values[]) 
     size_t i;
     for (i = 0; c != NULL && vr != NULL && i < n; i++) {
         if (vr[i] == VR_TIME) {
-            return spring_say_of(c, "fmi2GetReal", vr[i], "is no variable of this type");
+            return spring_say_of(c, "fmi2GetReal", vr[i], "is not a variable of this type");
         }
     }
     return spring_get(c, "fmi2GetReal", vr, n, values);

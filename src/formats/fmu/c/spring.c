@@ -73,7 +73,7 @@ int spring_get(spring_t *spring, const char *function, const uint32_t *vr, size_
         case VR_FORCE_SCALE: values[i] = now->force_scale; break;
         case VR_PAST_KNOT: values[i] = knots[0]; break;
         case VR_BEFORE_KNOT: values[i] = knots[1]; break;
-        default: return spring_say_of(spring, function, vr[i], "is no variable of this type");
+        default: return spring_say_of(spring, function, vr[i], "is not a variable of this type");
         }
     }
     return SAID_OK;
@@ -132,7 +132,7 @@ int spring_set_rates(spring_t *spring, const char *function, const uint32_t *vr,
     }
     for (i = 0; i < n; i++) {
         if (vr[i] != VR_DEFLECTION) {
-            return spring_say_of(spring, function, vr[i], "is no input");
+            return spring_say_of(spring, function, vr[i], "is not an input");
         }
         if (order[i] < 1 || order[i] > 2 || !is_finite(values[i])) {
             return spring_say_of(spring, function, vr[i],
