@@ -51,7 +51,7 @@ pub fn database(bytes: &[u8]) {
 
 pub fn plan(bytes: &[u8]) {
     if let Ok(plan) = sweep::Sweep::load(&written("a.toml", bytes), None) {
-        assert_eq!(plan.values(0).len(), plan.variables().len());
+        assert!(plan.values(0).len() < plan.columns().len());
     }
 }
 
