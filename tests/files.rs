@@ -90,10 +90,9 @@ fn devices_pipes_and_folders_are_refused() {
             if command.starts_with("rate") && path == "pipe" {
                 continue;
             }
-            let expected = match (command.starts_with("rate"), path) {
-                (true, "inner") => "inner: this is a folder",
-                _ => expected,
-            };
+            let says_more = ["rate", "build"].iter().any(|with| command.starts_with(with));
+            let expected =
+                if says_more && path == "inner" { "inner: this is a folder" } else { expected };
             let words: Vec<&str> =
                 command.split(' ').map(|w| if w == "FILE" { path } else { w }).collect();
             soon_fails(here, &words, expected);

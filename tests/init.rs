@@ -1064,8 +1064,8 @@ fn build_needs_no_arguments_beside_a_study() {
     // A folder of runs stands for the study in it, if there is one.
     fs::create_dir(here.join("runs")).unwrap();
     says(
-        &crumple_fails(&here, 2, "build runs -o a.h5"),
-        "runs is a folder without a study.toml: crumple init runs -o runs/study.toml writes one",
+        &crumple_fails(&here, 1, "build runs -o a.h5"),
+        "runs: this is a folder without a study.toml: give a study, or let crumple init runs -o runs/study.toml write one",
     );
     // As it says.
     for speed in ["12kmh", "18kmh", "25kmh"] {

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use crate::build::{self, BuildReport, BuiltRun, RunOutcome};
 use crate::curve::group as siblings;
 use crate::database::CasePath;
+use crate::error::error;
 use crate::plural::counted;
 use crate::table::Table;
 
@@ -47,9 +48,7 @@ impl Args {
                 let study = folder.join(STUDY);
                 if !study.is_file() {
                     let folder = folder.display();
-                    return usage(format!(
-                        "{folder} is a folder without a {STUDY}: crumple init {folder} -o {folder}/{STUDY} writes one"
-                    ));
+                    return Err(error!(Study, "{folder}: this is a folder without a {STUDY}: give a study, or let crumple init {folder} -o {folder}/{STUDY} write one").into());
                 }
                 study
             }
