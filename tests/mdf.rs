@@ -32,6 +32,33 @@ fn record(here: &Path) -> (Vec<[f64; 3]>, String) {
     (rows, format!("t_s,d_m,force_N\n{lines}"))
 }
 
+/// A result in MDF is rated as the same one in CSV.
+#[test]
+fn signals_of_mdf_files_are_rated() {
+    let folder = demo_folder();
+    let here = folder.path();
+    for name in ["run.mf4", "run.csv"] {
+        crumple_ok(here, &["simulate", "two-sets.toml", "-q", "-o", name]);
+    }
+    let rated = |a: &str, b: &str| -> Value {
+        let shown = crumple_ok(here, &["rate", a, b, "--cfc", "60", "--json"]);
+        serde_json::from_str(&shown).unwrap()
+    };
+    let (a, b) = ("a_m_per_s2[A1]", "a_m_per_s2[A2]");
+    let of_csv = rated(&format!("run.csv:{a}"), &format!("run.csv:{b}"));
+    let mut of_mdf = rated("run.mf4:a A1", "run.mf4:a A2 [m/s^2]");
+    for side in ["reference", "prediction"] {
+        let name = of_mdf[side]["name"].as_str().unwrap();
+        assert!(name.contains("a A") && name.contains("[m/s^2]"), "{name}");
+        of_mdf[side]["name"] = of_csv[side]["name"].clone();
+    }
+    assert_eq!(of_mdf, of_csv);
+    let error = crumple_fails(here, 1, &["rate", "run.mf4:a A9", "run.csv:a_m_per_s2[A2]"]);
+    says(&error, "run.mf4: there is no channel \"a A9\": name one of \"time [s]\", \"x A1 [m]\"");
+    let error = crumple_fails(here, 1, &["rate", "run.mf4", "run.mf4"]);
+    says(&error, "run.mf4: there are several columns: name one of");
+}
+
 /// asammdf finds every channel of a case and of a run, with its unit and values.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]

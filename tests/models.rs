@@ -10,11 +10,11 @@ use crumple::assess::{Purpose, Selection, gaps};
 use crumple::curve::audit;
 use crumple::curve::unloading_stiffness;
 use crumple::curve::{
-    Case, CaseId, Conditions, Curve, ForceCurve, ForceKind, Masses, Parameter, Provenance, Quality,
-    RecordedCurves,
+    Case, CaseId, Conditions, Curve, Envelope, ForceCurve, ForceKind, Masses, Parameter,
+    Provenance, Quality, RecordedCurves,
 };
 use crumple::database::Database;
-use crumple::dataset::TrainingSet;
+use crumple::dataset::{TrainingCase, TrainingSet};
 use crumple::surrogate::ForestOptions;
 use crumple::surrogate::MaxCrushRule;
 use crumple::surrogate::{Means, Validation};
@@ -604,7 +604,7 @@ fn one_to_five_curves() {
         let auto =
             train("made", &cases, Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None })
                 .unwrap();
-        let expected = ["nearest", "linear"];
+        let expected = ["nearest", "rate"];
         if n < 3 {
             assert_eq!(auto.name(), expected[n - 1]);
         }
@@ -1403,6 +1403,49 @@ fn a_crush_gives_its_speed() {
         let error = crumple_fails(here, code, &all);
         assert!(error.contains(says), "{arguments}: {error}");
     }
+}
+
+/// Two runs cannot be validated; the default that they get is better between them than a straight line.
+#[test]
+fn two_speeds_get_the_default() {
+    let folder = tempfile::tempdir().unwrap();
+    for group in ["lead-car-wall", "vehicle-pair"] {
+        let database = build_fixture(folder.path(), group);
+        let database = Database::read(&database).unwrap();
+        let cases = database.cases(group);
+        let set = TrainingSet::new(group, cases).unwrap();
+        let (mut of_default, mut of_linear) = (0.0, 0.0);
+        for low in 0..cases.len() {
+            for high in low + 2..cases.len() {
+                let two = [cases[low].clone(), cases[high].clone()];
+                let fitted = |choice| train(group, &two, choice).unwrap();
+                let auto = Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None };
+                let auto = fitted(auto);
+                assert_eq!(auto.name(), "crush-law");
+                let linear = fitted(Choice::Kind(ModelKind::linear()));
+                for case in &set.cases[low + 1..high] {
+                    let error = |model: &Model| force_error(model, case);
+                    of_default += error(&auto);
+                    of_linear += error(&linear);
+                }
+            }
+        }
+        assert!(of_default <= 0.75 * of_linear, "{group}: {of_default} and {of_linear}");
+    }
+}
+
+/// `Σ|p − r|/Σ|r|` of the declared force, along the crush of a case that the model has not seen.
+fn force_error(model: &Model, case: &TrainingCase) -> f64 {
+    let curve = predict(model, &Query::at(case.speed_m_per_s)).unwrap();
+    let predicted = Envelope::new(curve.deflection_m, curve.force_n).unwrap();
+    let fe = &case.envelope;
+    let along = (1..=400).map(|k| fe.end_m() * f64::from(k) / 400.0);
+    let (mut difference, mut level) = (0.0, 0.0);
+    for d in along {
+        difference += (predicted.force_at(d) - fe.force_at(d)).abs();
+        level += fe.force_at(d).abs();
+    }
+    difference / level
 }
 
 /// The advice of `--next`, judged: of every two speeds that are not neighbours, both left out, one

@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::against::Against;
-use super::choose::{NextRun, Purpose, Selection, choose, scores};
+use super::choose::{NextRun, Purpose, Selection, choose, default_among, scores};
 use super::left_out::{Answers, LeftOutCase, LeftOutRun, Score, query_of};
 use super::scatter::scatter;
 use super::subsets::OverSubsets;
@@ -476,11 +476,10 @@ fn without_means(model: &str) -> String {
     format!("{model} has no means and cannot be chosen: it cannot predict every inner speed")
 }
 
-/// With too few speeds to leave one out.
+/// With too few speeds to leave one out: the default, or the nearest of cases that differ in more than speed.
 fn without_validation(fitting: &[ModelKind]) -> (String, String) {
-    let reason = "too few speeds to leave one out";
-    let linear = fitting.contains(&ModelKind::linear());
-    (if linear { "linear" } else { "nearest" }.into(), reason.into())
+    let default = default_among(fitting.iter().map(ModelKind::name)).unwrap_or("nearest");
+    (default.into(), "too few speeds to leave one out".into())
 }
 
 /// The rule for the maximum crush: the body's motion, unless another has answers at more of the speeds; the reference method keeps its

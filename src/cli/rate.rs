@@ -32,7 +32,7 @@ const MAX_TABLE_BYTES: u64 = 256 << 20;
   crumple rate test.csv,time=ms model.csv,time=s
   crumple rate one.csv other.csv      # two results of crumple simulate: the acceptance rule, interface by interface
 A is the reference r, B the prediction p. Each is a CSV file (a header line; the first column is the
-time), FILE:COLUMN, or any file that crumple histories reads, FILE:ID:COMPONENT, in a binout with
+time), FILE:COLUMN, an MDF 4 file, FILE:CHANNEL, or any file that crumple histories reads, FILE:ID:COMPONENT, in a binout with
 several sections FILE:SECTION:ID:COMPONENT; append ,scale=FACTOR for the values and ,time=UNIT for
 the times (s, ms, us). What both share can be given once, by --id and --component or --column. Both
 are filtered on request, then interpolated linearly at common times 0.1 ms apart (10 kHz, as required
@@ -397,7 +397,9 @@ impl SignalRequest<'_> {
 
     fn read(&self, options: GlobalOptions) -> Result<LoadedSignal, Failure> {
         let is_table = self.path().extension().is_some_and(|extension| {
-            ["csv", "tsv", "txt", "crv", "cur"].iter().any(|e| extension.eq_ignore_ascii_case(e))
+            ["csv", "tsv", "txt", "crv", "cur", "mf4", "mdf"]
+                .iter()
+                .any(|e| extension.eq_ignore_ascii_case(e))
         });
         if is_table && self.both.format.is_none() {
             return self.read_table();

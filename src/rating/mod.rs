@@ -43,10 +43,13 @@ pub(crate) enum Quantity {
 }
 
 impl Quantity {
-    /// Tells an acceleration by a column's name: `x_acceleration[900001]`, `a_m_per_s2[A1]`.
+    /// Tells an acceleration by a column's name or unit: `x_acceleration[900001]`, `a_m_per_s2[A1]`, `head [g]`.
     pub(crate) fn named(column: &str) -> Self {
         let column = column.to_ascii_lowercase();
-        let is_acceleration = column.contains("acceleration") || column.starts_with("a_m_per_s2");
+        let units = ["m/s^2", "m/s2", "m/s²", "m/s**2", "[g]", "(g)"];
+        let is_acceleration = column.contains("acceleration")
+            || column.starts_with("a_m_per_s2")
+            || units.iter().any(|unit| column.contains(unit));
         if is_acceleration { Self::Acceleration } else { Self::Other }
     }
 }
@@ -380,8 +383,8 @@ mod tests {
     }
 
     #[test]
-    fn accelerations_are_told_by_their_name() {
-        for name in ["x_acceleration[900001]", "a_m_per_s2[A1]"] {
+    fn accelerations_are_known_by_name_and_unit() {
+        for name in ["x_acceleration[900001]", "a_m_per_s2[A1]", "a A1 [m/s^2]", "Head X [g]"] {
             assert_eq!(Quantity::named(name), Quantity::Acceleration, "{name}");
         }
         for name in ["x_velocity[1]", "force_N[A|B]", "a"] {

@@ -6,6 +6,8 @@
 //! fold, which need not occur at neighbouring speeds. How much runs have of their own is what makes their values most likely
 //! (ibid., section 5.4). The residual of a run fades with
 //! the square of the proximity in speed, so that at its own speed a run is reproduced exactly.
+//!
+//! Tried and dropped: more variance of its own for what varies over a short way. Neighbouring runs share their folds, too.
 
 use super::curves::neighbours;
 use crate::signal::Cholesky;

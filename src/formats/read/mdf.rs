@@ -15,6 +15,7 @@ use super::curve::ReadCurve;
 use super::label::{Label, Quantity};
 use super::{Input, tables};
 use crate::error::{Error, error};
+use crate::guess;
 use crate::plural::counted;
 
 /// How every MDF file begins; the version and the program that wrote it follow.
@@ -36,14 +37,62 @@ pub(super) fn recognise(input: &Input<'_>) -> bool {
     input.bytes.starts_with(BEGINNING)
 }
 
-pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
-    if input.bytes.get(8) != Some(&b'4') {
+/// The blocks of a file, its first one, and its groups.
+fn opened(bytes: &[u8]) -> Result<(Blocks<'_>, Block<'_>, Vec<Group>), Error> {
+    if bytes.get(8) != Some(&b'4') {
         return Err(wrong("expected MDF of version 4, found an earlier version: save it as MDF 4"));
     }
-    let visits = Cell::new(input.bytes.len() / 8 + 100);
-    let file = Blocks { bytes: input.bytes, visits };
+    let file = Blocks { bytes, visits: Cell::new(bytes.len() / 8 + 100) };
     let header = file.block(64, b"HD")?;
-    let mut groups = groups(&file, &header)?;
+    let groups = groups(&file, &header)?;
+    Ok((file, header, groups))
+}
+
+/// The table of the group with the channel called `wanted`, and how the table calls it: of that channel and the times.
+/// `None` if the file is not MDF.
+pub(super) fn history(
+    bytes: &[u8],
+    wanted: Option<&str>,
+) -> Result<Option<(String, Option<String>)>, Error> {
+    if !bytes.starts_with(BEGINNING) {
+        return Ok(None);
+    }
+    let (file, _, mut groups) = opened(bytes)?;
+    let is_wanted = |channel: &Channel| {
+        wanted.is_none_or(|wanted| channel.name == wanted || channel.label() == wanted)
+    };
+    let has = |group: &Group| group.channels.iter().any(is_wanted);
+    let found: Vec<usize> = (0..groups.len()).filter(|k| has(&groups[*k])).collect();
+    let [found] = found[..] else {
+        let labels = groups.iter().flat_map(|group| &group.channels).map(Channel::label);
+        let known = labels.map(|label| format!("\"{label}\"")).collect::<Vec<_>>().join(", ");
+        return Err(match (wanted, found.len()) {
+            (None, _) => {
+                error!(Rating at "column", "there are several groups of channels: name one of {known}")
+            }
+            (Some(name), 0) => {
+                error!(Rating at "column", "there is no channel \"{name}\": name one of {known}{}", guess::hint(name, &known))
+            }
+            (Some(name), count) => {
+                error!(Rating, "{count} groups have a channel \"{name}\": rename all but one")
+            }
+        });
+    };
+    let mut group = groups.swap_remove(found);
+    let mut called = None;
+    if wanted.is_some() {
+        let is_time = |channel: &Channel| channel.quantity() == Some(Quantity::Time);
+        let first = group.channels[0].at;
+        group.channels.retain(|c| c.at == first || is_time(c) || is_wanted(c));
+        called = group.channels.iter().find(|c| is_wanted(c)).map(Channel::label);
+    }
+    let mut text = String::new();
+    group.rows(&file, &mut text)?;
+    Ok(Some((text, called)))
+}
+
+pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
+    let (file, header, mut groups) = opened(input.bytes)?;
     let left_out = |of: &[Group]| {
         let all = of.iter().flat_map(|group| &group.left_out).take(LISTED);
         all.map(|why| format!("; left out: channel {why}")).collect::<String>()

@@ -36,7 +36,6 @@ use crate::unit::UnitSystem;
 pub(crate) use curve::Metadata;
 pub use curve::ReadCurve;
 use label::Quantity;
-pub(crate) use tables::history;
 
 /// One format of curves.
 #[derive(Debug)]
@@ -124,6 +123,14 @@ pub(crate) const READERS: &[Reader] = &[
         read: tables::read_pairs,
     },
 ];
+
+/// The values over time called `wanted` of a table or MDF file; without a name, the only ones.
+pub(crate) fn history(bytes: &[u8], wanted: Option<&str>) -> Result<tables::History, Error> {
+    match mdf::history(bytes, wanted)? {
+        Some((table, called)) => tables::history(table.as_bytes(), called.as_deref().or(wanted)),
+        None => tables::history(bytes, wanted),
+    }
+}
 
 /// What the user gives besides the file.
 #[derive(Clone, Debug, Default, PartialEq)]
