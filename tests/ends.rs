@@ -399,7 +399,11 @@ fn wrong_ends_are_refused() {
     ];
     cases.into_iter().for_each(|(from, to, expected)| fails(from, to, expected));
     let file = "end = { file = \"lead50.csv\" }";
-    fails("end = { model = \"vehicle-pair.model\" }", file, "ends of vehicle \"A1\" needs mass");
+    fails(
+        "end = { model = \"vehicle-pair.model\" }",
+        file,
+        "ends of vehicle \"A1\": curve \"end\" is not a model",
+    );
     let gap = "end = { model = \"vehicle-pair.model\", gap = \"3mm\" }";
     fails("end = { model = \"vehicle-pair.model\" }", gap, "is joined to the body without one");
     let band = "end = { model = \"vehicle-pair.model\", band = 1.0 }";

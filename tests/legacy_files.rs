@@ -674,7 +674,7 @@ fn an_impossible_import_speaks_of_the_file() {
         crumple_fails(folder.path(), 1, &[&arguments[..], &WALL, more].concat())
     };
     let error = refused(speed() * 0.577, &[]);
-    assert!(error.contains("absorbs 3.0") && error.contains("check units, speed and mass; whether the curve ends at the maximum crush of this impact, neither before nor after it; and whether its columns are deflection and force of the whole body. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"), "{error}");
+    assert!(error.contains("absorbs 3.0") && error.contains("check units, speed and mass; whether the curve ends at the maximum crush of this impact, neither before nor after it; and whether its columns are deflection and force of the whole body. Correct speed, mass or units (--speed, --mass, and --units or in crumple export --input-units), or take the curve as it is with --accept-energy"), "{error}");
     let error = refused(speed() * 0.5_f64.sqrt(), &[]);
     says(&error, "likely the mass, half a structure taken for a whole one");
     let error = refused(speed() * 0.5, &[]);

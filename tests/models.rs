@@ -660,7 +660,7 @@ fn several_parameters() {
         assert!((pole / wall - 0.7).abs() < 0.06, "{}: {}", options.name(), pole / wall);
         assert!((tilted / wall - 0.8).abs() < 0.06, "{}: {}", options.name(), tilted / wall);
         let error = predict(&model, &Query::at(12.0)).unwrap_err().to_string();
-        assert_eq!(error, "the model needs angle_deg as a finite number: give it with the query");
+        says(&error, "the model needs angle_deg as a finite number: give --parameter angle_deg=…");
         let mut more = ask(0.0, "wall");
         more.parameters.insert("bogus".into(), Parameter::Number(1.0));
         let error = predict(&model, &more).unwrap_err().to_string();
@@ -672,7 +672,10 @@ fn several_parameters() {
         let says = "angle_deg = 30 lies outside the training cases' 0 to 10";
         assert!(far.warnings.iter().any(|w| w.message.starts_with(says)));
         let error = predict(&model, &ask(0.0, "deer")).unwrap_err().to_string();
-        assert_eq!(error, "the model needs obstacle, one of pole, wall: give it with the query");
+        crate::common::says(
+            &error,
+            "the model needs obstacle, one of pole, wall: give --parameter obstacle=…",
+        );
         let crush = Query { rule: Some(MaxCrushRule::Spline), ..ask(0.0, "wall") };
         assert!(predict(&model, &crush).unwrap_err().to_string().contains("try --max-crush"));
     }
@@ -908,6 +911,11 @@ fn parameters_through_the_commands() {
     let (code, message) = refused("height_m=1");
     assert_eq!(code, Some(1));
     assert!(message.contains("has no parameter \"height_m\""), "{message}");
+    let twice = [&ask[..], &["angle_deg=1", "--parameter", "angle_deg=2"]].concat();
+    says(&crumple_fails(here, 2, &twice), "--parameter angle_deg=… is given twice");
+    let plot = ["plot", "m", "--speed", "50km/h", "--parameter", "angle_deg=1", "-o", "p.svg"];
+    crumple_ok(here, &plot);
+    crumple_ok(here, "plot more.h5 --left-out 48km/h -o left.svg");
     let without = crumple_fails(here, 1, &["predict", "m", "--speed", "50km/h"]);
     assert!(without.contains("the model needs angle_deg as a finite number"), "{without}");
     let train = ["train", "more.h5", "--group", "lead-car-wall", "--model", "linear", "-o", "m2"];
@@ -1391,9 +1399,9 @@ fn a_crush_gives_its_speed() {
         (
             1,
             "--crush 3m",
-            "no speed gives a crush of 3 m: the model's crush goes from 0.111 m at 12 km/h",
+            "no speed between those of the runs gives a crush of 3 m: the model's crush goes from 0.111 m at 12 km/h",
         ),
-        (1, "--crush 1mm", "no speed gives a crush"),
+        (1, "--crush 1mm", "no speed between those of the runs gives a crush"),
         (2, "--crush 0.5", "has no unit"),
         (2, "--crush 0.5m --speed 36km/h", "cannot be used with"),
         (2, "", "--speed"),

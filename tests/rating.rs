@@ -132,7 +132,8 @@ fn signals_that_end_while_decelerated_are_said() {
         let warnings = of["warnings"].as_array().unwrap();
         for who in ["reference", "prediction"] {
             assert_eq!(of["deceleration"][who]["is_cut"], is_cut, "{who} to {to}");
-            let said = format!("the {who} is still decelerated at 0.06 s, where the interval ends");
+            let said =
+                format!("the {who} is still decelerated at 60.0 ms, where the interval ends");
             let is_said = warnings.iter().any(|w| w.as_str().unwrap().starts_with(&said));
             assert_eq!(is_said, is_cut, "{warnings:?}");
         }

@@ -79,6 +79,21 @@ fn its_numbers_are_those_of_the_commands() {
     let interface = &run["summary"]["interfaces"][0];
     let peak = format!(">{:.3} MN<", interface["peak_force_N"].as_f64().unwrap() / 1e6);
     assert!(page.contains(&peak), "{peak}");
+    // The same scenario with its curve at both edges of the band.
+    let scenario = fs::read_to_string(folder.path().join("scenario.toml")).unwrap();
+    let at = |member: i32| {
+        let file = format!("at{member}.toml");
+        let banded = format!("model = \"lead.model\", band = {member}");
+        let changed = scenario.replace("model = \"lead.model\"", &banded);
+        fs::write(folder.path().join(&file), changed).unwrap();
+        json(&["simulate", &file, "--json"])["summary"].clone()
+    };
+    let (lower, upper) = (at(-1), at(1));
+    let of = |summary: &serde_json::Value| summary["bodies"][0]["mean_deceleration_g"].as_f64();
+    let range = format!(">{:.2} to {:.2} g<", of(&lower).unwrap(), of(&upper).unwrap());
+    says(&page, &range);
+    let of = |summary: &serde_json::Value| summary["interfaces"][0]["max_deflection_m"].as_f64();
+    says(&page, &format!(">{:.3} m to {:.3} m<", of(&upper).unwrap(), of(&lower).unwrap()));
     let database = Database::read(&folder.path().join("curves.h5")).unwrap();
     for case in database.cases("lead-car-wall") {
         for source in &case.provenance.sources {

@@ -621,6 +621,78 @@ fn a_run_that_ends_while_loading_is_said() {
     says(&crumple_ok(folder.path(), "simulate s.toml"), " g so far");
 }
 
+/// A mean that may still fall below a limit is no verdict, and neither is one that may rise above it.
+#[test]
+fn a_limit_is_not_judged_while_the_contact_loads() {
+    let nose = "nose = { stages = [ { stroke = \"100mm\", from = \"3MN\" }, { stroke = \"3m\", from = \"0.4MN\" } ], unloading = \"80MN/m\" }";
+    let cars = "vehicles = [ { name = \"A1\", mass = \"24t\" } ]\n[wall]";
+    let limits = "[limits]\nstandard = \"S\"\nedition = \"1\"\nmean_deceleration_g = 5.0\n";
+    let judged = |duration: &str| {
+        let text = scenario(nose, cars, limits).replace("36km/h", "25km/h");
+        let result = run(&text.replace("300ms", duration));
+        let mean_g = result["summary"]["bodies"][0]["mean_deceleration_g"].as_f64().unwrap();
+        (mean_g, result["summary"]["limits"].clone())
+    };
+    let (mean_g, limits) = judged("30ms");
+    assert!(mean_g > 5.0, "{mean_g}");
+    assert_eq!(
+        (&limits["over"], &limits["unknown"]),
+        (&Value::from([(); 0].to_vec()), &Value::from(vec!["A1"]))
+    );
+    let (mean_g, limits) = judged("900ms");
+    assert!(mean_g < 5.0, "{mean_g}");
+    assert_eq!(
+        (limits["over"].as_array().unwrap().len(), limits["unknown"].as_array().unwrap().len()),
+        (0, 0)
+    );
+}
+
+/// A body that the curve of its own FE run stops rebounds as that run did, however the curve goes on beyond.
+#[test]
+fn the_rebound_is_fes_whatever_lies_beyond_the_curve() {
+    let folder = demo_folder();
+    for (case, speed, mass) in [
+        ("lead-car-wall/18kmh", "18km/h", "24t"),
+        ("lead-car-wall/48kmh", "48km/h", "24t"),
+        ("lead-car-wall/72kmh", "72km/h", "24t"),
+    ] {
+        let restitution = |end: &str| {
+            let nose = format!("nose = {{ database = \"curves.h5\", case = \"{case}\"{end} }}");
+            let cars = format!("vehicles = [ {{ name = \"A1\", mass = \"{mass}\" }} ]\n[wall]");
+            let text = scenario(&nose, &cars, "").replace("36km/h", speed);
+            std::fs::write(folder.path().join("own.toml"), text).unwrap();
+            let result = json(&crumple_ok(folder.path(), "simulate own.toml --json -q"));
+            result["summary"]["interfaces"][0]["restitution"].as_f64().unwrap()
+        };
+        let usual = restitution("");
+        for end in ["bottom", "hold", "slope"] {
+            let other = restitution(&format!(", end = \"{end}\""));
+            assert!((other / usual - 1.0).abs() < 0.01, "{case} {end}: {other} and {usual}");
+        }
+        let database = crumple::database::Database::read(&folder.path().join("curves.h5")).unwrap();
+        let (group, name) = case.split_once('/').unwrap();
+        let fe = database.case(folder.path(), group, name).unwrap();
+        let speeds = &fe.curves.closing_speed_m_per_s;
+        let rebound = speeds.iter().copied().fold(0.0, f64::min).abs() / speeds[0];
+        assert!((usual / rebound - 1.0).abs() < 0.05, "{case}: {usual}, FE {rebound}");
+    }
+}
+
+/// What lies behind the last vehicle is not asked for in silence.
+#[test]
+fn keys_without_use_are_said() {
+    let alone = "inner = \"nose\"\ngap = \"10mm\"\nvehicles = [ { name = \"A1\", mass = \"24t\", gap = \"20mm\" } ]\n[wall]";
+    let nose = format!("nose = {{ {STAGES}, unloading = \"80MN/m\" }}");
+    let text = scenario(&nose, alone, "");
+    let warnings = run(&text)["warnings"].to_string();
+    says(
+        &warnings,
+        "inner and gap and the gap of its last vehicle are not used, because nothing is behind",
+    );
+    let error = fails(&text.replace("inner = \"nose\"", "inner = \"none\""));
+    says(&error, "there is no curve \"none\" in [curves]");
+}
+
 /// No command writes over what its scenario reads.
 #[test]
 fn inputs_of_a_scenario_are_kept() {

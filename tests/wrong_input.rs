@@ -311,11 +311,11 @@ fn histories_replace_no_other_hdf5_file() {
         let error = String::from_utf8([output.stdout, output.stderr].concat()).unwrap();
         says(
             &error,
-            "curves.h5 is an HDF5 file without histories, such as a curve database: name another file, or replace it with --force",
+            "curves.h5 is an HDF5 file without histories, such as a curve database: name another file, or replace it with --overwrite",
         );
     }
     assert_eq!(fs::read(&database).unwrap(), before);
-    crumple_ok(folder.path(), &[&arguments[..], &["--force"]].concat());
+    crumple_ok(folder.path(), &[&arguments[..], &["--overwrite"]].concat());
     assert_ne!(fs::read(&database).unwrap(), before);
     // A file of histories is replaced, as any other output.
     crumple_ok(folder.path(), &arguments);

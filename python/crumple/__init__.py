@@ -103,8 +103,9 @@ class Component(_Mapping):
     def __contains__(self, entity):
         return _key(entity) in self._items
 
-    def __init__(self, name, time, arrays, titles):
-        super().__init__(arrays)
+    def __init__(self, name, time, values, titles):
+        # Thousands of ids: an array is made of the values of those that are asked for.
+        super().__init__(values)
         self.name, self.time, self._titles = name, time, titles
 
     @property
@@ -118,11 +119,11 @@ class Component(_Mapping):
     @property
     def array(self):
         """All ids beside one another, as a new array of shape (states, ids)."""
-        return np.column_stack(list(self._items.values()))
+        return np.column_stack(list(self.values()))
 
     def __getitem__(self, entity):
         """The values of an id, given as a number, as text ("3:surfa"), or None."""
-        return super().__getitem__(_key(entity))
+        return _array(super().__getitem__(_key(entity)))
 
 
 class Section(_Mapping):
@@ -136,11 +137,13 @@ class Section(_Mapping):
     def __init__(self, name, title, solver, problems, notes, time, histories):
         self.name, self.title, self.solver, self.problems, self.notes = name, title, solver, problems, notes
         self.time = _array(time)
-        arrays, titles = {}, {}
+        components, titles, ids = {}, {}, {}
         for component, entity, entity_title, values in histories:
-            arrays.setdefault(component, {})[_id(entity)] = _array(values)
-            titles[_id(entity)] = entity_title
-        super().__init__({name: Component(name, self.time, of, titles) for name, of in arrays.items()})
+            if entity not in ids:
+                ids[entity] = _id(entity)
+                titles[ids[entity]] = entity_title
+            components.setdefault(component, {})[ids[entity]] = values
+        super().__init__({name: Component(name, self.time, of, titles) for name, of in components.items()})
 
     def _columns(self):
         for component in self.values():

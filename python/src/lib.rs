@@ -2,6 +2,7 @@
 //!
 //! Functions give plain tuples and buffers; `crumple/__init__.py` makes of them what a user meets.
 
+use std::collections::HashMap;
 use std::ffi::{OsString, c_int};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -113,12 +114,10 @@ type Section = (
 );
 
 fn section(file: SolverFile) -> Section {
-    let titles = file.entities;
+    let titles = file.entities.into_iter().filter_map(|entity| Some((entity.id, entity.title?)));
+    let titles: HashMap<_, String> = titles.collect();
     let histories = file.histories.into_iter().map(|history| {
-        let title = titles
-            .iter()
-            .find(|entity| Some(entity.id) == history.entity)
-            .and_then(|entity| entity.title.clone());
+        let title = history.entity.and_then(|entity| titles.get(&entity)).cloned();
         let id = history.entity.map(|entity| entity.to_string());
         (history.component.to_string(), id, title, floats(history.values))
     });

@@ -17,7 +17,7 @@ use crate::surrogate::{Model, ModelKind, PredictedCurve, Query};
 use crate::unit::km_per_h;
 
 /// Minimum number of steps along FE's crush at which forces are compared.
-const STEPS: usize = 400;
+pub(super) const STEPS: usize = 400;
 
 /// What to ask a model of this group's so that it predicts the case.
 pub(crate) fn query_of(case: &Case, model: &Model) -> Query {

@@ -5,9 +5,11 @@ use std::time::Instant;
 use schemars::JsonSchema;
 use serde::Serialize;
 
+use super::left_out::{STEPS, forces_n};
 use super::methods::{FittedNsdm, Method, Times};
 use super::reference::Reference;
 use crate::curve::ForceKind;
+use crate::dataset::grid;
 use crate::error::Error;
 use crate::rating::acceptance::Acceptance;
 use crate::rating::{Quantity, Rating, RatingSettings, Signal, rate};
@@ -90,8 +92,8 @@ impl RowBuilder<'_> {
             max_crush_m: run.interfaces[0].max_deflection_m,
             simulation_s,
         };
-        let force: Vec<f64> = truth.deflection_m().iter().map(|&d| ours.force_at(d)).collect();
-        let force_l1 = Some(l1_ratio(truth.force_n(), &force));
+        let along = grid(truth.end_m(), STEPS);
+        let force_l1 = Some(l1_ratio(&forces_n(&truth, &along), &forces_n(&ours, &along)));
         let row = self.rated(name, made_from, curve.kind, motion, times)?;
         Ok(Row { force_l1, ..row })
     }

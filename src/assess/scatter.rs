@@ -1,6 +1,6 @@
 //! Scatter: deviation of nominally repeated runs from their mean, which no model can remove.
 
-use super::left_out::forces_n;
+use super::left_out::{STEPS, forces_n};
 use super::reference::Reference;
 use crate::curve::body::body_motion;
 use crate::curve::replicates::at_times;
@@ -9,9 +9,6 @@ use crate::dataset::{TrainingCase, TrainingSet, grid};
 use crate::signal::l1_ratio;
 use crate::surrogate::band;
 use crate::surrogate::leave_one_out::{BodyScatter, Scatter, SpeedScatter};
-
-/// Minimum number of steps along a run's crush at which forces are compared, as for left-out speeds.
-const STEPS: usize = 400;
 
 /// The scatter of the set's cases that are means of several of `cases`; `None` without any, or if
 /// none can be compared.

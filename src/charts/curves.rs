@@ -1,6 +1,7 @@
 //! Force over deflection: the runs of a group, predictions, and a left-out speed.
 
 use super::speed;
+use crate::assess::left_out::query_of;
 use crate::assess::reference::Reference;
 use crate::assess::validate::{Choice, train};
 use crate::curve::{Case, CurveUnloading, ForceCurve, ForceKind};
@@ -8,7 +9,7 @@ use crate::dataset::{TrainingSet, is_same_speed};
 use crate::error::{Error, error};
 use crate::plot::{self, Axis, Chart, Mark, Panel, Series, Shown};
 use crate::surrogate::band::{Band, LeftOutSpeeds};
-use crate::surrogate::{ModelCase, PredictedCurve, Query, predict};
+use crate::surrogate::{ModelCase, PredictedCurve, predict};
 use crate::unit::km_per_h;
 
 /// Axes of force over deflection.
@@ -286,8 +287,7 @@ pub fn left_out_at(
     };
     let others: Vec<Case> = cases.iter().filter(|c| !is_that(c)).cloned().collect();
     let model = train(group, &others, choice)?;
-    let curve =
-        predict(&model, &Query { extrapolate: true, ..Query::at(case.conditions.speed.m_per_s) })?;
+    let curve = predict(&model, &query_of(case, &model))?;
     let run = Reference::of(case)?.run(&curve.driving(moving_force(&curve))?)?;
     let motion = Some((&run.time_s[..], &run.bodies[0].v_m_per_s[..]));
     Ok(left_out(LeftOutPrediction { case, curve: &curve, motion }))

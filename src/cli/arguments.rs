@@ -1,11 +1,12 @@
 //! Arguments that several commands share, and the kind of an input file by its first bytes.
 
+use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
-use super::Failure;
+use super::{Failure, usage};
 use crate::curve::{ForceKind, Parameter};
 use crate::error::error;
 use crate::file;
@@ -47,6 +48,19 @@ pub(super) fn parameter(text: &str) -> Result<(String, Parameter), String> {
         Err(_) => Parameter::Category(value.into()),
     };
     Ok((name.into(), value))
+}
+
+/// Parameters by their names, each given once.
+pub(super) fn parameters(
+    given: &[(String, Parameter)],
+) -> Result<BTreeMap<String, Parameter>, Failure> {
+    let mut by_name = BTreeMap::new();
+    for (name, value) in given {
+        if by_name.insert(name.clone(), value.clone()).is_some() {
+            return usage(format!("--parameter {name}=… is given twice"));
+        }
+    }
+    Ok(by_name)
 }
 
 /// Histories of a solver's file by their options; what is not named is not narrowed.

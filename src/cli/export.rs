@@ -258,7 +258,7 @@ fn export(
         let model = input.model(format.name)?;
         let mut options = args.target.options(output);
         options.speeds_m_per_s.clone_from(&args.which.speed);
-        options.query = args.which.query();
+        options.query = args.which.query()?;
         let mut exported = format.export_model(model, &options)?;
         let warnings = std::mem::take(&mut exported.warnings);
         return Ok((exported, warnings));

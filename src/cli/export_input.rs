@@ -11,7 +11,7 @@ use crate::import::{self, Item, Settings};
 use crate::surrogate::{Model, PredictedCurve, Query, predict};
 use crate::unit::km_per_h;
 
-use super::arguments::FileKind;
+use super::arguments::{self, FileKind};
 use super::export::{Args, Which};
 use super::{Failure, usage};
 
@@ -99,14 +99,14 @@ impl Input {
 
 impl Which {
     /// The query to the model; the speed is set for each curve.
-    pub(super) fn query(&self) -> Query {
-        Query {
+    pub(super) fn query(&self) -> Result<Query, Failure> {
+        Ok(Query {
             mass_kg: self.mass,
             rule: self.max_crush,
             extrapolate: self.extrapolate,
-            parameters: self.parameter.iter().cloned().collect(),
+            parameters: arguments::parameters(&self.parameter)?,
             ..Query::at(0.0)
-        }
+        })
     }
 
     fn refuse_all(&self, what: &str) -> Result<(), Failure> {
@@ -160,7 +160,7 @@ impl Which {
             ));
         }
         let curve = |&speed: &f64| {
-            let query = Query { speed_m_per_s: speed, ..self.query() };
+            let query = Query { speed_m_per_s: speed, ..self.query()? };
             Ok(predict(model, &query)?)
         };
         self.speed.iter().map(curve).collect()
@@ -219,7 +219,7 @@ impl Args {
         let mut settings = Settings {
             group: self.which.group.as_deref().unwrap_or(&stem).into(),
             mass_kg: self.which.mass,
-            parameters: self.which.query().parameters,
+            parameters: self.which.query()?.parameters,
             ..self.file.settings()
         };
         settings.read.units = self.input_units;

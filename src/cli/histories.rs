@@ -54,8 +54,8 @@ pub(super) struct Args {
     /// entities [default: state by state]
     #[arg(long)]
     chunk: bool,
-    /// Replace an HDF5 file that is not a file of histories, such as a curve database
-    #[arg(long)]
+    /// The same as --overwrite
+    #[arg(long, hide = true)]
     force: bool,
 }
 
@@ -65,7 +65,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         ..selection(&args.ids, &args.components, args.section.as_deref())
     };
     let output = args.output.as_deref().filter(|path| !is_stdout(path));
-    let is_hdf5 = is_hdf5(args, output)?;
+    let is_hdf5 = is_hdf5(args, output, options)?;
     let deck = is_hdf5.then(|| decks::deck_next_to(&args.file)).flatten().map(|(_, deck)| deck);
     let (units, deck) = (args.units, deck.as_ref());
     let storage = Storage { single: args.f32, by_entity: args.chunk };
@@ -142,13 +142,13 @@ pub(super) fn check_section(
 }
 
 /// Whether HDF5 is written, else CSV; refuses what would be written over.
-fn is_hdf5(args: &Args, output: Option<&Path>) -> Result<bool, Failure> {
+fn is_hdf5(args: &Args, output: Option<&Path>, options: GlobalOptions) -> Result<bool, Failure> {
     if let Some(output) = output {
         let parts = solver::family(&args.file)?;
         parts.iter().try_for_each(|part| keep_input(part, output))?;
-        if !args.force && crate::history_hdf5::is_other_hdf5(output) {
+        if !(args.force || options.overwrite) && crate::history_hdf5::is_other_hdf5(output) {
             return usage(format!(
-                "{} is an HDF5 file without histories, such as a curve database: name another file, or replace it with --force",
+                "{} is an HDF5 file without histories, such as a curve database: name another file, or replace it with --overwrite",
                 output.display()
             ));
         }

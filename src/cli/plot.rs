@@ -7,7 +7,7 @@ use crate::assess::choose::Purpose;
 use crate::assess::train::compare_train;
 use crate::assess::validate::Choice;
 use crate::charts::{self, Motion, Quantity};
-use crate::curve::ForceKind;
+use crate::curve::{ForceKind, Parameter};
 use crate::database::Database;
 use crate::file::{self, write_all_whole};
 use crate::formats::ReadOptions;
@@ -59,6 +59,9 @@ pub(super) struct Args {
     /// Of a model: speed of the curve
     #[arg(long, value_parser = arguments::speed)]
     speed: Option<f64>,
+    /// Of a model: value of a further parameter, as NAME=VALUE; may be repeated
+    #[arg(long, value_parser = arguments::parameter, value_name = "NAME=VALUE")]
+    parameter: Vec<(String, Parameter)>,
     /// Of a scenario or result: quantity to draw
     #[arg(long, value_parser = one_of(QUANTITIES), default_value = "velocity")]
     quantity: Quantity,
@@ -254,6 +257,7 @@ impl Args {
             ),
             (self.left_out.is_some(), is(&[FileKind::Database]), "--left-out is for a database"),
             (self.speed.is_some(), is(&[FileKind::Model]), "--speed is for a model"),
+            (!self.parameter.is_empty(), is(&[FileKind::Model]), "--parameter is for a model"),
             (self.train, is(&[FileKind::Scenario]), "--train is for a scenario"),
             (!self.ids.is_empty(), of_solver, "--id is for a solver file"),
             (!self.components.is_empty(), of_solver, "--component is for a solver file"),
@@ -309,7 +313,9 @@ fn of_database(args: &Args, file: &Path, options: GlobalOptions) -> Result<Chart
 fn of_model(args: &Args, file: &Path) -> Result<Chart, Failure> {
     let model = Model::read(file)?;
     let Some(speed) = args.speed else { return Err(speed_of_model(&model)) };
-    of_force(args, predict(&model, &Query::at(speed))?, &model.cases)
+    let parameters = arguments::parameters(&args.parameter)?;
+    let query = Query { parameters, ..Query::at(speed) };
+    of_force(args, predict(&model, &query)?, &model.cases)
 }
 
 /// A curve, or its part of one force.

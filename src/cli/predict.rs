@@ -71,7 +71,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         speed_m_per_s: args.speed.unwrap_or_else(|| model.range_m_per_s().0),
         mass_kg: args.mass,
         rule,
-        parameters: args.parameter.iter().cloned().collect(),
+        parameters: arguments::parameters(&args.parameter)?,
         energy_correct: args.energy_correct,
         extrapolate: args.extrapolate,
     };

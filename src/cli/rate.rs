@@ -27,7 +27,7 @@ const MAX_TABLE_BYTES: u64 = 256 << 20;
 #[command(after_help = "Examples:
   crumple rate test.csv:x_acceleration 'result.csv:a_m_per_s2[A1]' --cfc 60
   crumple rate fe/nodout:900001:x_velocity,scale=0.001 'result.csv:v_m_per_s[A1]' --to 150ms
-  crumple rate 36kmh/nodout 48kmh/nodout --id 900001 --component x_acceleration --cfc 60 --json
+  crumple rate 36kmh/nodout:900001:x_acceleration,scale=-0.001 48kmh/nodout:900001:x_acceleration,scale=-0.001 --cfc 60 --json
   crumple rate fe/binout:rwforc/forces:1:normal_force fe/rwforc:1:normal_force
   crumple rate test.csv,time=ms model.csv,time=s
   crumple rate one.csv other.csv      # two results of crumple simulate: the acceptance rule, interface by interface

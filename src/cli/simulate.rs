@@ -227,13 +227,7 @@ fn print_energy(out: &mut dyn Write, ledger: &Ledger) -> io::Result<()> {
 }
 
 fn print_limits(out: &mut dyn Write, limits: &Limits<'_>) -> io::Result<()> {
-    let over = if !limits.beyond_data.is_empty() {
-        format!("unknown: {} went beyond the data of its curve", limits.beyond_data.join(", "))
-    } else if limits.over.is_empty() {
-        "no vehicle".into()
-    } else {
-        limits.over.join(", ")
-    };
+    let over = limits.text();
     let of = match &limits.trains {
         Some(trains) => format!(", of train {}", trains.join(", ")),
         None => String::new(),

@@ -267,7 +267,10 @@ fn say(
         global.warn(&format!("{warned} of {rows} items have warnings in their rows: {reasons}"));
     }
     let is_short = reached.is_some_and(|reached| !reached.is_reached);
-    let outcome = Outcome::warned_if(report.failed + report.warned > 0 || is_short);
+    let outcome = match report.failed {
+        failed if failed > 0 && failed == report.rows => Outcome::Partly,
+        failed => Outcome::warned_if(failed + report.warned > 0 || is_short),
+    };
     if is_stdout(output) {
         return Ok(outcome);
     }

@@ -11,7 +11,7 @@ use super::croissant;
 use crate::curve::body::body_force_n;
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
 use crate::dataset::grid;
-use crate::error::Error;
+use crate::error::{Error, error};
 use crate::file::{not_written, write_at};
 use crate::signal::l1_ratio;
 use crate::unit::SpeedKind;
@@ -27,6 +27,13 @@ pub(crate) fn write_tables(
     originals: bool,
     described_as: Option<&str>,
 ) -> Result<Vec<PathBuf>, Error> {
+    if path.is_file() {
+        return Err(error!(
+            Database,
+            "{} is a file: tables are written into a folder",
+            path.display()
+        ));
+    }
     std::fs::create_dir_all(path).map_err(|e| not_written(path, e))?;
     let mut written = Vec::new();
     let mut table = |name: &str, fill: &dyn Fn(&mut dyn Write) -> io::Result<()>| {

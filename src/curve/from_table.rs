@@ -24,7 +24,7 @@ fn impossible_table(impossible: energy::ImpossibleRun) -> Error {
     let (found, cause) = (impossible.found(), impossible.cause_in_file());
     error!(
         Other,
-        "{found}: such an impact is impossible; {cause}. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"
+        "{found}: such an impact is impossible; {cause}. Correct speed, mass or units (--speed, --mass, and --units or in crumple export --input-units), or take the curve as it is with --accept-energy"
     )
 }
 
@@ -187,7 +187,7 @@ fn remarks(curves: &RecordedCurves, impact: &Impact) -> Result<(Vec<String>, Vec
             let cause = "the times are in another unit, the speed is that of another run, or the test was slow (--time-column none takes its force over deflection without the times)";
             return Err(error!(
                 Other,
-                "{found}: such an impact is impossible; {cause}. Correct speed, mass or units (--speed, --mass, --units), or take the curve as it is with --accept-energy"
+                "{found}: such an impact is impossible; {cause}. Correct speed, mass or units (--speed, --mass, and --units or in crumple export --input-units), or take the curve as it is with --accept-energy"
             ));
         }
         warnings.push(format!("accept_energy: {found}"));

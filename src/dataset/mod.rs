@@ -119,7 +119,11 @@ pub(crate) fn feature_values(
         } else {
             format!(", one of {}", known.join(", "))
         };
-        error!(Dataset, "the model needs {}{among}: give it with the query", feature.parameter)
+        let name = &feature.parameter;
+        error!(
+            Dataset,
+            "the model needs {name}{among}: give --parameter {name}=…, or in a scenario parameters = {{ {name} = … }} of the curve"
+        )
     };
     let is_known = |feature: &Feature, parameter: &Parameter| match parameter {
         Parameter::Number(v) => feature.category.is_none() && v.is_finite(),

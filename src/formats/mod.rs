@@ -452,11 +452,12 @@ pub(crate) fn names() -> String {
 pub(crate) fn by_extension(path: &Path) -> Result<&'static Format, Error> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     let known = || {
-        let all: Vec<String> =
+        let mut all: Vec<String> =
             FORMATS.iter().flat_map(|f| f.extensions).map(|e| format!(".{e}")).collect();
+        all.dedup();
         all.join(", ")
     };
     FORMATS.iter().find(|f| f.extensions.contains(&extension)).ok_or_else(|| {
-        error!(Export, "{path}: the extension does not name an export format: use one of {known}, or name the format", known = known(), path = path.display())
+        error!(Export, "{path}: the extension does not name an export format: use one of {known}, or name the format with --to", known = known(), path = path.display())
     })
 }

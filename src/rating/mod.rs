@@ -263,8 +263,8 @@ fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Ve
         }
         if of.is_cut {
             warnings.push(format!(
-                "the {who} is still decelerated at {} s, where the interval ends: its mean deceleration covers the time up to then",
-                rating.to_s
+                "the {who} is still decelerated at {:.1} ms, where the interval ends: its mean deceleration covers the time up to then",
+                1e3 * rating.to_s
             ));
         }
     }

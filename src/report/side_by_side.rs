@@ -49,8 +49,8 @@ pub(super) fn add_scenarios(content: &mut Content, ran: Vec<Ran>) -> Result<(), 
     if ran.len() < 2 {
         return Ok(());
     }
-    let vehicles = names(ran.iter().flat_map(|of| &of.vehicles).map(|(name, _)| name));
-    let interfaces = names(ran.iter().flat_map(|of| &of.interfaces).map(|(name, _)| name));
+    let vehicles = names(ran.iter().flat_map(|of| &of.numbers.vehicles).map(|(name, _)| name));
+    let interfaces = names(ran.iter().flat_map(|of| &of.numbers.interfaces).map(|(name, _)| name));
     let conditions = Table::of(&ran)
         .column("scenario", |of| &of.name)
         .column("impact", |of| &of.impact)
@@ -62,8 +62,9 @@ pub(super) fn add_scenarios(content: &mut Content, ran: Vec<Ran>) -> Result<(), 
     }
     let g = |digits: usize| move |g: f64| format!("{g:.digits$} g");
     let m_per_s = |v: f64| format!("{v:.1} m/s");
-    let of_vehicles = |k: usize| move |of: &Ran, name: &str| found(&of.vehicles, name)?[k];
-    let of_interfaces = |k: usize| move |of: &Ran, name: &str| found(&of.interfaces, name)?[k];
+    let of_vehicles = |k: usize| move |of: &Ran, name: &str| found(&of.numbers.vehicles, name)?[k];
+    let of_interfaces =
+        |k: usize| move |of: &Ran, name: &str| found(&of.numbers.interfaces, name)?[k];
     let vehicle = Beside { what: "vehicle", names: &vehicles, ran: &ran };
     let interface = Beside { what: "interface", names: &interfaces, ran: &ran };
     parts.push(vehicle.part("Mean deceleration, each over its own contact", of_vehicles(0), g(2)));
@@ -72,7 +73,8 @@ pub(super) fn add_scenarios(content: &mut Content, ran: Vec<Ran>) -> Result<(), 
     parts.push(vehicle.part("Secondary impact after 0.6 m", of_vehicles(3), m_per_s));
     parts.push(vehicle.part("Occupant load", of_vehicles(4), g(1)));
     parts.push(interface.part("Maximum crush", of_interfaces(0), metres));
-    let energies = ran.iter().flat_map(|of| &of.interfaces).filter_map(|(_, [_, energy])| *energy);
+    let energies =
+        ran.iter().flat_map(|of| &of.numbers.interfaces).filter_map(|(_, [_, energy])| *energy);
     let shown = Shown::energy(energies.fold(0.0, f64::max));
     parts
         .push(interface.part("Energy absorbed", of_interfaces(1), |energy_j| shown.text(energy_j)));
@@ -92,8 +94,9 @@ pub(super) fn add_scenarios(content: &mut Content, ran: Vec<Ran>) -> Result<(), 
 
 /// Whether most vehicles of both are in both: others are no variants of one design.
 fn are_alike(a: &Ran, b: &Ran) -> bool {
-    let names =
-        |of: &Ran| of.vehicles.iter().map(|(name, _)| name.clone()).collect::<Vec<String>>();
+    let names = |of: &Ran| {
+        of.numbers.vehicles.iter().map(|(name, _)| name.clone()).collect::<Vec<String>>()
+    };
     let (a, b) = (names(a), names(b));
     let common = a.iter().filter(|name| b.contains(name)).count();
     2 * common >= a.len() + b.len() - common

@@ -12,7 +12,7 @@ use crate::assess::train::{TrainComparison, compare_train};
 use crate::charts::{self, Motion, Quantity, train_speeds};
 use crate::error::Error;
 use crate::multibody::{Body, Ledger, Method, Run};
-use crate::scenario::{self, CurveOrigin, Limits, Prepared, Summary};
+use crate::scenario::{self, CurveOrigin, Limits, Prepared, Scenario, Sources, Summary};
 use crate::table::Table;
 use crate::unit::{Shown, km_per_h};
 
@@ -24,6 +24,11 @@ pub(super) struct Ran {
     /// Curve and source, of each curve.
     pub curves: String,
     pub motion: Motion,
+    pub numbers: Numbers,
+}
+
+/// What a run comes to.
+pub(super) struct Numbers {
     /// By vehicle: mean, largest filtered and largest 120 ms mean deceleration, in g, and what its occupants meet.
     pub vehicles: Vec<(String, [Option<f64>; 5])>,
     /// By interface: largest crush in m and energy in J.
@@ -47,13 +52,18 @@ pub(super) fn add(
     settings: &ReportSettings,
 ) -> Result<Ran, Error> {
     let read = scenario::read(path)?;
-    let (prepared, origins) = scenario::load_with_origins(path)?;
+    let sources = Sources::read(path, &read)?;
+    let prepared = scenario::assemble(path, &read, &sources)?;
+    let origins = sources.origins(&read);
     let run = prepared.run()?;
     let number = content.sections.len() + 1;
     let name = name.to_string();
     let summary = prepared.summary(&run);
     let uncertainty = origins.iter().filter_map(|of| Some(of.left_out.as_ref()?.force_l1));
-    add_verdicts(content, &name, &summary, uncertainty.fold(0.0, f64::max));
+    let uncertainty = uncertainty.fold(0.0, f64::max);
+    let found = Numbers::of(&summary);
+    let edges = edges(path, &read, &sources);
+    add_verdicts(content, &name, &summary, uncertainty, &edges);
     let mut parts = vec![
         Part::Text(conditions(&prepared, &read.run.duration.0, &run)),
         Part::table("Vehicles", vehicles(&summary)),
@@ -61,6 +71,12 @@ pub(super) fn add(
     parts.push(Part::Text(VEHICLES.into()));
     parts.push(Part::table("Interfaces", interfaces(&summary)));
     parts.push(Part::Text(ledger(&run.ledger)));
+    if !edges.is_empty() {
+        let caption = |of: &str| format!("{of} over the bands of the curves");
+        parts.push(Part::table(caption("Vehicles"), ranges_of_vehicles(&found, &edges)));
+        parts.push(Part::table(caption("Interfaces"), ranges_of_interfaces(&found, &edges)));
+        parts.push(Part::Text(RANGES.into()));
+    }
     parts.push(Part::table("What drives the interfaces", curves(&origins)));
     parts.push(Part::table("Sequence", sequence(&summary)));
     if let Some(time_s) = summary.common_speed_time_s {
@@ -98,12 +114,7 @@ pub(super) fn add(
         parts.push(Part::table(caption, methods(&comparison)));
     }
     let ran = Ran {
-        vehicles: of_vehicles(&summary),
-        interfaces: summary
-            .interfaces
-            .iter()
-            .map(|of| (of.name.into(), [Some(of.history.max_deflection_m), of.energy_j]))
-            .collect(),
+        numbers: found,
         motion: runs.into_iter().next().map(|(_, motion)| motion).expect("there is one"),
         impact: impact(&prepared),
         curves: origins
@@ -118,27 +129,95 @@ pub(super) fn add(
     Ok(ran)
 }
 
-fn of_vehicles(summary: &Summary<'_>) -> Vec<(String, [Option<f64>; 5])> {
-    let vehicles = summary.bodies.iter().filter(|body| !body.is_crush_zone);
-    let numbers = vehicles.map(|body| {
-        let of = [
-            Some(body.mean_deceleration_g),
-            body.peak_deceleration_g,
-            body.moving_mean_deceleration_g,
-            body.secondary_impact_m_per_s,
-            body.occupant_load_g,
-        ];
-        (body.name.into(), of)
-    });
-    numbers.collect()
+impl Numbers {
+    fn of(summary: &Summary<'_>) -> Self {
+        let vehicles = summary.bodies.iter().filter(|body| !body.is_crush_zone);
+        let of_vehicle = vehicles.map(|body| {
+            let of = [
+                Some(body.mean_deceleration_g),
+                body.peak_deceleration_g,
+                body.moving_mean_deceleration_g,
+                body.secondary_impact_m_per_s,
+                body.occupant_load_g,
+            ];
+            (body.name.into(), of)
+        });
+        let of_interface = summary
+            .interfaces
+            .iter()
+            .map(|of| (of.name.into(), [Some(of.history.max_deflection_m), of.energy_j]));
+        Self { vehicles: of_vehicle.collect(), interfaces: of_interface.collect() }
+    }
+}
+
+/// The runs with all curves at the lower, and at the upper edge of their bands; none where a curve has no band or a run ends with an error.
+fn edges(path: &Path, read: &Scenario, sources: &Sources) -> Vec<Numbers> {
+    let at = |member: f64| {
+        let prepared = scenario::at_band_edge(path, read, sources, member)?;
+        let run = prepared.run().ok()?;
+        Some(Numbers::of(&prepared.summary(&run)))
+    };
+    [at(-1.0), at(1.0)].into_iter().collect::<Option<_>>().unwrap_or_default()
+}
+
+/// The least and the largest of the value that `of` finds in a run and at the edges.
+fn range(
+    found: &Numbers,
+    edges: &[Numbers],
+    of: impl Fn(&Numbers) -> Option<f64>,
+) -> Option<(f64, f64)> {
+    let all = std::iter::once(found).chain(edges).map(of).collect::<Option<Vec<f64>>>()?;
+    Some((
+        all.iter().copied().fold(f64::INFINITY, f64::min),
+        all.into_iter().fold(f64::NEG_INFINITY, f64::max),
+    ))
+}
+
+/// What the ranges say.
+const RANGES: &str = "From a run with every curve at the lower edge of its band to one with every curve at the upper edge. A band holds 90 % of the points of a curve that was left out; all at the same edge together are less likely than that.";
+
+/// Each vehicle's results over the bands.
+fn ranges_of_vehicles(found: &Numbers, edges: &[Numbers]) -> impl Into<Table> {
+    let of = |i: usize, k: usize| {
+        let range = range(found, edges, |n| n.vehicles.get(i)?.1[k]);
+        range.map_or("–".into(), |(low, high)| {
+            format!("{low:.2} to {high:.2} g").replace('-', "−")
+        })
+    };
+    Table::of(found.vehicles.iter().enumerate())
+        .column("vehicle", |(_, (name, _))| name)
+        .column("mean deceleration", move |(i, _)| of(*i, 0))
+        .column("peak (CFC 60)", move |(i, _)| of(*i, 1))
+        .column("120 ms mean", move |(i, _)| of(*i, 2))
+}
+
+/// Each interface's results over the bands.
+fn ranges_of_interfaces(found: &Numbers, edges: &[Numbers]) -> impl Into<Table> {
+    let of = |i: usize, k: usize, shown: &dyn Fn(f64) -> String| {
+        let range = range(found, edges, |n| n.interfaces.get(i)?.1[k]);
+        range.map_or("–".into(), |(low, high)| format!("{} to {}", shown(low), shown(high)))
+    };
+    let energies = found.interfaces.iter().filter_map(|(_, [_, energy_j])| *energy_j);
+    let energy = Shown::energy(energies.fold(0.0, f64::max));
+    Table::of(found.interfaces.iter().enumerate())
+        .column("interface", |(_, (name, _))| name)
+        .column("maximum crush", move |(i, _)| of(*i, 0, &metres))
+        .column("energy absorbed", move |(i, _)| of(*i, 1, &|energy_j| energy.text(energy_j)))
 }
 
 /// What is over a limit, what is not known, and where most of the energy goes.
 ///
-/// `force_error` is the largest mean error of its curves at left-out speeds: what is nearer to a limit is too close to call.
-fn add_verdicts(content: &mut Content, name: &str, summary: &Summary<'_>, force_error: f64) {
+/// Too close to call is a limit that lies between the results at the `edges` of the bands; without them what is nearer to it than
+/// `force_error`, the largest mean error of its curves at left-out speeds.
+fn add_verdicts(
+    content: &mut Content,
+    name: &str,
+    summary: &Summary<'_>,
+    force_error: f64,
+    edges: &[Numbers],
+) {
     if let Some(limits) = &summary.limits {
-        add_limits(content, name, summary, limits, force_error);
+        add_limits(content, name, summary, limits, (force_error, edges));
     } else {
         let text = "no limits are stated ([limits] in the scenario)".into();
         content.verdict(Verdict::known(name, text));
@@ -173,7 +252,7 @@ fn add_limits(
     name: &str,
     summary: &Summary<'_>,
     limits: &Limits<'_>,
-    force_error: f64,
+    (force_error, edges): (f64, &[Numbers]),
 ) {
     let what = format!(
         "mean deceleration above {} g ({}:{})",
@@ -192,28 +271,37 @@ fn add_limits(
             "unknown",
             format!("{what}: not known, because {beyond} went beyond the data of its curve"),
         );
-    } else if over.is_empty() {
-        verdict("kept", format!("{what}: no vehicle"));
-    } else {
+    } else if !over.is_empty() {
         verdict("over", format!("{what}: {}", over.join(", ")));
+    } else if limits.unknown.is_empty() {
+        verdict("kept", format!("{what}: no vehicle"));
+    }
+    if !limits.unknown.is_empty() && limits.beyond_data.is_empty() {
+        let unknown = limits.unknown.join(", ");
+        verdict("unknown", format!("{what}: the run ended before it is known of {unknown}"));
     }
     let limit_g = limits.mean_deceleration_limit_g;
-    let is_close = |g: f64| (g.abs() / limit_g - 1.0).abs() < force_error;
-    let close = summary
-        .bodies
-        .iter()
-        .filter(|body| !body.is_crush_zone && is_close(body.mean_deceleration_g));
-    let close: Vec<String> =
-        close.map(|body| format!("{} ({:.2} g)", body.name, body.mean_deceleration_g)).collect();
+    let found = Numbers::of(summary);
+    let close = found.vehicles.iter().enumerate().filter_map(|(i, (name, [g, ..]))| {
+        let of = |n: &Numbers| n.vehicles.get(i)?.1[0].map(f64::abs);
+        let (low, high) = range(&found, edges, of)?;
+        if edges.is_empty() {
+            let g = (*g)?;
+            let is_close = (g.abs() / limit_g - 1.0).abs() < force_error;
+            return is_close.then(|| format!("{name} ({g:.2} g)"));
+        }
+        (low..=high).contains(&limit_g).then(|| format!("{name} ({low:.2} to {high:.2} g)"))
+    });
+    let close = close.collect::<Vec<_>>().join(", ");
     if !close.is_empty() && limits.beyond_data.is_empty() {
-        verdict(
-            "unknown",
-            format!(
-                "closer to the limit of {limit_g} g than the curves' own mean force error of {}: {}",
-                percent(force_error),
-                close.join(", ")
+        let than = match edges {
+            [] => format!(
+                "closer to the limit of {limit_g} g than the curves' own mean force error of {}",
+                percent(force_error)
             ),
-        );
+            _ => format!("the limit of {limit_g} g lies within what the curves' bands give"),
+        };
+        verdict("unknown", format!("{than}: {close}"));
     }
     for of in &limits.occupants {
         let state =

@@ -6,7 +6,9 @@ use std::sync::Arc;
 use super::layout::{Connection, ConnectionKind, End, Layout, Role, layout};
 use super::place::{self, Origin};
 use super::spring::{Crush, Spring, crush_between, crush_end, plates, scale_error, spring};
-use super::{CheckedScenario, CurveInUse, CurveSource, LawName, LimitsTable, Prepared, Sources};
+use super::{
+    CheckedScenario, CurveInUse, CurveSource, LawName, LimitsTable, Prepared, Sources, TrainTable,
+};
 use crate::curve::Masses;
 use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::multibody::{Chain, Damping, EnvelopeEnd, ForceLaw, Interface, RunSettings, Tension};
@@ -65,6 +67,7 @@ pub(super) fn assemble_at(
             "resistance acts from the first contact on: the trains run up to it at the speeds given".into(),
         );
     }
+    warnings.extend(scenario.train.iter().filter_map(without_use));
     let limits = scenario.limits.clone();
     let limited = match &limits {
         Some(limits) => limited(scenario, &vehicles, limits),
@@ -86,6 +89,26 @@ pub(super) fn assemble_at(
         warnings,
         of_one,
         origin,
+    })
+}
+
+/// What a train says of interfaces that it does not have.
+fn without_use(train: &TrainTable) -> Option<String> {
+    let last = train.vehicles.last()?;
+    let is_alone = train.vehicles.len() == 1;
+    let keys = [
+        ("inner", is_alone && train.inner.is_some()),
+        ("gap", is_alone && train.gap.is_some()),
+        ("the gap of its last vehicle", last.gap.is_some()),
+    ];
+    let keys: Vec<&str> = keys.into_iter().filter(|(_, given)| *given).map(|(k, _)| k).collect();
+    (!keys.is_empty()).then(|| {
+        format!(
+            "train \"{}\": {} not used, because nothing is behind \"{}\"; the distance to what it hits is [contact] gap",
+            train.name,
+            if keys.len() == 1 { format!("{} is", keys[0]) } else { format!("{} are", keys.join(" and ")) },
+            last.name
+        )
     })
 }
 

@@ -53,6 +53,7 @@ impl Scenario {
             }
         }
         check_names(self)?;
+        check_models_of_ends(self)?;
         check_contact(self)?;
         let curves = self.curves.len();
         if curves > MAX_CURVES {
@@ -66,7 +67,9 @@ impl Scenario {
             check_keys(name, table)?;
         }
         let checked = check_values(self)?;
-        for curve in layout(&checked).slots.iter().filter_map(|slot| slot.joint.curve()) {
+        let inner = self.train.iter().filter_map(|train| train.inner.as_deref());
+        let layout = layout(&checked);
+        for curve in layout.slots.iter().filter_map(|slot| slot.joint.curve()).chain(inner) {
             if !self.curves.contains_key(curve) {
                 return Err(error!(Scenario, "there is no curve \"{curve}\" in [curves]: it has")
                     .names(curve, self.curve_names())
@@ -391,6 +394,35 @@ fn check_zones(vehicle: &VehicleTable, scenario: &Scenario) -> Result<(), Error>
 }
 
 /// Ends without a mass of their own come from models.
+fn check_models_of_ends(scenario: &Scenario) -> Result<(), Error> {
+    for vehicle in scenario.train.iter().flat_map(|train| &train.vehicles) {
+        for zone in vehicle.zones().filter(CrushZone::is_of_model) {
+            let Some(table) = scenario.curves.get(zone.curve) else { continue };
+            if table.model.is_some() {
+                continue;
+            }
+            let (name, curve) = (&vehicle.name, zone.curve);
+            let by_both = vehicle.ends.as_deref() == Some(curve);
+            let (end, instead) = match by_both {
+                true => (
+                    "ends",
+                    format!(
+                        "write front = {{ curve = \"{curve}\", mass = \"…t\" }} and rear likewise"
+                    ),
+                ),
+                false => (zone.end, "add mass = \"…t\"".into()),
+            };
+            return Err(error!(
+                Scenario,
+                "{end} of vehicle \"{name}\": curve \"{curve}\" is not a model, which would know the mass that is stopped: {instead}, or name a model"
+            )
+            .at(scenario.vehicle(name).key(end)));
+        }
+    }
+    Ok(())
+}
+
+/// What the ends of vehicles say that belongs to curves between bodies.
 fn check_ends(scenario: &Scenario) -> Result<(), Error> {
     for vehicle in scenario.train.iter().flat_map(|train| &train.vehicles) {
         for zone in vehicle.zones().filter(CrushZone::is_of_model) {
@@ -405,16 +437,6 @@ fn check_ends(scenario: &Scenario) -> Result<(), Error> {
             ];
             if let Some((key, _)) = foreign.into_iter().find(|(_, given)| *given) {
                 return Err(foreign_key(zone.curve, key, between));
-            }
-            if table.model.is_none() {
-                let by_both = vehicle.ends.as_deref() == Some(zone.curve);
-                let end = if by_both { "ends" } else { zone.end };
-                let vehicle = &vehicle.name;
-                return Err(error!(
-                    Scenario,
-                    "{end} of vehicle \"{vehicle}\" needs mass = \"…t\", or a model as its curve, which knows the mass that is stopped"
-                )
-                .at(scenario.vehicle(vehicle).key(end)));
             }
         }
     }

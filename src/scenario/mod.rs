@@ -152,3 +152,28 @@ pub(crate) fn load_with_origins(path: &Path) -> Result<(Prepared, Vec<CurveOrigi
     let sources = Sources::read(path, &scenario)?;
     Ok((assemble(path, &scenario, &sources)?, sources.origins(&scenario)))
 }
+
+/// A scenario whose curves of models and predictions all have the same edge of their bands, the lower (−1) or the upper (1); `None` if
+/// none has one. Ends of vehicles and curves with a rate have none, and a `band` of the scenario stays.
+pub(crate) fn at_band_edge(
+    path: &Path,
+    read: &Scenario,
+    sources: &Sources,
+    member: f64,
+) -> Option<Prepared> {
+    let zones = read.train.iter().flat_map(|train| &train.vehicles).flat_map(VehicleTable::zones);
+    let ends: Vec<&str> = zones.map(|zone| zone.curve).collect();
+    let mut changed = read.clone();
+    let is_free = |(name, table): &(&String, &mut CurveTable)| {
+        table.band.is_none()
+            && table.law != LawName::Rate
+            && !ends.contains(&name.as_str())
+            && sources.has_band(name)
+    };
+    let free = changed.curves.iter_mut().filter(is_free);
+    if free.map(|(_, table)| table.band = Some(member)).count() == 0 {
+        return None;
+    }
+    // A model may have a band that does not reach to the speed of an interface.
+    assemble(path, &check(path, &changed).ok()?, sources).ok()
+}

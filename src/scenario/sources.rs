@@ -154,6 +154,18 @@ impl Sources {
         }
     }
 
+    /// Whether a curve comes from a model or prediction with a band.
+    pub(super) fn has_band(&self, curve: &str) -> bool {
+        match self.curves.get(curve) {
+            Some(CurveSource::Model(model)) => {
+                let of = model.leave_one_out.as_ref();
+                of.is_some_and(|of| of.band.is_some() || of.body_band.is_some())
+            }
+            Some(CurveSource::Predicted(curve)) => curve.force_low_n.is_some(),
+            _ => false,
+        }
+    }
+
     /// Makes a model's crush law one without stopped mass, in which the contact force itself has the
     /// rate.
     pub(crate) fn without_stopped_mass(&mut self, curve: &str) {

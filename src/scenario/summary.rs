@@ -98,6 +98,8 @@ pub(crate) struct Limits<'a> {
     pub(crate) trains: &'a Option<Vec<String>>,
     /// Bodies whose mean deceleration is over it.
     pub(crate) over: Vec<&'a str>,
+    /// Bodies that are still loaded at the end: their mean may yet rise or fall.
+    pub(crate) unknown: Vec<&'a str>,
     /// Limits on what occupants meet.
     pub(crate) occupants: Vec<OccupantLimit<'a>>,
     /// Interfaces that were crushed beyond the data of their curves: then nothing here is a verdict.
@@ -110,8 +112,17 @@ impl Limits<'_> {
     pub(crate) fn are_broken(&self) -> Option<bool> {
         let is_broken =
             !self.over.is_empty() || self.occupants.iter().any(|of| !of.over.is_empty());
-        let is_known = is_broken || self.occupants.iter().all(|of| of.unknown.is_empty());
-        (is_known && self.beyond_data.is_empty()).then_some(is_broken)
+        let none_is_unknown =
+            self.unknown.is_empty() && self.occupants.iter().all(|of| of.unknown.is_empty());
+        ((is_broken || none_is_unknown) && self.beyond_data.is_empty()).then_some(is_broken)
+    }
+
+    /// Which bodies are over the limit of the mean deceleration, in words.
+    pub(crate) fn text(&self) -> String {
+        match &*self.beyond_data {
+            [] => known(&self.over, &self.unknown),
+            beyond => format!("unknown: {} went beyond the data of its curve", beyond.join(", ")),
+        }
     }
 }
 
@@ -133,16 +144,20 @@ impl OccupantLimit<'_> {
             "occupant_load_g" => ("occupant load", "g"),
             _ => ("secondary impact", "m/s"),
         };
-        let known = match (&*self.over, &*self.unknown) {
-            ([], []) => "no vehicle".into(),
-            ([], _) => "no vehicle of which it is known".into(),
-            (over, _) => over.join(", "),
-        };
-        let unknown = match &*self.unknown {
-            [] => String::new(),
-            names => format!("; the run ended before it is known of {}", names.join(", ")),
-        };
-        format!("{what} above {} {unit}: {known}{unknown}", self.limit)
+        format!("{what} above {} {unit}: {}", self.limit, known(&self.over, &self.unknown))
+    }
+}
+
+/// Bodies over a limit, and those of which it is not known.
+fn known(over: &[&str], unknown: &[&str]) -> String {
+    let known = match (over, unknown) {
+        ([], []) => "no vehicle".into(),
+        ([], _) => "no vehicle of which it is known".into(),
+        (over, _) => over.join(", "),
+    };
+    match unknown {
+        [] => known,
+        names => format!("{known}; the run ended before it is known of {}", names.join(", ")),
     }
 }
 
@@ -207,9 +222,11 @@ impl Prepared {
             mean_deceleration_limit_g: limits.mean_deceleration_g,
             trains: &limits.trains,
             over: judged()
+                .filter(|body| !body.still_loaded_at_end)
                 .filter(|body| body.mean_deceleration_g.abs() > limits.mean_deceleration_g)
                 .map(|body| body.name)
                 .collect(),
+            unknown: judged().filter(|b| b.still_loaded_at_end).map(|body| body.name).collect(),
             occupants: occupants(limits),
             beyond_data: run.beyond_data().map(|k| &*interfaces[k].name).collect(),
             statement: format!(

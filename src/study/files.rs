@@ -194,13 +194,17 @@ impl Study {
     pub(crate) fn locate<'a>(&'a self, entry: &'a RunEntry) -> Result<LocatedRun<'a>, Error> {
         let folder = self.folder.join(&entry.path);
         let there = file::if_there(fs::metadata(&folder)).map_err(|e| Error::io(&folder, e))?;
-        if !there.is_some_and(|meta| meta.is_dir()) {
-            let path = folder.display();
-            return Err(error!(
+        let path = folder.display();
+        let error = match there {
+            Some(meta) if meta.is_dir() => None,
+            Some(_) => Some(error!(Run, "{path} is a file: path is the folder of the run")),
+            None => Some(error!(
                 Run,
                 "the run's folder {path} does not exist: check path in the manifest"
-            )
-            .at(self.run_key(entry).key("path")));
+            )),
+        };
+        if let Some(error) = error {
+            return Err(error.at(self.run_key(entry).key("path")));
         }
         let recipe = &self.manifest.recipe;
         let forces = [("force", Some(&recipe.force)), ("contact", recipe.contact.as_ref())];

@@ -29,6 +29,8 @@ use crate::error::{Error, error};
 const POINTS: usize = 400;
 /// The body's motion is followed to this share of the longest training curve.
 const REACH: f64 = 1.5;
+/// A maximum crush above this share of that of the runs deserves a warning.
+const CRUSH_BEYOND: f64 = 1.01;
 
 /// The curve of `model` at the speed of `query`, with its audit and warnings.
 ///
@@ -198,8 +200,8 @@ impl<'a> Prediction<'a> {
         Ok(Corrected { envelope, factor: Some(factor) })
     }
 
-    /// The forces from a maximum crush on; `None` if it is as far as the motion is followed.
-    fn beyond(&self, max_crush_m: f64) -> Option<Beyond> {
+    /// The forces from a maximum crush on.
+    fn beyond(&self, max_crush_m: f64) -> Beyond {
         let Motion { asked, body, .. } = &self.motion;
         // Whole intervals of the curve, so that what goes on with it keeps its table even.
         let interval_m = max_crush_m / POINTS as f64;
@@ -207,16 +209,15 @@ impl<'a> Prediction<'a> {
         let further = body.deflection_m().iter().filter(|&&d| d > max_crush_m).map(|&d| on_grid(d));
         let mut deflection_m: Vec<f64> = std::iter::once(max_crush_m).chain(further).collect();
         deflection_m.dedup();
+        if deflection_m.len() == 1 {
+            // Further than the motion is followed: the last force is held.
+            deflection_m.push(max_crush_m + interval_m);
+        }
         let along = |force: &Envelope| deflection_m.iter().map(|&d| force.force_at(d)).collect();
         let force_n = along(&self.declared);
         let body_force_n = asked.model.has_body_force().then(|| along(body));
         let data_end_m = asked.model.largest_crush_m();
-        (deflection_m.len() > 1).then_some(Beyond {
-            data_end_m,
-            deflection_m,
-            force_n,
-            body_force_n,
-        })
+        Beyond { data_end_m, deflection_m, force_n, body_force_n }
     }
 
     /// The band around one force, with both branches where the collapse changes its mode; what was reported for the other
@@ -261,6 +262,10 @@ impl<'a> Prediction<'a> {
         let is_worse = |other: &f64| (other - 1.0).abs() > (energy - 1.0).abs();
         let unloading = over_speed(model, v, |c| c.unloading_stiffness_n_per_m);
         warnings.extend(asked.warnings(unloading, body_energy.filter(is_worse).unwrap_or(energy)));
+        let (crush_m, data_end_m) = (declared.end_m(), model.largest_crush_m());
+        if crush_m > CRUSH_BEYOND * data_end_m {
+            warnings.push(Warning::beyond_data(crush_m, data_end_m));
+        }
         let own = self.banded(model.force_kind, &declared, &mut warnings);
         let of_body = body
             .as_ref()
@@ -280,7 +285,7 @@ impl<'a> Prediction<'a> {
             force_n: declared.force_n().to_vec(),
             force_low_n: own.low_n,
             force_high_n: own.high_n,
-            beyond: self.beyond(end),
+            beyond: Some(self.beyond(end)),
             body_force_n: body.as_ref().map(|b| b.force_n().to_vec()),
             body_force_low_n: of_body.low_n,
             body_force_high_n: of_body.high_n,

@@ -21,7 +21,7 @@ pub struct Warning {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum WarningCode {
-    /// The speed or another parameter lies outside the training cases'.
+    /// The speed, another parameter or the maximum crush lies outside the training cases'.
     OutOfRange,
     /// A midpoint forest jumps here from one training curve to the next.
     NearSplitMidpoint,
@@ -216,6 +216,15 @@ impl Warning {
         Self {
             code: WarningCode::NoUnloading,
             message: "no training run holds an unloading branch: the unloading stiffness is the steepest rise of the curve".into(),
+        }
+    }
+
+    pub(crate) fn beyond_data(crush_m: f64, data_end_m: f64) -> Self {
+        Self {
+            code: WarningCode::OutOfRange,
+            message: format!(
+                "the maximum crush of {crush_m:.3} m lies beyond the {data_end_m:.3} m of the training runs: the force there is an assumption, and no band holds there"
+            ),
         }
     }
 

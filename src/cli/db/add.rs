@@ -9,7 +9,7 @@ use crate::import::{self, Item, Settings};
 use crate::unit::UnitSystem;
 
 use super::super::arguments::CurveFile;
-use super::arguments::{FORCES, mass, one_of, parameter, speed, units};
+use super::arguments::{FORCES, mass, one_of, parameter, parameters, speed, units};
 use super::list::{case_row, print_group};
 use super::{CommandResult, Failure, GlobalOptions, output, usage};
 
@@ -65,7 +65,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         group: group.clone(),
         mass_kg: args.mass,
         read: ReadOptions { units: args.units, force: args.force, ..said.read },
-        parameters: args.parameter.iter().cloned().collect(),
+        parameters: parameters(&args.parameter)?,
         replace: args.replace,
         ..said
     };

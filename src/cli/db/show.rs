@@ -94,12 +94,13 @@ fn print_case(out: &mut dyn Write, case: &Case) -> io::Result<()> {
     for source in &case.provenance.sources {
         writeln!(
             out,
-            "from {} ({} bytes, blake3 {}…, {} {})",
+            "from {} ({} bytes, blake3 {}…{})",
             source.absolute_path.as_ref().unwrap_or(&source.path),
             source.size_bytes,
             &source.blake3.get(..12).unwrap_or(&source.blake3),
-            source.solver.as_deref().unwrap_or("unknown solver"),
-            source.version.as_deref().unwrap_or("")
+            source.solver.as_deref().map_or(String::new(), |solver| {
+                format!(", {solver} {}", source.version.as_deref().unwrap_or("of unknown version"))
+            })
         )?;
     }
     for (name, value) in &case.conditions.parameters {

@@ -147,10 +147,11 @@ fn filter(class: u32, record: &mut Record) -> Result<Notes, ExtractError> {
 /// Notes on energy, impulse and the loading branch of a curve.
 fn audited(curve: &Curve, balance: energy::EnergyBalance) -> Notes {
     let mut remarks = Notes::default();
-    // Of a run that ended while loading: of what it had stopped by then.
+    let is_truncated = loading::loading_end(curve) + 1 == curve.time_s().len();
     if let Some(work) = balance.work.filter(|w| (w - 1.0).abs() > EnergyAudit::TOLERANCE) {
-        remarks
-            .warn(format!("energy: the curve absorbs {:.1} % of the kinetic energy", work * 100.0));
+        let of = if is_truncated { " lost up to the last state" } else { "" };
+        let share = work * 100.0;
+        remarks.warn(format!("energy: the curve absorbs {share:.1} % of the kinetic energy{of}"));
     }
     if let Some(impulse) = balance.impulse.filter(|i| (i - 1.0).abs() > energy::IMPULSE_TOLERANCE) {
         remarks.warn(format!(
@@ -158,7 +159,7 @@ fn audited(curve: &Curve, balance: energy::EnergyBalance) -> Notes {
             impulse * 100.0
         ));
     }
-    if loading::loading_end(curve) + 1 == curve.time_s().len() {
+    if is_truncated {
         remarks.warn(
             "truncated: the maximum deflection is at the last state, so the run ended while loading",
         );

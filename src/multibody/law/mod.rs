@@ -97,22 +97,22 @@ impl ForceLaw {
     }
 
     /// The law of a recorded motion: the unloading branch has its shape, and the energy of the
-    /// line of the unloading stiffness from the envelope's end.
+    /// line of the unloading stiffness from where the motion turned, at `turned_m`. The envelope may go on from there.
     ///
     /// A recorded force oscillates, but the energy stored in a structure does not.
     /// Therefore the storable energy is taken from the mean force `work/δ`, scaled to that
-    /// energy at the end, and only bounded by `cδF`.
-    pub fn recorded(
+    /// energy at `turned_m`, and only bounded by `cδF`.
+    fn recorded(
         envelope: Envelope,
         unloading: Unloading,
         shape: UnloadingShape,
-        end: EnvelopeEnd,
+        (turned_m, end): (f64, EnvelopeEnd),
     ) -> Self {
         let unloading = match unloading {
             Unloading::Elastic => unloading,
             Unloading::Memory { stiffness_n_per_m } => {
-                let (top, end_m) = (envelope.force_at(envelope.end_m()), envelope.end_m());
-                let mean = envelope.work() / end_m;
+                let top = envelope.force_at(turned_m);
+                let mean = envelope.work_to(turned_m) / turned_m;
                 let scale = (mean / top).powi(2);
                 let scale = if scale > 0.0 && scale.is_finite() { scale } else { 1.0 };
                 Unloading::Memory { stiffness_n_per_m: stiffness_n_per_m * scale }

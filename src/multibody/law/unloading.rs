@@ -210,7 +210,9 @@ impl ForceLaw {
         match &curve.unloading {
             CurveUnloading::Recorded { deflection_m, force_n, .. } => {
                 let shape = UnloadingShape::of_branch(deflection_m, force_n);
-                Self::recorded(loading, law, shape.unwrap_or_else(UnloadingShape::line), end)
+                let shape = shape.unwrap_or_else(UnloadingShape::line);
+                let turned_m = curve.data_end_m.unwrap_or(loading.end_m());
+                Self::recorded(loading, law, shape, (turned_m, end))
             }
             CurveUnloading::Unknown | CurveUnloading::Stiffness(_) => Self::new(loading, law, end),
         }
