@@ -181,7 +181,7 @@ fn what_is_not_as_it_should_be_is_said_with_what_to_do() {
         says(&error, expected);
         assert!(!here.join("study.toml").exists(), "{arguments:?}");
     };
-    // A wrong path is told with what is there.
+    // For a wrong path the message lists what is there.
     fails(&["run"], "run: No such file or directory (os error 2); did you mean runs?");
     fails(&["runs/36kmh", "runs/49kmh"], "runs/49kmh: No such file");
     fails(&["runs/49kmh"], "did you mean runs/48kmh?");

@@ -283,7 +283,7 @@ fn damage_in_the_middle_costs_one_state() {
         file.problems[0].to_string(),
         format!("byte {at}: state 51 is cut or damaged; it is left out")
     );
-    // Zeros among values can only be told from those around them.
+    // Zeros among values are known only by those around them.
     let mut zeroed = bytes;
     zeroed[at + 20..at + 48].fill(0);
     fs::write(&path, &zeroed).unwrap();

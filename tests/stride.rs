@@ -220,14 +220,14 @@ fn a_surprise_is_left_to_the_line_reader() {
 /// A file that is being written: its size changes while it is read.
 struct Live {
     bytes: Vec<u8>,
-    /// Size that is told, and bytes that are there when they are read.
-    told: u64,
+    /// Size that is stated, and bytes that are there when they are read.
+    stated: u64,
     there: u64,
 }
 
 impl Source for Live {
     fn size(&self) -> io::Result<u64> {
-        Ok(self.told)
+        Ok(self.stated)
     }
 
     fn read_at(&self, offset: u64, buffer: &mut [u8]) -> io::Result<usize> {
@@ -241,11 +241,11 @@ fn a_file_that_shrinks_or_grows_gives_its_complete_states() {
     let size = text.len() as u64;
     let whole = read(text.as_bytes(), &Selection::all());
     for there in (0..size).step_by(2_713).chain([size]) {
-        for told in [there / 2, there, size, size * 3] {
-            let live = Live { bytes: text.as_bytes().to_vec(), told, there };
+        for stated in [there / 2, there, size, size * 3] {
+            let live = Live { bytes: text.as_bytes().to_vec(), stated, there };
             let file = read_from("nodout", &[Box::new(live)], &Selection::all()).unwrap().remove(0);
             let cut = read(&text.as_bytes()[..there as usize], &Selection::all());
-            assert_eq!(content(&file), content(&cut), "{there} of {size}, {told} told");
+            assert_eq!(content(&file), content(&cut), "{there} of {size}, {stated} stated");
             for (a, b) in file.histories.iter().zip(&whole.histories) {
                 assert_eq!(a.values, b.values[..file.time.len()]);
             }

@@ -661,7 +661,7 @@ fn a_stated_precision_ends_a_sweep() {
     }
 }
 
-/// Runs of which a verdict is not known are no sample: the share they leave open is in the interval.
+/// Runs without a known verdict are left out of the sample: the share they leave open is in the interval.
 #[test]
 fn what_is_not_known_is_not_precise() {
     let plan = SPEEDS

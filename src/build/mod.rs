@@ -265,7 +265,7 @@ struct Previous {
     /// Cases whose run the study no longer has.
     pub left: Vec<CasePath>,
     /// If the database has no case of the study: groups with cases that were built from the manifest
-    /// when it was of another study or group, and are no run's.
+    /// when it belonged to another study or group; no run of this one has them.
     pub earlier: BTreeSet<String>,
 }
 

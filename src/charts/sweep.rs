@@ -7,7 +7,7 @@ use crate::multibody::STANDARD_GRAVITY_M_PER_S2;
 use crate::plot::{Axis, Band, Cell, Chart, Panel, Series, Shown};
 use crate::sweep::{ResultColumn, SweepColumns};
 
-/// More values than this are no grid that anyone wrote down.
+/// More values than this were not written down as a grid.
 const MOST_VALUES: usize = 60;
 /// Bins of a quantity that is drawn from a distribution.
 const BINS: usize = 12;

@@ -388,7 +388,7 @@ impl TrainingCase {
                 name = runs[0].id.name
             )
         };
-        // A copy of a run is no repetition of it.
+        // A copied run does not count as a repetition.
         let mut known = HashSet::new();
         let of_own = |run: &&&Case| known.insert(key_of(&run.curves.original));
         let runs: Vec<&Case> = runs.iter().filter(of_own).copied().collect();

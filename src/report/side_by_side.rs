@@ -92,7 +92,7 @@ pub(super) fn add_scenarios(content: &mut Content, ran: Vec<Ran>) -> Result<(), 
     Ok(())
 }
 
-/// Whether most vehicles of both are in both: others are no variants of one design.
+/// Whether most vehicles of both are in both: others are not variants of one design.
 fn are_alike(a: &Ran, b: &Ran) -> bool {
     let names = |of: &Ran| {
         of.numbers.vehicles.iter().map(|(name, _)| name.clone()).collect::<Vec<String>>()

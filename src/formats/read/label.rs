@@ -197,7 +197,7 @@ impl Label {
         Self { quantity, unit: unit.map(Into::into) }
     }
 
-    /// What a text names; `None` if it is no quantity of a curve.
+    /// What a text names; `None` if that is not a quantity of a curve.
     pub(super) fn parse(text: &str) -> Option<Self> {
         let text = text.trim().trim_matches('"').trim();
         if let Some((name, unit)) = in_brackets(text) {
