@@ -789,6 +789,9 @@ fn a_curve_file_of_any_format_drives_an_interface() {
         .unwrap();
     let (found, warnings) = crush("x.csv", "");
     assert!(found > 0.5 && warnings.contains("third quadrant"), "{found} {warnings}");
+    // Units beside those that the header states change nothing.
+    std::fs::write(here.join("few.csv"), "d_mm,F_kN\n0,0\n10,1000\n900,1500\n").unwrap();
+    assert_eq!(crush("few.csv", "").0, crush("few.csv", ", units = \"SI\"").0);
     // A record over time drives from its contact on.
     let rows: String = (0..=200)
         .map(|i| {

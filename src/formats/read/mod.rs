@@ -292,7 +292,7 @@ pub(crate) fn driving(path: &Path, options: &ReadOptions) -> Result<DrivingFile,
     }
     let has = |e: &str| path.extension().is_some_and(|found| found.eq_ignore_ascii_case(e));
     let mut error = None;
-    if (has("csv") || has("tsv")) && options.units.is_none() {
+    if has("csv") || has("tsv") {
         match found.as_they_stand() {
             Ok(curve) => return Ok(DrivingFile::Curve(Box::new(curve), Vec::new())),
             Err(plain) => error = Some(curve::content(path)(plain).at_key("points")),
