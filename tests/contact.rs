@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::common::{crumple_fails, crumple_in, crumple_ok, entries, fixture, says};
 use crumple::curve::Masses;
-use crumple::curve::{Extracted, Measured, MeasuredForce, Setup, Stated, extract};
+use crumple::curve::{Extracted, Measured, MeasuredForce, Setup, Stated, StatedContact, extract};
 use crumple::curve::{Recipe, RecordedMotion};
 use crumple::history::{EntityId, History};
 use crumple::solver::{self, Selection};
@@ -278,6 +278,25 @@ fn built(folder: &Path, entry: &str) -> serde_json::Value {
     crumple_ok(folder, "build study.toml -o c.h5");
     let shown = crumple_ok(folder, "db show c.h5 --group g --case r --json");
     serde_json::from_str(&shown).unwrap()
+}
+
+/// The state at a stated contact belongs to the curve: a right time leaves nothing out.
+#[test]
+fn a_stated_contact_at_a_state_is_exact() {
+    let run = Run::read(36);
+    let (whole, later) = (run.extract(), Run::read(36).after_flight(4));
+    for contact in [StatedContact::Time { s: 4.0 * INTERVAL_S }, StatedContact::Gap { m: 0.03 }] {
+        let stated = Stated { contact: Some(contact), ..Stated::default() };
+        let found = later.extract_with(CONTACT_RECIPE, stated).unwrap();
+        let warned = &found.quality.warnings;
+        assert!(!warned.iter().any(|w| w.contains("the curve leaves it out")), "{warned:?}");
+        assert!((crush(&found) / crush(&whole) - 1.0).abs() < 1e-6, "{contact:?}");
+    }
+    // A state late, what came before is missing.
+    let contact = Some(StatedContact::Time { s: 6.0 * INTERVAL_S });
+    let found = later.extract_with(CONTACT_RECIPE, Stated { contact, ..Stated::default() });
+    let warned = found.unwrap().quality.warnings;
+    assert!(warned.iter().any(|w| w.contains("the curve leaves it out")), "{warned:?}");
 }
 
 #[test]

@@ -804,3 +804,26 @@ fn formats_hold_what_they_declare() {
         assert!(has_band == format.band || format.name == "json", "{}", format.name);
     }
 }
+
+/// The header states the sign that the table below it has.
+#[test]
+fn headers_state_the_sign_of_their_tables() {
+    let folder = demo_folder();
+    for (words, is_elongation) in [
+        ("-o a.csv", false),
+        ("-o s08.k", false),
+        ("--material s06 -o s06.k", true),
+        ("--material mat121 -o m121.k", true),
+        ("-o a.rad", true),
+        ("-o a.inp", true),
+    ] {
+        crumple_ok(folder.path(), &format!("export lead50.json {words} -q"));
+        let file = words.split(' ').next_back().unwrap();
+        let text = std::fs::read_to_string(folder.path().join(file)).unwrap();
+        let sign = match is_elongation {
+            true => "sign: elongation positive, so a crush has a negative deflection and force",
+            false => "sign: deflection and force positive in compression",
+        };
+        assert!(text.contains(sign), "{file}");
+    }
+}

@@ -441,6 +441,30 @@ fn energies_of_interfaces_and_loads_of_occupants() {
     assert!(met > 5, "{met} occupants were restrained");
 }
 
+/// The speed of separation is that at the release, not that at the end of a step: long steps give the same.
+#[test]
+fn restitution_does_not_depend_on_the_step() {
+    let demo = demo_folder();
+    let demo = demo.path();
+    let text = std::fs::read_to_string(demo.join("eight-on-eight.toml")).unwrap();
+    let text: String =
+        text.lines().filter(|l| !l.starts_with("method")).map(|l| l.to_string() + "\n").collect();
+    let of = |method: &str| {
+        let text = text.replacen("[run]", &format!("[run]\nmethod = \"{method}\""), 1);
+        std::fs::write(demo.join("own.toml"), text).unwrap();
+        let result = json(&crumple_ok(demo, "simulate own.toml --json -q"));
+        result["summary"]["interfaces"].as_array().unwrap().clone()
+    };
+    let mut compared = 0;
+    for (a, b) in of("verlet").iter().zip(of("fourth_order")) {
+        if let (Some(a), Some(b)) = (a["restitution"].as_f64(), b["restitution"].as_f64()) {
+            assert!((a / b - 1.0).abs() < 0.01, "{a} and {b}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 4, "{compared}");
+}
+
 /// What happens when: contacts, stages, largest crush, mean decelerations and their spans, peaks by CFC 60 and the common
 /// speed, all by a second route from the histories.
 #[test]

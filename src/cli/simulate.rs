@@ -159,12 +159,13 @@ fn print(
     ledger: &Ledger,
     is_verbose: bool,
 ) -> io::Result<()> {
-    let largest_n = summary.interfaces.iter().map(|i| i.history.peak_force_n).fold(0.0, f64::max);
+    let loads_n = summary.interfaces.iter().filter_map(|i| i.load_n());
+    let largest_n = loads_n.fold(0.0, f64::max);
     let force = Shown::force(largest_n);
     let energy = Shown::energy(ledger.initial_kinetic_j);
     let interfaces = Table::of(&summary.interfaces)
         .column("interface", |i| i.name)
-        .column("peak force", |i| force.text(i.history.peak_force_n))
+        .column("peak force", |i| i.load_n().map_or("-".into(), |n| force.text(n)))
         .column("max crush", |i| format!("{:.3} m", i.history.max_deflection_m))
         .column("at", |i| format!("{:.1} ms", i.history.max_deflection_time_s * 1e3))
         .column("energy", |i| i.energy_j.map_or("-".into(), |j| energy.text(j)))

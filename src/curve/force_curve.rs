@@ -9,7 +9,7 @@
 //! 1. If faster runs show how the force continues (the curve comes from a model), it follows them, at the level with
 //!    which the curve ends. Otherwise the force changes within 5 % of the maximum crush to the mean over the curve's last tenth, if
 //!    that is more than its last force, and stays there.
-//! 2. At 1.5 times the maximum crush, or where the faster runs end, the structure is assumed to be fully crushed.
+//! 2. At 1.5 times the maximum crush, for a model at 1.5 times that of its fastest run, the structure is assumed to be fully crushed.
 //! 3. From there the force rises with the unloading stiffness (a steeper rise would change the unloading of tools that use the
 //!    steepest rise for it) to three times the curve's peak force.
 
@@ -297,11 +297,11 @@ impl Tail {
         match (self, follows_faster_runs) {
             (Self::None, _) => "none: the last point is the maximum crush",
             (Self::Hold, true) => {
-                "beyond max_deflection_m along faster runs, then the force is held"
+                "beyond max_deflection_m along faster runs to data_end_m, then the force is held"
             }
             (Self::Hold, false) => "beyond max_deflection_m the level of its last tenth is held",
             (Self::Bottom, true) => {
-                "beyond max_deflection_m along faster runs, then the force rises with the unloading stiffness"
+                "beyond max_deflection_m along faster runs to data_end_m, held to 1.5 times that, then the force rises with the unloading stiffness"
             }
             (Self::Bottom, false) => {
                 "beyond max_deflection_m the level of its last tenth is held to 1.5 times that, then the force rises with the unloading stiffness"

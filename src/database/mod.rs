@@ -431,8 +431,10 @@ const MAX_NAME: usize = 200;
 
 /// Why a text is not a name of a group or case, as a message says it of "it".
 pub(crate) fn check_name(name: &str) -> Result<(), &'static str> {
-    if name.trim().is_empty() || name == "." || name == ".." {
+    if name.trim().is_empty() {
         Err("it is blank")
+    } else if name == "." || name == ".." {
+        Err("HDF5 takes it for a place")
     } else if name.contains(|c: char| c.is_control() || c == '/') {
         Err("it may not contain \"/\" or control characters")
     } else if name.len() > MAX_NAME {

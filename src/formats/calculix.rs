@@ -32,10 +32,9 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
         }
         notes.push(curve.restitution_note("CalculiX", TargetUnloading::Elastic));
         line!(lines, "** {}", units.stated());
-        for (key, value) in curve.facts() {
+        for (key, value) in curve.facts_by_elongation() {
             line!(lines, "** {key}: {}", ascii(&value));
         }
-        line!(lines, "** elongation is positive: a crush stands as (-force, -deflection)");
         if options.deck {
             nodes(&mut lines, curve, units, id);
         }

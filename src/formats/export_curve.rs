@@ -277,6 +277,15 @@ impl ExportCurve {
         identifier(&self.file_stem())
     }
 
+    /// [`facts`](Self::facts) for tools whose springs are positive in elongation.
+    pub(crate) fn facts_by_elongation(&self) -> Vec<(&'static str, String)> {
+        let mut facts = self.facts();
+        if let Some((_, sign)) = facts.iter_mut().find(|(key, _)| *key == "sign") {
+            *sign = "elongation positive, so a crush has a negative deflection and force".into();
+        }
+        facts
+    }
+
     /// Description of a curve and its use, as keys and values of a file's header; SI.
     pub fn facts(&self) -> Vec<(&'static str, String)> {
         let curve = &self.predicted;

@@ -30,7 +30,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
             begin(&mut lines, curve, units, &stem);
         }
         line!(lines, "# {}", units.stated());
-        for (key, value) in curve.facts() {
+        for (key, value) in curve.facts_by_elongation() {
             line!(lines, "# {key}: {value}");
         }
         function(&mut lines, curve, units, id);

@@ -174,7 +174,7 @@ fn range(
 }
 
 /// What the ranges say.
-const RANGES: &str = "From a run with every curve at the lower edge of its band to one with every curve at the upper edge. A band holds 90 % of the points of a curve that was left out; all at the same edge together are less likely than that.";
+const RANGES: &str = "Smallest and largest of three runs: with the curves as they are, with every one at the lower edge of its band, and with every one at the upper. A band holds 90 % of the points of a curve that was left out; all at the same edge together are less likely than that.";
 
 /// Each vehicle's results over the bands.
 fn ranges_of_vehicles(found: &Numbers, edges: &[Numbers]) -> impl Into<Table> {
@@ -390,12 +390,12 @@ fn vehicles(summary: &Summary<'_>) -> impl Into<Table> {
 
 /// Crush and energy of each interface.
 fn interfaces(summary: &Summary<'_>) -> impl Into<Table> {
-    let largest_n = summary.interfaces.iter().map(|of| of.history.peak_force_n).fold(0.0, f64::max);
+    let largest_n = summary.interfaces.iter().filter_map(|of| of.load_n()).fold(0.0, f64::max);
     let largest_j = summary.interfaces.iter().filter_map(|of| of.energy_j).fold(0.0, f64::max);
     let (force, energy) = (Shown::force(largest_n), Shown::energy(largest_j));
     Table::of(&summary.interfaces)
         .column("interface", |of| of.name)
-        .column("peak force", move |of| force.text(of.history.peak_force_n))
+        .column("peak force", move |of| of.load_n().map_or("–".into(), |n| force.text(n)))
         .column("maximum crush", |of| metres(of.history.max_deflection_m))
         .column("time of it", |of| format!("{:.1} ms", 1e3 * of.history.max_deflection_time_s))
         .column("energy dissipated", |of| {

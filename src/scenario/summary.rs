@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::sequence::{Event, common_speed_time_s, sequence};
-use super::{CurveInUse, LimitsTable, Prepared};
+use super::{CurveInUse, LimitsTable, PLATES, Prepared};
 use crate::multibody::{Interface, InterfaceHistory, Run, STANDARD_GRAVITY_M_PER_S2};
 use crate::signal::cfc;
 
@@ -71,6 +71,13 @@ impl BodySummary<'_> {
     pub(crate) fn peak_text(&self) -> Option<String> {
         let (g, time_s) = self.peak_deceleration_g.zip(self.peak_deceleration_time_s)?;
         Some(format!("{g:.1} g, {:.0} ms", 1e3 * time_s))
+    }
+}
+
+impl InterfaceSummary<'_> {
+    /// The largest force; of plates, which are stopped at once, that would be their own impact and no load of a vehicle.
+    pub(crate) fn load_n(&self) -> Option<f64> {
+        (self.used.curve != PLATES).then_some(self.history.peak_force_n)
     }
 }
 

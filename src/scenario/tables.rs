@@ -111,7 +111,7 @@ fn default_interval() -> TimeText {
 pub(crate) enum InterfaceSpeed {
     /// The speed at which the trains meet.
     Train,
-    /// The interface's own closing speed.
+    /// The interface's own closing speed: the largest from the contact to the first peak of the force.
     #[default]
     Local,
 }

@@ -16,6 +16,8 @@ const CERTAIN_SHARE: f64 = 0.01;
 const MISSING_SHARE: f64 = 0.005;
 /// Impulse before the contact that the manifest states, as a share of the loading branch's, likewise.
 const EARLY_SHARE: f64 = 0.001;
+/// Times that differ by less than this share are one: files print seven digits.
+const SAME_TIME: f64 = 1e-6;
 
 /// Where contact begins, and how sure that is.
 pub(super) struct Start {
@@ -147,7 +149,8 @@ impl Start {
         if !matches!(self.by, StartBy::Manifest) && contact.time_s <= self.time_s {
             return remarks;
         }
-        let before = time_s.partition_point(|&t| t <= contact.time_s);
+        // A state at the contact itself is the curve's first.
+        let before = time_s.partition_point(|&t| t < contact.time_s * (1.0 - SAME_TIME));
         let early_ns = impulse(&time_s[..before], &force_n[..before]);
         let end = loading::loading_end(&contact.curve);
         let rest_ns = impulse(&contact.curve.time_s()[..=end], &contact.curve.force_n()[..=end]);

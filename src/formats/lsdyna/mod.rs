@@ -62,7 +62,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
         let units = InUnits(options.units.or(units).unwrap_or(UnitSystem::SI));
         // Of the loading branch and of the material; that of the unloading is one more.
         let id = options.id + 2 * k as u32;
-        describe(&mut lines, curve, units);
+        describe(&mut lines, curve, units, options.material);
         match options.material {
             Material::S08 => inelastic(&mut lines, curve, units, id),
             Material::Mat121 => discrete_beam(&mut lines, curve, units, id),
@@ -104,14 +104,18 @@ fn resampling_note(curve: &ExportCurve) -> Option<String> {
     })
 }
 
-fn describe(lines: &mut String, curve: &ExportCurve, units: InUnits) {
+fn describe(lines: &mut String, curve: &ExportCurve, units: InUnits, material: Material) {
     line!(lines, "$ {}", units.stated());
     line!(
         lines,
         "$ unloading stiffness in these units: {}",
         nine_digits(units.stiffness(curve.stiffness_n_per_m()))
     );
-    for (key, value) in curve.facts() {
+    let facts = match material {
+        Material::S08 => curve.facts(),
+        Material::Mat121 | Material::S06 => curve.facts_by_elongation(),
+    };
+    for (key, value) in facts {
         line!(lines, "$ {key}: {value}");
     }
 }

@@ -172,10 +172,13 @@ impl Engine<'_> {
             self.record_sides(k, time_of(at_m));
         }
         if let Some(at_m) = what.released_m {
+            let time_s = time_of(at_m);
             if compresses {
+                // Without what the neighbours have done to the two since.
+                let closing = closing - (end_s - time_s) * rate;
                 self.events.interfaces[k].released(-closing);
             }
-            self.record_sides(k, time_of(at_m));
+            self.record_sides(k, time_s);
         }
     }
 
