@@ -1456,6 +1456,45 @@ fn force_error(model: &Model, case: &TrainingCase) -> f64 {
     difference / level
 }
 
+/// A mass that crushes further than any run did is answered, with what is assumed.
+#[test]
+fn a_crush_beyond_the_runs_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let database = Database::read(&build_fixture(folder.path(), "lead-car-wall")).unwrap();
+    let set = TrainingSet::new("lead-car-wall", database.cases("lead-car-wall")).unwrap();
+    let model = Model::fit(&set, ModelKind::rate()).unwrap();
+    for (mass_t, is_beyond) in [(24.0, false), (60.0, true), (300.0, true)] {
+        let query = Query { mass_kg: Some(1e3 * mass_t), ..Query::at(50.0 / 3.6) };
+        let curve = predict(&model, &query).unwrap();
+        let says = "lies beyond the 1.626 m of the training runs";
+        let is_said = curve.warnings.iter().any(|w| w.message.contains(says));
+        assert_eq!(is_said, is_beyond, "{mass_t} t: {:?}", curve.warnings);
+        let data_end_m = curve.beyond.unwrap().data_end_m;
+        assert!((data_end_m - 1.626).abs() < 1e-3, "{mass_t} t: {data_end_m}");
+    }
+}
+
+/// FDRM is the model `nearest`: both tables measure its force alike.
+#[test]
+fn compare_and_validate_have_one_force_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-wall");
+    let json = |words: &str| -> Value {
+        serde_json::from_str(&crumple_ok(here, &format!("{words} curves.h5 --json -q"))).unwrap()
+    };
+    let compared = json("compare --speed 36km/h --nsdm-seeds 0");
+    let validated = json("validate");
+    let rows = compared["rows"].as_array().unwrap();
+    let fdrm = rows.iter().find(|row| row["method"] == "fdrm").unwrap();
+    let rows = validated["groups"][0]["rows"].as_array().unwrap();
+    let is_36 = |row: &&Value| row["model"] == "nearest" && row["speed_m_per_s"] == 10.0;
+    let nearest = rows.iter().find(is_36).unwrap();
+    let of = |row: &Value| row["force_l1"].as_f64().unwrap();
+    // The model's curve has other points and ends at its own crush.
+    assert!((of(fdrm) / of(nearest) - 1.0).abs() < 0.01, "{} {}", of(fdrm), of(nearest));
+}
+
 /// The advice of `--next`, judged: of every two speeds that are not neighbours, both left out, one
 /// is requested. What is left is the error at the other one, trained with the one that was run.
 #[test]
