@@ -155,7 +155,7 @@ fn a_killed_run_says_nothing_of_the_others() {
     let hint = "; binout0000 holds it too, and is read where there is no nodout\n";
     says(&printed, hint);
     fs::remove_file(here.join("runs/48kmh/binout0000")).unwrap();
-    // The run that died is damage to whoever asks for it.
+    // The run that died counts as damage for --strict.
     let strict = crumple_in(here, "init runs -o strict.toml --strict");
     assert_eq!(strict.status.code(), Some(3));
     // A force that was cut early tells as little, and is called by its end, not by another recipe.

@@ -174,7 +174,7 @@ fn range(
 }
 
 /// What the ranges say.
-const RANGES: &str = "Smallest and largest of three runs: with the curves as they are, with every one at the lower edge of its band, and with every one at the upper. A band holds 90 % of the points of a curve that was left out; all at the same edge together are less likely than that.";
+const RANGES: &str = "Smallest and largest of three runs: with the curves as they are, with every one that has a band at its lower edge, and at its upper. Ends of vehicles, curves with a rate and recorded curves have none and stay. A band holds 90 % of the points of a curve that was left out; all at the same edge together are less likely than that.";
 
 /// Each vehicle's results over the bands.
 fn ranges_of_vehicles(found: &Numbers, edges: &[Numbers]) -> impl Into<Table> {

@@ -150,7 +150,8 @@ impl Start {
             return remarks;
         }
         // A state at the contact itself is the curve's first.
-        let before = time_s.partition_point(|&t| t < contact.time_s * (1.0 - SAME_TIME));
+        let earliest_s = contact.time_s - SAME_TIME * contact.time_s.abs();
+        let before = time_s.partition_point(|&t| t < earliest_s);
         let early_ns = impulse(&time_s[..before], &force_n[..before]);
         let end = loading::loading_end(&contact.curve);
         let rest_ns = impulse(&contact.curve.time_s()[..=end], &contact.curve.force_n()[..=end]);
