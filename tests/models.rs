@@ -698,6 +698,15 @@ fn masses_are_a_parameter_where_they_differ() {
     assert!(predict(&model, &ask(None)).unwrap_err().to_string().contains("needs mass_kg"));
     let crush = |mass| predict(&model, &ask(Some(mass))).unwrap().max_deflection_m;
     assert!(crush(20e3) < crush(25e3) && crush(25e3) < crush(30e3));
+    // As a parameter it is the same mass.
+    let mass_kg = |value| BTreeMap::from([("mass_kg".into(), value)]);
+    let asked = Query { parameters: mass_kg(Parameter::Number(25e3)), ..Query::at(10.0) };
+    assert_eq!(predict(&model, &asked).unwrap(), predict(&model, &ask(Some(25e3))).unwrap());
+    let error = predict(&model, &Query { mass_kg: Some(20e3), ..asked }).unwrap_err();
+    says(&error.to_string(), "mass_kg is 25000, but the mass is given as 20000 kg");
+    let text = Query { parameters: mass_kg(Parameter::Category("abc".into())), ..Query::at(10.0) };
+    let error = predict(&model, &text).unwrap_err().to_string();
+    says(&error, "mass_kg is \"abc\": expected a mass in kg, above 0");
 }
 
 #[test]
@@ -786,6 +795,20 @@ fn pairs_of_unequal_masses() {
     };
     let crush = |other| predict(&model, &ask(other)).unwrap().max_deflection_m;
     assert!(crush(24e3) < crush(30e3));
+    // The other mass is known to what reads the curve, although all runs have the same two.
+    let of_one = |other_kg: f64| -> Vec<Case> {
+        let with = |case: &Case| {
+            let mut case = case.clone();
+            case.conditions.masses.other_kg = Some(other_kg);
+            case
+        };
+        cases.iter().map(with).collect()
+    };
+    for (other_kg, shown) in [(6e3, Some(Parameter::Number(6e3))), (24e3, None)] {
+        let model = train("made", &of_one(other_kg), Choice::Kind(ModelKind::linear())).unwrap();
+        let curve = predict(&model, &Query::at(11.0)).unwrap();
+        assert_eq!(curve.provenance.parameters.get("other_mass_kg"), shown.as_ref());
+    }
 }
 
 /// Speeds that no car has ever had: an answer with warnings or an error, soon.
@@ -1399,7 +1422,7 @@ fn a_crush_gives_its_speed() {
         (
             1,
             "--crush 3m",
-            "no speed between those of the runs gives a crush of 3 m: the model's crush goes from 0.111 m at 12 km/h",
+            "no speed between those of the runs gives a crush of 3 m: the model's crush goes from 0.1110 m at 12 km/h",
         ),
         (1, "--crush 1mm", "no speed between those of the runs gives a crush"),
         (2, "--crush 0.5", "has no unit"),

@@ -120,6 +120,9 @@ pub(crate) fn feature_values(
             format!(", one of {}", known.join(", "))
         };
         let name = &feature.parameter;
+        if name == MASS {
+            return error!(Dataset, "the model needs {name}, the mass of the body: give --mass");
+        }
         error!(
             Dataset,
             "the model needs {name}{among}: give --parameter {name}=…, or in a scenario parameters = {{ {name} = … }} of the curve"

@@ -58,7 +58,7 @@ impl FitInput<'_> {
 
     /// The crush law with stopped mass.
     pub(crate) fn crush_law(&self) -> Result<CrushLaw, Error> {
-        self.crush_law.cloned().ok_or(error!(Model, "model crush-law takes the mass stopped in the crush zone from momentum: it needs contact forces and speeds of a body against a wall, or of two bodies of equal mass, whose momentum agrees; the runs of this group do not qualify: use --model rate"))
+        self.crush_law.cloned().ok_or(error!(Model, "model crush-law takes the mass stopped in the crush zone from momentum: it needs contact forces and speeds of a body against a wall, or of two bodies of equal mass, whose momentum agrees; the runs of this group do not qualify, or show no stopped mass: use --model rate"))
     }
 }
 

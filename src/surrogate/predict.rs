@@ -22,7 +22,7 @@ use super::query::{Query, ResolvedQuery, over_speed};
 use super::spikes::without_spikes;
 use super::{Model, QueryPoint, Warning};
 use crate::curve::{Envelope, ForceCurve, ForceKind};
-use crate::dataset::{grid, nearest};
+use crate::dataset::{OTHER_MASS, grid, nearest};
 use crate::error::{Error, error};
 
 /// Points of a predicted curve besides (0, 0), as in the reference data.
@@ -338,7 +338,11 @@ fn provenance(
     let nearest = model.cases[nearest(speeds(), v)].speed_m_per_s;
     let (low, high) = model.range_m_per_s();
     let mut parameters = asked.parameters.clone();
-    parameters.retain(|name, _| model.features.iter().any(|f| f.parameter == *name));
+    let is_unequal = asked.masses.other_kg.is_some_and(|other| other != asked.masses.body_kg);
+    parameters.retain(|name, _| {
+        // Without it the other body of a pair has the mass of the first.
+        is_unequal && name == OTHER_MASS || model.features.iter().any(|f| f.parameter == *name)
+    });
     Provenance {
         case: None,
         written_by: concat!("crumple ", env!("CARGO_PKG_VERSION")).into(),

@@ -89,11 +89,19 @@ impl<'a> ResolvedQuery<'a> {
             ));
         }
         let mut parameters = query.parameters.clone();
-        let other = match parameters.get(OTHER_MASS) {
-            Some(Parameter::Number(mass)) if *mass > 0.0 && mass.is_finite() => Some(*mass),
-            _ => None,
-        };
-        let masses = match query.mass_kg {
+        let other = mass_among(&parameters, OTHER_MASS)?;
+        let as_parameter = mass_among(&parameters, MASS)?;
+        if let (Some(mass), Some(other)) = (query.mass_kg, as_parameter)
+            && mass != other
+        {
+            return Err(error!(
+                Prediction,
+                "{MASS} is {other}, but the mass is given as {mass} kg: give one of them"
+            )
+            .at(KeyPath::of("parameters").key(MASS)));
+        }
+        let asked_kg = query.mass_kg.or(as_parameter);
+        let masses = match asked_kg {
             Some(mass) => {
                 let other_kg = model.other_mass_kg.map(|_| other.unwrap_or(mass));
                 Masses { body_kg: mass, other_kg }
@@ -103,7 +111,7 @@ impl<'a> ResolvedQuery<'a> {
                 ..model.masses()
             },
         };
-        if let Some(mass) = query.mass_kg {
+        if let Some(mass) = asked_kg {
             parameters.insert(MASS.into(), Parameter::Number(mass));
         }
         if let Some(other) = masses.other_kg {
@@ -185,13 +193,28 @@ impl<'a> ResolvedQuery<'a> {
         }
         let mass_is_feature = self.model.features.iter().any(|f| f.parameter == MASS);
         if !mass_is_feature && !self.same_mass {
-            let trained_kg = self.model.masses().effective_kg();
-            warnings.push(Warning::other_mass(self.mass_kg, trained_kg));
+            warnings.push(Warning::other_mass(self.masses, self.model.masses()));
         }
         if (energy - 1.0).abs() > EnergyAudit::TOLERANCE {
             warnings.push(Warning::energy_mismatch(energy));
         }
         warnings
+    }
+}
+
+/// A mass in kg that the parameters give.
+fn mass_among(parameters: &BTreeMap<String, Parameter>, name: &str) -> Result<Option<f64>, Error> {
+    match parameters.get(name) {
+        None => Ok(None),
+        Some(Parameter::Number(kg)) if *kg > 0.0 && kg.is_finite() => Ok(Some(*kg)),
+        Some(other) => {
+            let found = match other {
+                Parameter::Number(number) => number.to_string(),
+                Parameter::Category(text) => format!("\"{text}\""),
+            };
+            let message = error!(Prediction, "{name} is {found}: expected a mass in kg, above 0");
+            Err(message.at(KeyPath::of("parameters").key(name)))
+        }
     }
 }
 

@@ -54,7 +54,7 @@ pub(crate) fn speed_of_crush(
     let speed_m_per_s = find(crush_m)?.ok_or_else(|| {
         error!(
             Prediction,
-            "no speed between those of the runs gives a crush of {crush_m} m: the model's crush goes from {:.3} m at {} to {:.3} m at {}",
+            "no speed between those of the runs gives a crush of {crush_m} m: the model's crush goes from {:.4} m at {} to {:.4} m at {}",
             crushes[0],
             km_per_h(low),
             crushes[INTERVALS],

@@ -5,8 +5,12 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use crate::curve::Masses;
 use crate::plural::counted;
 use crate::unit::{Shown, km_per_h};
+
+/// A mass that differs from the training runs' by such a factor is a mistaken unit rather than another vehicle.
+const UNLIKE_MASS: f64 = 10.0;
 
 /// Something to know before trusting a predicted curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -228,13 +232,26 @@ impl Warning {
         }
     }
 
-    pub(crate) fn other_mass(mass_kg: f64, trained_kg: f64) -> Self {
+    pub(crate) fn other_mass(asked: Masses, trained: Masses) -> Self {
+        let shown = |of: Masses| match of.other_kg.map(Shown::one_mass) {
+            None => Shown::one_mass(of.body_kg),
+            Some(_) if of.other_kg == Some(of.body_kg) => {
+                format!("{} each", Shown::one_mass(of.body_kg))
+            }
+            Some(other) => format!("{} against {other}", Shown::one_mass(of.body_kg)),
+        };
+        let ratio = asked.effective_kg() / trained.effective_kg();
+        let effect = if (1.0 / UNLIKE_MASS..UNLIKE_MASS).contains(&ratio) {
+            "rate effects are those of the training mass"
+        } else {
+            "so far from it, neither the curve nor its band is reliable: check the unit"
+        };
         Self {
             code: WarningCode::OtherMass,
             message: format!(
-                "the mass of {} differs from the training runs' {}: rate effects are those of the training mass",
-                Shown::one_mass(mass_kg),
-                Shown::one_mass(trained_kg)
+                "the mass of {} differs from the training runs' {}: {effect}",
+                shown(asked),
+                shown(trained)
             ),
         }
     }
