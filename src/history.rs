@@ -85,6 +85,19 @@ impl History {
             None => self.component.to_string(),
         }
     }
+
+    /// The sum of histories with the same times, under the name of the first; `None` if there is none, or their times differ.
+    pub(crate) fn sum(of: &[&Self]) -> Option<Self> {
+        let (first, others) = of.split_first()?;
+        let mut sum = Self::clone(first);
+        for other in others {
+            if other.time != sum.time {
+                return None;
+            }
+            sum.values.iter_mut().zip(&other.values).for_each(|(sum, value)| *sum += value);
+        }
+        Some(sum)
+    }
 }
 
 /// A hole in time: an interval without a state, far longer than those around it.

@@ -310,8 +310,20 @@ pub struct UnitSystem {
     pub time_s: f64,
 }
 
-const LENGTHS: &[(&str, f64)] = &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254)];
-const MASSES: &[(&str, f64)] = &[("kg", 1.0), ("t", 1e3), ("Mg", 1e3), ("g", 1e-3)];
+const LENGTHS: &[(&str, f64)] =
+    &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254), ("ft", 0.3048)];
+/// One pound-force, in N.
+const LBF_N: f64 = 0.45359237 * 9.80665;
+/// `slinch` and `slug` are those that a pound-force accelerates by 1 in/s² and 1 ft/s².
+const MASSES: &[(&str, f64)] = &[
+    ("kg", 1.0),
+    ("t", 1e3),
+    ("Mg", 1e3),
+    ("g", 1e-3),
+    ("lb", 0.45359237),
+    ("slug", LBF_N / 0.3048),
+    ("slinch", LBF_N / 0.0254),
+];
 const TIMES: &[(&str, f64)] = &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6)];
 
 impl UnitSystem {

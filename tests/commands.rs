@@ -191,10 +191,7 @@ fn energy_audits_of_all_groups() {
     let check = crumple_ok(folder.path(), "db check curves.h5");
     // At 3 km/h a step is a good part of the crush.
     let findings: Vec<&str> = check.lines().collect();
-    assert!(
-        findings[0]
-            .starts_with("vehicle-pair/3kmh: contact: it lies between two states 0.63 mm apart")
-    );
+    assert!(findings[0].starts_with("vehicle-pair/3kmh: contact: it lies within 0.63 mm"));
     assert_eq!(findings[1..], ["20 cases checked, 1 finding"], "{check}");
 }
 

@@ -352,6 +352,12 @@ fn impossible_runs_are_refused_with_their_likely_cause() {
         refused(run, &without("24t"), "SI", units);
         refused(run, &with("24t"), "mm-kg-ms", units);
         refused(run, &without("24t"), "mm-kg-ms", units);
+        // At a thousandth of the times a filter leaves nothing of the force.
+        let study = fs::read_to_string(study_of(folder.path(), run, &with("24t"), "mm-kg-ms"));
+        let filtered = study.unwrap().replace("filter = \"none\"", "filter = \"CFC60\"");
+        says(&filtered, "CFC60");
+        fs::write(folder.path().join("study.toml"), filtered).unwrap();
+        says(&crumple_fails(folder.path(), 1, "build study.toml -o d.h5"), units);
         let mass = "likely the mass (impulse and speeds give 2";
         refused(run, &with("12t"), "mm-t-s", mass);
         refused(run, &without("48t"), "mm-t-s", mass);

@@ -443,6 +443,24 @@ fn pairs_have_both_bodies() {
     assert_eq!(turned["recipe"]["deflection"]["node"].as_integer(), Some(9));
     assert!((number(&turned["run"][0]["mass"], "t") / 2.0 - 1.0).abs() < 1e-2);
     crumple_ok(&here, "build -q");
+    let exchanged = fs::read_to_string(here.join("study.toml")).unwrap();
+    let (mass, other) = (run["mass"].as_str().unwrap(), run["other_mass"].as_str().unwrap());
+    let exchanged = exchanged.replace(&format!("mass = \"{mass}\""), "mass = \"M\"");
+    let exchanged = exchanged.replace(&format!("\"{other}\""), &format!("\"{mass}\""));
+    fs::write(here.join("exchanged.toml"), exchanged.replace("\"M\"", &format!("\"{other}\"")))
+        .unwrap();
+    let said = warned(&here, "build exchanged.toml -o exchanged.h5");
+    says(&said, "mass: by the changes of velocity of the two bodies the other one has 1.6");
+    says(&said, "they are exchanged");
+    // What a model says of them has both masses, too.
+    crumple_ok(&here, "train curves.h5 --model nearest -o pair.model -q");
+    crumple_ok(&here, "predict pair.model --speed 57.6km/h -o pair.csv -q");
+    let csv = fs::read_to_string(here.join("pair.csv")).unwrap();
+    for (name, kg) in [("mass_kg", 1_200.0), ("other_mass_kg", 2_000.0)] {
+        let line = csv.lines().find_map(|line| line.strip_prefix(&format!("# {name}: ")));
+        let found: f64 = line.unwrap().parse().unwrap();
+        assert!((found / kg - 1.0).abs() < 1e-2, "{name}: {found}");
+    }
 }
 
 /// Bodies that meet each other and of which nothing but their motion is recorded.
@@ -733,7 +751,8 @@ fn a_run_that_died_early_says_where_its_record_ends() {
     let whole: Vec<&str> = forces.split_inclusive('\n').take(9 + 20).collect();
     fs::write(killed.join("rwforc"), whole.concat()).unwrap();
     let document = json(&crumple_ok(&here, "init --json -o force.toml"));
-    assert_eq!(left_out(&document), [("killed".into(), died.into())]);
+    let died = died.replace("ms,", "ms, where rwforc ends and the motion goes on,");
+    assert_eq!(left_out(&document), [("killed".into(), died)]);
 }
 
 #[test]
@@ -1127,4 +1146,118 @@ fn links_out_of_the_folder_are_followed_to_runs_only() {
     assert!(text.contains("36kmh"), "{text}{said}");
     let why = "runs/root: it is a link to /, which is not a run and lies outside";
     assert!(format!("{text}{said}").contains(why), "{text}{said}");
+}
+
+/// Two load cells with one half each: added where the kinetic energy says so, else the user is asked.
+#[test]
+fn forces_that_share_the_load_are_added() {
+    let history = Crash::default().run();
+    let half: Vec<f64> = history.contact_n.iter().map(|f| 0.5 * f).collect();
+    let cell = |id, title| Force { id, title, along_n: &half, across_n: 0.0 };
+    let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    for (run, with_energy) in [("known/50kmh", true), ("asked/50kmh", false)] {
+        let run = here.join(run);
+        layout.nodout(&run, &history, &car_nodes());
+        layout.rwforc(&run, &history, &[cell(1, "left"), cell(2, "right")]);
+        if with_energy {
+            layout.glstat(&run, &history);
+        }
+    }
+    crumple_ok(here, "init known -o known.toml");
+    let known = study(here, "known.toml");
+    assert_eq!(known["recipe"]["force"]["id"], toml::Value::from(vec![1, 2]));
+    assert!((number(&known["run"][0]["mass"], "t") / 1.2 - 1.0).abs() < 1e-2);
+    crumple_ok(here, "build known.toml -o known.h5 -q");
+
+    let said = warned(here, "init asked -o asked.toml");
+    says(
+        &said,
+        "the bodies follow rwforc 2 as they follow rwforc 1: if these share the load, write id = [1, 2] in force, and 2.00 times the masses",
+    );
+    let asked = study(here, "asked.toml");
+    assert_eq!(asked["recipe"]["force"]["id"].as_integer(), Some(1));
+    let text = fs::read_to_string(here.join("asked.toml")).unwrap();
+    let mass = asked["run"][0]["mass"].as_str().unwrap();
+    let doubled = format!("{}kg", 2.0 * number(&asked["run"][0]["mass"], "kg"));
+    let text = text.replace("id = 1,", "id = [1, 2],").replace(mass, &doubled);
+    fs::write(here.join("asked.toml"), text).unwrap();
+    crumple_ok(here, "build asked.toml -o asked.h5 -q");
+    let peak_n = |database: &str| -> f64 {
+        let database = Database::read(&here.join(database)).unwrap();
+        let case = database.all().next().unwrap();
+        case.curves.original.force_n().iter().copied().fold(0.0, f64::max)
+    };
+    assert!((peak_n("asked.h5") / peak_n("known.h5") - 1.0).abs() < 1e-6);
+    // A wall that is not there, or twice.
+    for (ids, what) in [
+        ("[1, 7]", "7"),
+        ("[1, 1]", "id is a number, or a list of different numbers"),
+        ("[]", "id is"),
+    ] {
+        let text = fs::read_to_string(here.join("known.toml")).unwrap();
+        fs::write(here.join("wrong.toml"), text.replace("id = [1, 2]", &format!("id = {ids}")))
+            .unwrap();
+        says(&crumple_fails(here, 1, "build wrong.toml -o wrong.h5"), what);
+    }
+}
+
+/// CFC 60 would smooth away the pulse of a crash of some milliseconds.
+#[test]
+fn short_impacts_get_a_filter_that_leaves_their_work() {
+    // 50 kg stopped from 3 m/s by a constant force within 5 ms.
+    let (mass_kg, speed, deceleration, contact_s) = (50.0, 3.0, 600.0, 0.02);
+    let mut history = History { bodies: vec![Default::default()], ..History::default() };
+    for k in 0..600 {
+        let time_s = 1e-4 * f64::from(k);
+        let braked_s = (time_s - contact_s).clamp(0.0, speed / deceleration);
+        let is_braked = time_s > contact_s && time_s <= contact_s + speed / deceleration;
+        history.time_s.push(time_s);
+        history.contact_n.push(if is_braked { mass_kg * deceleration } else { 0.0 });
+        let body = &mut history.bodies[0];
+        let moved_m = speed * (time_s.min(contact_s) + braked_s);
+        body.displacement_m[4].push(moved_m - 0.5 * deceleration * braked_s * braked_s);
+        body.velocity_m_per_s[4].push(speed - deceleration * braked_s);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
+    let run = here.join("sled/a");
+    let ground = Node { id: 1, title: "ground", on: None, shakes: 0.0 };
+    layout.nodout(&run, &history, &[ground, node(5, "", 0, 4, 0.0)]);
+    let wall = Force { id: 1, title: "", along_n: &history.contact_n, across_n: 0.0 };
+    layout.rwforc(&run, &history, &[wall]);
+    crumple_ok(here, "init sled --units mm-t-s --mass 50kg -o s.toml");
+    let filter = study(here, "s.toml")["recipe"]["filter"].as_str().unwrap().to_string();
+    assert_ne!(filter, "CFC60");
+    let text = fs::read_to_string(here.join("s.toml")).unwrap();
+    says(&text, "the impacts are short: CFC 60 would take");
+    let said = warned(here, "build s.toml -o s.h5");
+    assert!(!said.contains("filter:"), "{said}");
+    let usual = text.replace(&format!("filter = \"{filter}\""), "filter = \"CFC60\"");
+    fs::write(here.join("s.toml"), usual).unwrap();
+    says(&warned(here, "build s.toml -o s.h5"), "filter: CFC60 takes");
+}
+
+/// A body that slows down shortly before the force begins: nothing that acts on it all the time.
+#[test]
+fn a_force_that_is_recorded_late_is_no_gravity() {
+    let history = Crash { gap_m: 0.3, ..Crash::default() }.run();
+    let late = 25;
+    let mut force_n = vec![0.0; late];
+    force_n.extend(&history.contact_n[..history.contact_n.len() - late]);
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
+    let run = here.join("car/a");
+    layout.nodout(&run, &history, &car_nodes());
+    let wall = |along_n| Force { id: 1, title: "", along_n, across_n: 0.0 };
+    layout.rwforc(&run, &history, &[wall(&history.contact_n)]);
+    crumple_ok(here, "init car -o s.toml");
+    let said = warned(here, "build s.toml -o s.h5");
+    assert!(!said.contains("free flight"), "{said}");
+    layout.rwforc(&run, &history, &[wall(&force_n)]);
+    let said = warned(here, "build s.toml -o s.h5");
+    says(&said, "nearly all of it in the second half of that time: the force is recorded late");
 }

@@ -27,8 +27,8 @@ use crate::unit::UnitSystem;
   crumple export --list
 
 Beyond the maximum crush, files for multi-body tools continue along faster runs where a model has
-them, else at the mean level of the curve's last tenth up to 1.5 times the maximum crush, and then
-rise with the unloading stiffness. --tail changes this.
+them, else at the curve's last force (or the mean of its last tenth if that is more) up to 1.5 times the
+maximum crush, and then rise with the unloading stiffness. --tail changes this.
 
 ONNX: input is records, double, N x 2: speed_m_per_s, deflection_m (then the model's further
 parameters); output is force_N, float, N x 1. Splits are evaluated in double; the force is rounded to float (6e-8).")]
@@ -112,7 +112,11 @@ pub(super) struct Target {
 /// What a curve does beyond its maximum crush.
 const TAILS: &[(&str, Tail, &str)] = &[
     ("none", Tail::None, "Nothing: the last point is the maximum crush"),
-    ("hold", Tail::Hold, "Continues along faster runs, or at the mean level of its last tenth"),
+    (
+        "hold",
+        Tail::Hold,
+        "Continues along faster runs, or at its last force or the mean of its last tenth, whichever is more",
+    ),
     ("bottom", Tail::Bottom, "The same, and then rises with the unloading stiffness"),
 ];
 

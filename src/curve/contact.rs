@@ -63,7 +63,11 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
         i => {
             let share = (threshold_n - force_n[i - 1]) / (force_n[i] - force_n[i - 1]);
             let crossing_s = time_s[i - 1] + share.clamp(0.0, 1.0) * (time_s[i] - time_s[i - 1]);
-            let gone = (0..i).rev().find(|&k| force_n[k] <= GONE * threshold_n).unwrap_or(0);
+            let mut gone = (0..i).rev().find(|&k| force_n[k] <= GONE * threshold_n).unwrap_or(0);
+            // A force that rises gently begins further down.
+            while gone > 0 && force_n[gone] > 0.0 && force_n[gone - 1] < force_n[gone] {
+                gone -= 1;
+            }
             (crossing_s, Some(time_s[i] - time_s[gone]))
         }
     };

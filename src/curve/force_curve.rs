@@ -299,12 +299,14 @@ impl Tail {
             (Self::Hold, true) => {
                 "beyond max_deflection_m along faster runs to data_end_m, then the force is held"
             }
-            (Self::Hold, false) => "beyond max_deflection_m the level of its last tenth is held",
+            (Self::Hold, false) => {
+                "beyond max_deflection_m the last force is held, or the mean of the last tenth if that is more"
+            }
             (Self::Bottom, true) => {
                 "beyond max_deflection_m along faster runs to data_end_m, held to 1.5 times that, then the force rises with the unloading stiffness"
             }
             (Self::Bottom, false) => {
-                "beyond max_deflection_m the level of its last tenth is held to 1.5 times that, then the force rises with the unloading stiffness"
+                "beyond max_deflection_m the last force, or the mean of the last tenth if that is more, is held to 1.5 times that, then the force rises with the unloading stiffness"
             }
         }
     }

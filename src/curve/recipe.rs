@@ -122,6 +122,8 @@ pub enum ForceSource {
         file: String,
         /// Number of the wall or interface.
         id: i64,
+        /// Further ones that share the load: their forces are added.
+        also: Vec<i64>,
         /// Side of an interface; a wall has none.
         side: Option<Side>,
         /// Component of the force, such as `normal_force`.
@@ -144,8 +146,10 @@ impl std::fmt::Display for ForceSource {
     /// `x_force of rcforc 3:surfa`, or `mass times the rate of x_velocity of nodout 900001`.
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Contact { file, id, side, component } => {
-                write!(f, "{component} of {file} {}", EntityId { id: *id, side: *side })
+            Self::Contact { file, id, also, side, component } => {
+                write!(f, "{component} of {file} {}", EntityId { id: *id, side: *side })?;
+                let side = *side;
+                also.iter().try_for_each(|&id| write!(f, " + {}", EntityId { id, side }))
             }
             Self::Body { file, node, motion, component } => {
                 let rate = match motion {
@@ -173,9 +177,9 @@ pub enum RecordedMotion {
 struct ForceTable {
     /// File in the run's folder.
     file: String,
-    /// Wall or interface of a contact force.
+    /// Wall or interface of a contact force; several are added.
     #[serde(skip_serializing_if = "Option::is_none")]
-    id: Option<i64>,
+    id: Option<Ids>,
     /// Side of an interface: "surfa" (slave) or "surfb" (master).
     #[serde(skip_serializing_if = "Option::is_none")]
     side: Option<String>,
@@ -187,6 +191,14 @@ struct ForceTable {
     /// "mass" makes a body force of the node's acceleration.
     #[serde(skip_serializing_if = "Option::is_none")]
     times: Option<String>,
+}
+
+/// One number, or several.
+#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected the number of a wall or contact, or a list of numbers")]
+enum Ids {
+    One(i64),
+    Several(Vec<i64>),
 }
 
 impl TryFrom<ForceTable> for ForceSource {
@@ -206,7 +218,19 @@ impl TryFrom<ForceTable> for ForceSource {
                         })
                     })
                     .transpose()?;
-                Ok(Self::Contact { file, id, side, component })
+                let ids = match id {
+                    Ids::One(id) => vec![id],
+                    Ids::Several(ids) => ids,
+                };
+                let mut distinct = ids.clone();
+                distinct.sort_unstable();
+                distinct.dedup();
+                match ids.split_first() {
+                    Some((&id, also)) if distinct.len() == ids.len() => {
+                        Ok(Self::Contact { file, id, also: also.to_vec(), side, component })
+                    }
+                    _ => Err("id is a number, or a list of different numbers".into()),
+                }
             }
             (None, Some(_), _) if side.is_some() => {
                 Err("a node has no side: remove side, or give the id of an interface".into())
@@ -239,9 +263,12 @@ impl TryFrom<ForceTable> for ForceSource {
 impl From<ForceSource> for ForceTable {
     fn from(source: ForceSource) -> Self {
         match source {
-            ForceSource::Contact { file, id, side, component } => Self {
+            ForceSource::Contact { file, id, also, side, component } => Self {
                 file,
-                id: Some(id),
+                id: Some(match also.is_empty() {
+                    true => Ids::One(id),
+                    false => Ids::Several([&[id], &also[..]].concat()),
+                }),
                 side: side.map(|s| s.name().into()),
                 node: None,
                 component,

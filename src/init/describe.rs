@@ -160,11 +160,15 @@ impl Facts<'_> {
         let source = ForceSource::Contact {
             file: force.file.into(),
             id: force.id,
+            also: force.also.clone(),
             side: named.as_ref().and_then(|named| named.side).or(force.side),
             component: component.unwrap_or_else(|| force.component.into()),
         };
         if named.is_some() {
             Proposed::found(source, Given, "by --force")
+        } else if !force.also.is_empty() {
+            let from = "they share the load: together they give the bodies their mass";
+            Proposed::found(source, Computed, from)
         } else if other_forces.is_empty() {
             let from = "the only force along the motion, and the bodies follow it";
             Proposed::found(source, Computed, from)
@@ -183,21 +187,48 @@ impl Facts<'_> {
         });
         let coarsest = self.impacts().map(|(_, impact)| impact.interval_s).fold(0.0, f64::max);
         let proposed = measure::filter(means, coarsest);
-        let mut cuts = vec![None; self.records.len()];
-        let Some(Filter::Cfc(class)) = proposed.value() else { return (proposed, cuts) };
+        let none = vec![None; self.records.len()];
+        if *proposed.value().unwrap_or(&Filter::None) == Filter::None {
+            return (proposed, none);
+        }
+        let (cuts, by_usual) = match self.filtered(measure::CLASSES[0]) {
+            Ok((cuts, kept)) if kept >= cfc::KEPT => return (proposed, cuts),
+            Ok(found) => found,
+            Err(from) => return (Proposed::found(Filter::None, Computed, from), none),
+        };
+        let higher = measure::CLASSES[1..].iter().find_map(|&class| {
+            let (cuts, kept) = self.filtered(class).ok()?;
+            (kept >= cfc::KEPT).then_some((Filter::Cfc(class), cuts))
+        });
+        let (filter, cuts) = higher.unwrap_or((Filter::None, vec![None; cuts.len()]));
+        (Proposed::found(filter, Computed, taken(by_usual)), cuts)
+    }
+
+    /// For each run a time at which a filter needs it to be cut, and the smallest share of a run's work that it keeps; else
+    /// why it cannot be used.
+    fn filtered(&self, class: u32) -> Result<(Vec<Option<f64>>, f64), String> {
+        let (mut cuts, mut least) = (vec![None; self.records.len()], 1.0_f64);
         for ((record, impact), cut) in self.impacts().zip(&mut cuts) {
             let (time, force) = (&impact.force_time_s, &impact.force_n);
-            let fits = |states: usize| cfc::filter(*class, &time[..states], &force[..states]);
+            let fits = |states: usize| cfc::filter(class, &time[..states], &force[..states]);
             let Some(last) = force.len().checked_sub(1) else { continue };
-            let Err(error) = fits(last + 1) else { continue };
-            if fits(last).is_err() {
-                let from = format!("run {}: {error}", record.run.name);
-                let none = vec![None; self.records.len()];
-                return (Proposed::found(Filter::None, Computed, from), none);
-            }
-            *cut = Some(0.5 * (time[last - 1] + time[last]));
+            let filtered = match fits(last + 1) {
+                Ok(filtered) => filtered,
+                Err(error) => {
+                    *cut = Some(0.5 * (time[last - 1] + time[last]));
+                    fits(last).map_err(|_| format!("run {}: {error}", record.run.name))?
+                }
+            };
+            let path = record.path_while_loading();
+            // Filtered, a force begins ahead of the contact, where the curve does not.
+            let contact = time.partition_point(|&t| t < impact.contact_s);
+            let loading = contact.min(path.len())..path.len().min(filtered.values.len());
+            let of = |force: &[f64]| force[loading.clone()].to_vec();
+            let kept = cfc::work_kept(&of(&filtered.values), &of(force), &of(&path));
+            // Without a path there is no work.
+            least = least.min(if kept.is_nan() { 1.0 } else { kept });
         }
-        (proposed, cuts)
+        Ok((cuts, least))
     }
 
     /// What the user should check.
@@ -207,6 +238,23 @@ impl Facts<'_> {
             warnings.push(format!(
                 "no node's velocity follows the impulse of a force closely (residual {} %): several bodies in a row, or a force on part of the body? Check node and force",
                 percent(recipe.residual)
+            ));
+        }
+        let given = self.hints.mass_kg.zip(self.units.value()).map(|(kg, u)| kg / u.mass_kg);
+        let is_whole = |record: &Record| {
+            record.over_momentum(given).is_some_and(|ratio| is_near(ratio, 1.0, SAME_MASS))
+        };
+        if let Some(force) = &recipe.force
+            && force.also.is_empty()
+            && self.hints.force.is_none()
+            && !recipe.beside.ids.is_empty()
+            && !self.records.iter().any(is_whole)
+        {
+            let (file, id, whole) = (force.file, force.id, recipe.beside.whole);
+            let ids: Vec<String> = recipe.beside.ids.iter().map(i64::to_string).collect();
+            let ids = ids.join(", ");
+            warnings.push(format!(
+                "the bodies follow {file} {ids} as they follow {file} {id}: if these share the load, write id = [{id}, {ids}] in force, and {whole:.2} times the masses"
             ));
         }
         if self.force_is_of_section() {
@@ -407,6 +455,12 @@ impl Facts<'_> {
         }
         Some(format!("by their velocities {times} times the mass: use --other-mass"))
     }
+}
+
+/// Why not the usual class, which keeps so much of the work.
+fn taken(kept: f64) -> String {
+    let (usual, taken) = (measure::CLASSES[0], 100.0 * (1.0 - kept));
+    format!("the impacts are short: CFC {usual} would take {taken:.1} % of the work from the force")
 }
 
 /// Speeds in a folder's name and the run's own deck that contradict the record.

@@ -183,8 +183,8 @@ pub(super) fn differ(masses: &[Proposed<f64>]) -> Option<String> {
     })
 }
 
-/// Class that is proposed, that of domain practice for forces of crash structures.
-const CFC: u32 = 60;
+/// Classes that are proposed: that of domain practice for forces of crash structures, and those for shorter impacts.
+pub(super) const CLASSES: [u32; 4] = [60, 180, 600, 1000];
 /// Finer records are sampled at this interval: CFC 60 leaves nothing that needs more.
 const FINEST_S: f64 = 1e-4;
 const MOST_STATES: f64 = 20_000.0;
@@ -205,18 +205,19 @@ pub(super) fn interval(time: &[f64]) -> f64 {
 
 /// `means`: why the forces are means over their intervals, if they are.
 pub(super) fn filter(means: Option<&str>, interval_s: f64) -> Proposed<Filter> {
-    let longest_s = 1.0 / (10.0 * f64::from(CFC));
+    let usual = CLASSES[0];
+    let longest_s = 1.0 / (10.0 * f64::from(usual));
     let ms = digits(interval_s * 1e3);
     match means {
         Some(why) => Proposed::found(Filter::None, Read, why),
         None if interval_s <= longest_s => {
             let from = format!("the usual class; one force every {ms} ms allows it");
-            Proposed::found(Filter::Cfc(CFC), Guessed, from)
+            Proposed::found(Filter::Cfc(usual), Guessed, from)
         }
         None => {
             let needed = digits(longest_s * 1e3);
             let from = format!(
-                "one force every {ms} ms is too coarse for CFC {CFC}, which needs one every {needed} ms"
+                "one force every {ms} ms is too coarse for CFC {usual}, which needs one every {needed} ms"
             );
             Proposed::found(Filter::None, Computed, from)
         }

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::describe::{Facts, stated_units};
 use super::folders::{Folders, LeftOut, Reason, names, no_usable_run, seen_from};
-use super::measure::Impact;
+use super::measure::{Impact, SAME_MASS, is_near};
 use super::recipe::CommonRecipe;
 use super::record::{Record, Run};
 use super::sources::Sources;
@@ -53,6 +53,7 @@ pub(crate) fn propose(
     let records = record(runs, &recipe, &mut left_out);
     let records = without_duplicates(records, &mut left_out);
     let (units, records, warnings) = agree_on_units(records, hints, &mut left_out);
+    let (recipe, records) = adding_shares(recipe, records, units.value(), hints, &mut left_out);
     let folder = folder_of(study);
     let (mut records, unnamed): (Vec<Record>, Vec<Record>) =
         records.into_iter().partition(|record| seen_from(folder, &record.run.path).is_some());
@@ -176,6 +177,30 @@ fn record(runs: Vec<Run>, recipe: &CommonRecipe, left_out: &mut Vec<LeftOut>) ->
     records
 }
 
+/// Where the bodies have the mass that several forces give them together, by their kinetic energy or by the caller, these
+/// are added.
+fn adding_shares(
+    mut recipe: CommonRecipe,
+    records: Vec<Record>,
+    units: Option<&UnitSystem>,
+    hints: &UserHints,
+    left_out: &mut Vec<LeftOut>,
+) -> (CommonRecipe, Vec<Record>) {
+    let whole = recipe.beside.whole;
+    let given = hints.mass_kg.zip(units).map(|(kg, units)| kg / units.mass_kg);
+    let ratios = || records.iter().filter_map(|record| record.over_momentum(given));
+    let all_agree = ratios().count() > 0 && ratios().all(|r| is_near(r, whole, SAME_MASS));
+    let may_share = hints.force.is_none() && !recipe.beside.ids.is_empty() && all_agree;
+    let Some(force) = recipe.force.as_mut().filter(|_| may_share) else {
+        return (recipe, records);
+    };
+    force.also = recipe.beside.ids.clone();
+    let runs = records.into_iter().map(|record| record.run).collect();
+    recipe.members = recipe.members.into_iter().filter(Result::is_ok).collect();
+    let records = record(runs, &recipe, left_out);
+    (recipe, records)
+}
+
 /// Leaves out runs whose histories are those of another.
 fn without_duplicates(records: Vec<Record>, left_out: &mut Vec<LeftOut>) -> Vec<Record> {
     let is_same = |a: &Record, b: &Record| {
@@ -240,7 +265,9 @@ fn agree_on_units(
             end: match units.value() {
                 Some(units) => milliseconds(end * units.time_s),
                 None => format!("{end} in the file's unit of time"),
-            },
+            } + &record.force_ends.as_ref().map_or(String::new(), |file| {
+                format!(", where {file} ends and the motion goes on")
+            }),
             share: record.loading_end().err().unwrap_or_default(),
             damage: record.damage() + &others,
         };

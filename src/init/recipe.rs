@@ -27,6 +27,8 @@ pub(super) struct CommonRecipe {
     /// `None` if no force moves the bodies: then mass times acceleration is used.
     pub force: Option<ForceCandidate>,
     pub other_forces: Vec<Alternative>,
+    /// Walls or contacts that may share the load with the force.
+    pub beside: Beside,
     /// What the chosen nodes leave of the impulse in the run where they follow it worst.
     pub residual: f64,
     /// The same for what one body of a pair leaves of the other's change of velocity, if no force
@@ -45,6 +47,14 @@ pub(super) struct ChosenNode {
     pub title: Option<String>,
     pub residual: f64,
     pub others: Vec<Alternative>,
+}
+
+/// Forces of the same file that the bodies follow as well as the chosen one.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Beside {
+    pub ids: Vec<i64>,
+    /// The impulse of all, the chosen one among them, over that of the chosen one.
+    pub whole: f64,
 }
 
 /// What else could be meant, and how well it would do.
@@ -94,7 +104,10 @@ impl CommonRecipe {
             view.explained = view.takes(&key, kind, hints);
         }
         let (kind, direction, force) = key;
-        let (force, other_forces) = force.and_then(|_| chosen_force(&views)).unzip();
+        let (force, other_forces, beside) = match force.and_then(|_| chosen_force(&views)) {
+            Some((force, others, beside)) => (Some(force), others, beside),
+            None => Default::default(),
+        };
         let explained = views.iter().filter_map(|view| view.explained.as_ref().ok()?.as_ref());
         let opposed = explained.map(|explained| explained.residual).fold(0.0, f64::max);
         let given = [hints.node, hints.minus_node];
@@ -107,7 +120,8 @@ impl CommonRecipe {
             direction,
             opposed: (force.is_none() && kind == StudyKind::Pair).then_some(opposed),
             force,
-            other_forces: other_forces.unwrap_or_default(),
+            other_forces,
+            beside,
             residual: nodes.iter().map(|node| node.residual).fold(0.0, f64::max),
             bodies: surveys.iter().map(|survey| survey.bodies.len()).max().unwrap_or(0),
             members: views.iter().map(|view| view.check_nodes(&nodes, are_given)).collect(),
@@ -317,7 +331,7 @@ fn choose(
 
 /// The force that the members share, as the recipe names it, and those that could be meant; `None`
 /// if none moves them.
-fn chosen_force(views: &[RunView<'_>]) -> Option<(ForceCandidate, Vec<Alternative>)> {
+fn chosen_force(views: &[RunView<'_>]) -> Option<(ForceCandidate, Vec<Alternative>, Beside)> {
     let of_members: Vec<(&Survey, &ForceCandidate)> = views
         .iter()
         .filter_map(|view| {
@@ -327,10 +341,22 @@ fn chosen_force(views: &[RunView<'_>]) -> Option<(ForceCandidate, Vec<Alternativ
         .collect();
     let (first, force) = *of_members.first()?;
     let others = first.forces.iter().enumerate();
-    let others = others
+    let others: Vec<(&ForceCandidate, f64)> = others
         .filter(|(_, other)| (other.file, other.id) != (force.file, force.id))
         .filter_map(|(k, other)| Some((other, of_force(first, k, None)?.residual)))
         .filter(|(_, residual)| *residual < RELATED)
+        .collect();
+    let last = |force: &ForceCandidate| force.impulse.last().copied().unwrap_or(0.0);
+    let shares = others.iter().filter(|(other, residual)| {
+        let is_alike = other.file == force.file && other.side == force.side;
+        let is_contact = ["rwforc", "rcforc"].contains(&force.file);
+        is_alike && is_contact && *residual < FOLLOWS && last(other) * last(force) > 0.0
+    });
+    let (ids, sizes): (Vec<i64>, Vec<f64>) =
+        shares.map(|(other, _)| (other.id, other.size() / force.size())).unzip();
+    let beside = Beside { ids, whole: 1.0 + sizes.iter().sum::<f64>() };
+    let others = others
+        .into_iter()
         .take(NAMED)
         .map(|(other, residual)| Alternative {
             id: format!("{} {}", other.file, other.id),
@@ -346,7 +372,7 @@ fn chosen_force(views: &[RunView<'_>]) -> Option<(ForceCandidate, Vec<Alternativ
     let mut components = of_members.iter().map(|(_, force)| force.component);
     let component = components.find(|c| *c != "normal_force").unwrap_or(force.component);
     let other_side = of_members.iter().all(|(_, force)| force.other_side);
-    Some((ForceCandidate { component, other_side, ..force.clone() }, others))
+    Some((ForceCandidate { component, other_side, ..force.clone() }, others, beside))
 }
 
 fn title_before(title: &Option<String>) -> String {

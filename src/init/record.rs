@@ -10,6 +10,7 @@ use super::sources::{Source, Sources, component, impulse, picked, rising, veloci
 use super::survey::{STOPPED, Survey, bracketed};
 use super::units::Magnitudes;
 use crate::history::{EntityId, History};
+use crate::signal::interpolate;
 use crate::solver::WantedId;
 use crate::study::StudyKind;
 
@@ -23,6 +24,8 @@ pub(super) struct Run {
 
 /// A force below this share of its largest is none.
 const NO_FORCE: f64 = 0.01;
+/// A motion that goes on for more states than this goes on without its force.
+const FURTHER: usize = 3;
 /// A flight after the contact that is shorter than this, in states and as a share of the record,
 /// gives no mass.
 const FREE: (usize, f64) = (5, 0.03);
@@ -40,6 +43,8 @@ pub(super) struct Record {
     pub force: Vec<f64>,
     /// At the motion's times.
     impulse: Vec<f64>,
+    /// The force's file, if it ends before the motion.
+    pub force_ends: Option<String>,
     /// Damage of the files, for messages.
     pub damage: Vec<String>,
     /// The smaller number of states of its files.
@@ -79,15 +84,25 @@ impl Record {
         }
         let (mut time, mut all) = (picked(&read.time, &states), read.time.len());
         let (mut force_time, mut force, mut impulses) = (Vec::new(), Vec::new(), Vec::new());
+        let mut force_ends = None;
         if let Some(chosen) = &recipe.force {
             let unusable = |why: String| Reason::Unusable { why };
             let source = run.sources.force(chosen.file);
             let source = source.ok_or_else(|| unusable(format!("it has no {}", chosen.file)))?;
-            let id = WantedId { id: chosen.id, side: chosen.side };
-            let read = source.read(Some(vec![id]), &[chosen.component])?;
-            let history = read.histories.first().ok_or_else(|| {
-                unusable(format!("{} has no {} of {id}", source.shown(), chosen.component))
+            let ids = [&[chosen.id], &chosen.also[..]].concat();
+            let side = chosen.side;
+            let wanted = ids.iter().map(|&id| WantedId { id, side }).collect();
+            let read = source.read(Some(wanted), &[chosen.component])?;
+            let of = |id: &i64| {
+                let is = |history: &&History| history.entity.is_some_and(|of| of.id == *id);
+                read.histories.iter().find(is)
+            };
+            let history = ids.iter().map(of).collect::<Option<Vec<_>>>();
+            let history = history.and_then(|of| History::sum(&of)).ok_or_else(|| {
+                let (path, component) = (source.shown(), chosen.component);
+                unusable(format!("{path} has no {component} of {ids:?} at the same times"))
             })?;
+            let history = &history;
             impulses = impulse(history, &time).ok_or_else(|| {
                 let (history, file) = (history.label(), source.shown());
                 unusable(format!("{history} of {file} holds values that are not numbers"))
@@ -99,6 +114,7 @@ impl Record {
             let last = force_time[force_time.len() - 1];
             let reach = last + 0.5 * (last - force_time[force_time.len() - 2]);
             let kept = time.iter().take_while(|&&t| t <= reach).count();
+            force_ends = (kept + FURTHER < time.len()).then(|| source.shown());
             for values in [&mut time, &mut travel, &mut impulses].into_iter().chain(&mut velocities)
             {
                 values.truncate(kept);
@@ -117,6 +133,7 @@ impl Record {
             force_time,
             force,
             impulse: impulses,
+            force_ends,
             damage,
             states: all,
             impact: None,
@@ -145,6 +162,15 @@ impl Record {
             None if self.closing(last) < STOPPED * self.closing(0) => Ok(last),
             None => Err(self.closing(last) / self.closing(0)),
         }
+    }
+
+    /// What the body has moved at the times of the force, up to the end of the loading; in the file's unit.
+    pub(super) fn path_while_loading(&self) -> Vec<f64> {
+        let end = self.loading_end().unwrap_or(self.time.len() - 1);
+        let until = |t: &&f64| **t <= self.time[end];
+        // Before the first state of the motion nothing has moved.
+        let times = self.force_time.iter().take_while(until).map(|t| t.max(self.time[0]));
+        interpolate(&self.time, &self.travel, &times.collect::<Vec<_>>()).unwrap_or_default()
     }
 
     /// The first and the last time at which a force acts.
@@ -185,6 +211,12 @@ impl Record {
             by_energy: kg(&by_energy, k),
         };
         (0..self.velocities.len()).map(estimates).collect()
+    }
+
+    /// The first body's mass, given or by kinetic energy, over that by momentum.
+    pub(super) fn over_momentum(&self, given: Option<f64>) -> Option<f64> {
+        let mass = given.or_else(|| self.masses_by_energy()?.first().copied())?;
+        Some(mass / self.masses_by_momentum()?.0.first()?)
     }
 
     /// The bodies' masses by momentum, `∫F dt / Δv`: after the contact, where both rest (and whether

@@ -73,6 +73,8 @@ pub(super) struct NodeCandidate {
 pub(super) struct ForceCandidate {
     pub file: &'static str,
     pub id: i64,
+    /// Others of the file that share the load with it.
+    pub also: Vec<i64>,
     /// `None` where it has no sides, or is one side only without saying which.
     pub side: Option<Side>,
     /// Whether the other side has the same force.
@@ -231,6 +233,7 @@ fn force_candidates(
             let candidate = ForceCandidate {
                 file: source.name,
                 id: entity.id,
+                also: Vec::new(),
                 side: entity.side,
                 other_side: false,
                 component,

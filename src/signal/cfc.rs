@@ -26,6 +26,18 @@ const EQUAL: f64 = 0.02;
 /// and times of six digits, but not a change of the output interval.
 const MAX_SPREAD: f64 = 0.6;
 
+/// Of the work of a force a class must keep this share, else it is too low for the impact.
+pub(crate) const KEPT: f64 = 0.97;
+
+/// Share of the work that a filtered force still does along a path, both as long as the path.
+pub(crate) fn work_kept(filtered: &[f64], recorded: &[f64], path: &[f64]) -> f64 {
+    let work = |force: &[f64]| -> f64 {
+        let steps = force.windows(2).zip(path.windows(2));
+        steps.map(|(f, d)| 0.5 * (f[0] + f[1]) * (d[1] - d[0])).sum()
+    };
+    work(filtered) / work(recorded)
+}
+
 /// A filtered history.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Filtered {

@@ -160,7 +160,7 @@ impl LocatedRun<'_> {
         if self.files.len() > 1 {
             compare_text_with_binary(&files.force, remarks)?;
         }
-        for ReadFile { located, file } in files.each() {
+        for ReadFile { located, file, .. } in files.each() {
             remarks.notes.extend(file.notes.iter().map(|n| format!("{}: {n}", located.file)));
             remarks.warnings.extend(file.problems.iter().map(|p| format!("{}: {p}", located.file)));
         }
@@ -243,7 +243,7 @@ impl LocatedRun<'_> {
         }
     }
 
-    fn source(&self, ReadFile { located, file }: &ReadFile<'_>) -> SourceFile {
+    fn source(&self, ReadFile { located, file, .. }: &ReadFile<'_>) -> SourceFile {
         SourceFile {
             path: format!("{}/{}", self.entry.path, shown_name(&located.path)),
             absolute_path: Some(absolute(&located.path)),
@@ -266,7 +266,7 @@ const SAME_VALUE: f64 = 1e-5;
 
 /// Which of text file and binary file was read, and whether they differ.
 fn compare_text_with_binary(read: &ReadFile<'_>, remarks: &mut Notes) -> Result<(), Error> {
-    let ReadFile { located, file } = read;
+    let ReadFile { located, file, .. } = read;
     let name = &located.file;
     if let Some(section) = &located.section {
         let path = shown_name(&located.path);
@@ -317,6 +317,8 @@ pub(crate) fn is_alike(a: &[f64], b: &[f64]) -> bool {
 pub(super) struct ReadFile<'a> {
     pub located: &'a Located,
     pub file: SolverFile,
+    /// Of the forces that the recipe adds.
+    sum: Option<History>,
 }
 
 /// The files of a run with the histories that its recipe names.
@@ -332,19 +334,19 @@ impl<'a> RunFiles<'a> {
     pub(crate) fn read(run: &'a LocatedRun<'_>, recipe: &'a Recipe) -> Result<Self, Error> {
         let read_force = |table: &str, source: &ForceSource| {
             let located = run.file(force_file(source));
-            let id = match source {
-                ForceSource::Contact { .. } => "id",
-                ForceSource::Body { .. } => "node",
+            let ids = match source {
+                ForceSource::Contact { also, .. } => vec!["id"; 1 + also.len()],
+                ForceSource::Body { .. } => vec!["node"],
             };
-            let file = read_force(located, source).map_err(|e| in_recipe(e, table, &[id]))?;
-            Ok::<_, Error>(ReadFile { located, file })
+            let (file, sum) = read_force(located, source).map_err(|e| in_recipe(e, table, &ids))?;
+            Ok::<_, Error>(ReadFile { located, file, sum })
         };
         let located = run.file(&recipe.deflection.file);
         let file = read_motion(located, &recipe.deflection)
             .map_err(|e| in_recipe(e, "deflection", &["node", "minus_node"]))?;
         Ok(Self {
             recipe,
-            motion: ReadFile { located, file },
+            motion: ReadFile { located, file, sum: None },
             force: read_force("force", &recipe.force)?,
             contact: recipe.contact.as_ref().map(|c| read_force("contact", c)).transpose()?,
         })
@@ -395,6 +397,9 @@ impl<'a> RunFiles<'a> {
 
 impl ReadFile<'_> {
     fn force_history(&self, source: &ForceSource) -> Result<&History, Error> {
+        if let Some(sum) = &self.sum {
+            return Ok(sum);
+        }
         let history = match source {
             ForceSource::Contact { id, side, component, .. } => {
                 contact_history(&self.file, *id, *side, component)
@@ -457,12 +462,33 @@ fn read_motion(file: &Located, source: &DeflectionSource) -> Result<SolverFile, 
     }
 }
 
-fn read_force(file: &Located, source: &ForceSource) -> Result<SolverFile, Error> {
-    let id = match *source {
-        ForceSource::Contact { id, side, .. } => WantedId { id, side },
-        ForceSource::Body { node, .. } => WantedId { id: node, side: None },
+/// The file, and the sum where the recipe adds forces.
+fn read_force(
+    file: &Located,
+    source: &ForceSource,
+) -> Result<(SolverFile, Option<History>), Error> {
+    let (ids, side) = match source {
+        ForceSource::Contact { id, also, side, .. } => ([&[*id], &also[..]].concat(), *side),
+        ForceSource::Body { node, .. } => (vec![*node], None),
     };
-    read_file(file, vec![id], &[force_component(source)])
+    let wanted = ids.iter().map(|&id| WantedId { id, side }).collect();
+    let component = force_component(source);
+    let read = read_file(file, wanted, &[component])?;
+    let sum = match ids.len() {
+        1 => None,
+        _ => {
+            let of = ids.iter().map(|&id| contact_history(&read, id, side, component));
+            let sum = of.collect::<Option<Vec<_>>>().and_then(|of| History::sum(&of));
+            Some(sum.ok_or_else(|| {
+                let path = file.path.display();
+                error!(
+                    Run,
+                    "{path} does not hold {component} of {ids:?} at the same times: forces that are added need them"
+                )
+            })?)
+        }
+    };
+    Ok((read, sum))
 }
 
 /// The history of a wall or of one side of an interface; without a side named, SURFA's.

@@ -1,14 +1,15 @@
 //! Consistency of the histories of one record along time: impulse against momentum, displacement against velocity,
 //! force against motion, the output interval against the curve.
 
-use super::Notes;
 use super::error::ExtractError;
 use super::record::Record;
 use super::start::FromContact;
+use super::{Measured, Notes};
 use crate::curve::contact::milliseconds;
 use crate::curve::energy::{IMPOSSIBLE_ALONG_TIME, ImpossibleRun, POSSIBLE};
 use crate::curve::{Curve, Masses, loading};
-use crate::signal::interpolate;
+use crate::history::History;
+use crate::signal::{cfc, interpolate};
 use crate::unit::Shown;
 
 /// Impulse and lost momentum of clean FE runs differ by 1 to 4 % of the impact's momentum at any
@@ -31,6 +32,10 @@ const SAMPLED_OFF: f64 = 0.02;
 const OTHER_FILES: &str = "likely files of two runs, the wrong node or wall, or shifted times";
 /// A peak is a spike above these multiples of its neighbours and of all others.
 const SPIKE: (f64, f64) = (2.5, 1.2);
+/// Masses of two bodies whose ratio differs from that of their changes of velocity by more are doubtful.
+const RATIO: f64 = 0.1;
+/// Gravity changes half of the speed in half of a flight; what has changed less than this share of it begins later.
+const SUDDEN: f64 = 0.2;
 /// Free flight in fewer states says nothing of gravity.
 const FLIGHT: usize = 5;
 /// Work of another force, as a share of the kinetic energy, that deserves a warning.
@@ -98,6 +103,45 @@ pub(super) fn displacement(record: &Record) -> Result<Notes, ImpossibleRun> {
     Ok(remarks)
 }
 
+/// Of two bodies, whether their changes of velocity are in the ratio of their masses: `m₁Δv₁ = −m₂Δv₂`.
+pub(super) fn masses(measured: &Measured<'_>, masses: Masses) -> Option<String> {
+    let changes = |history: &History| -> Vec<f64> {
+        history.values.iter().map(|v| v - history.values[0]).collect()
+    };
+    let (own, other) = (changes(measured.velocity?), changes(measured.minus_velocity?));
+    let sum = |of: &dyn Fn(usize) -> f64| -> f64 { (0..own.len().min(other.len())).map(of).sum() };
+    let found = -sum(&|i| own[i] * other[i]) / sum(&|i| other[i] * other[i]);
+    let stated = masses.other_kg? / masses.body_kg;
+    let is_off = |stated: f64| (found / stated - 1.0).abs() > RATIO;
+    (found.is_finite() && found > 0.0 && is_off(stated)).then(|| {
+        let what_to_do = match is_off(1.0 / stated) {
+            true => "one of them is wrong, or the node of another body",
+            false => "they are exchanged",
+        };
+        format!(
+            "mass: by the changes of velocity of the two bodies the other one has {found:.3} times the mass of the first, by the manifest {stated:.3} times ({} and {}): {what_to_do}",
+            Shown::one_mass(masses.body_kg),
+            Shown::one_mass(stated * masses.body_kg)
+        )
+    })
+}
+
+/// What a filter takes from the work up to the maximum deflection: the pulses of a short impact are no noise. `recorded_n`
+/// ends with the states of `filtered`.
+pub(super) fn filter(class: u32, filtered: &Curve, recorded_n: &[f64]) -> Option<String> {
+    // The first of the curve lies between two states.
+    let states = 1..loading::loading_end(filtered) + 1;
+    let recorded = &recorded_n[recorded_n.len() + 1 - filtered.force_n().len()..];
+    let (force, path) = (filtered.force_n(), filtered.deflection_m());
+    let kept = cfc::work_kept(&force[states.clone()], &recorded[..states.len()], &path[states]);
+    (kept < cfc::KEPT).then(|| {
+        format!(
+            "filter: CFC{class} takes {:.1} % of the work from the force, for the impact is short: use a higher class, or filter = \"none\"",
+            100.0 * (1.0 - kept)
+        )
+    })
+}
+
 /// A peak that is a single state, far above its neighbours and all others: damage, or an output
 /// interval that is too long.
 pub(super) fn spike(time_s: &[f64], force_n: &[f64]) -> Option<String> {
@@ -151,6 +195,9 @@ impl<'a> Motion<'a> {
         let curve = &self.contact.curve;
         let last = loading::loading_end(curve);
         let closing = &self.contact.closing_m_per_s;
+        if closing[0] <= 0.0 {
+            return Err(ExtractError::Standing);
+        }
         let slowest = closing[..last].iter().copied().fold(f64::INFINITY, f64::min);
         let impulse = integral(curve.time_s(), curve.force_n())[last];
         if slowest < (1.0 - SLOWED) * closing[0] || impulse < 0.5 * self.momentum_ns() {
@@ -263,7 +310,13 @@ impl<'a> Motion<'a> {
         let rate = (last - first) / (record.time_s[states - 1] - record.time_s[0]);
         let energy = 0.5 * self.contact.closing_m_per_s[0].powi(2);
         let share = rate * crush_m / energy;
-        if share.abs() > OTHER_WORK {
+        let halfway = record.rate_m_per_s[states / 2].abs();
+        if share.abs() > OTHER_WORK && (halfway - first).abs() < SUDDEN * (last - first).abs() {
+            remarks.warn(format!(
+                "free flight: the speed changes by {:.3} m/s before contact, nearly all of it in the second half of that time: the force is recorded late, or another one acts before it: check the times of both files",
+                last - first
+            ));
+        } else if share.abs() > OTHER_WORK {
             remarks.warn(format!(
                 "free flight: before contact the speed changes by {rate:.2} m/s² (gravity, brakes, friction); energy and stopped mass neglect this force, whose work over the crush is {:.1} % of the kinetic energy",
                 share * 100.0

@@ -59,7 +59,9 @@ pub(crate) enum ExtractError {
     )]
     NoSpeed { component: String },
     /// The body does not move in the first state.
-    #[error("the body is at rest in the first state: add speed = \"…km/h\" to the run")]
+    #[error(
+        "the body is at rest in the first state: name a node of the body that moves, or add speed = \"…km/h\" to the run"
+    )]
     Standing,
     /// The force cannot be filtered.
     #[error("{0}")]

@@ -54,7 +54,8 @@ pub(crate) fn of_run(
     measured: &Measured<'_>,
     setup: &Setup<'_>,
 ) -> Result<Extracted, ExtractError> {
-    let (record, remarks) = Record::of(measured, setup)?;
+    let (record, mut remarks) = Record::of(measured, setup)?;
+    remarks.warnings.extend(consistency::masses(measured, setup.masses));
     curve_of(record, remarks, setup)
 }
 
@@ -80,6 +81,9 @@ pub(crate) fn curve_of(
     }
     let contact = remarks.take(FromContact::of(&record, start.time_s, setup.stated.offset_m)?);
     remarks.append(start.uncertainty(&contact, setup));
+    if let Filter::Cfc(class) = setup.filter {
+        remarks.warnings.extend(consistency::filter(class, &contact.curve, &recorded_n));
+    }
     remarks.append(start.force_before(&record.time_s, &recorded_n, &contact));
     let motion = Motion::of(&contact, setup.masses);
     motion.is_free()?;

@@ -68,8 +68,12 @@ impl Start {
         };
         let of_body = record.contact.is_none() && record.force_kind == ForceKind::Body;
         if of_body {
+            let earlier = match onset.interval_s {
+                Some(_) => "the first touch is some milliseconds earlier",
+                None => "the record begins there, and the first touch may be earlier",
+            };
             remarks.warn(format!(
-                "contact: found at {}, where the body starts to slow down; the first touch is some milliseconds earlier, and the crush is too short by the distance travelled in between: name the contact force in the recipe (contact = {{ file = \"rwforc\", id = 1, component = \"normal_force\" }}), or set contact_time in the run",
+                "contact: found at {}, where the body starts to slow down; {earlier}, and the crush is too short by the distance travelled in between: name the contact force in the recipe (contact = {{ file = \"rwforc\", id = 1, component = \"normal_force\" }}), or set contact_time in the run",
                 milliseconds(onset.time_s)
             ));
         }
@@ -104,7 +108,7 @@ impl Start {
             }
             StartBy::Crossing { interval_s } if step_m(interval_s) > CERTAIN_SHARE * crush_m => {
                 remarks.warn(format!(
-                    "contact: it lies between two states {:.2} mm apart, so the crush is uncertain by up to {:.1} % (contact_time or gap in the run sets it)",
+                    "contact: it lies within {:.2} mm, between the last state without force and the first above the threshold, so the crush is uncertain by up to {:.1} % (contact_time or gap in the run, or contact_threshold in the recipe, sets it)",
                     step_m(interval_s) * 1e3,
                     100.0 * step_m(interval_s) / crush_m
                 ));
