@@ -144,6 +144,36 @@ fn crush_zones_have_no_gap() {
     assert_eq!(folder.names(), Vec::<String>::new());
 }
 
+/// What has no effect is not varied: the gap of a curve where the train has its own, the band of an end or of a rate.
+#[test]
+fn what_has_no_effect_is_refused() {
+    let folder = Folder::new("");
+    let refused = |scenario: &str, vary: &str, expected: &str| {
+        folder.put("s.toml", &format!("{scenario}[sweep]\nvary = [ {{ {vary} }} ]\n"));
+        says(&folder.fails(1, "sweep s.toml -q -o out.csv"), expected);
+    };
+    let gap = "what = \"gap\", curve = \"inner\", values = [\"1mm\", \"9mm\"]";
+    let own = SCENARIO.replace("inner = \"inner\"", "gap = \"30mm\"\ninner = \"inner\"");
+    assert_ne!(own, SCENARIO);
+    refused(
+        &own,
+        gap,
+        "the contact, a train or a vehicle has its own gap, so that of the curve has no effect",
+    );
+    let band = "what = \"band\", curve = \"nose\", values = [-1, 1]";
+    let train = "[[train]]\nname = \"A\"\nspeed = \"36km/h\"\n";
+    let run = "[run]\nduration = \"0.1s\"\n[wall]\n[contact]\n";
+    let rate = format!(
+        "{run}curve = \"nose\"\n[curves]\nnose = {{ model = \"lead.model\", law = \"rate\" }}\n{train}vehicles = [ {{ name = \"A1\", mass = \"24t\" }} ]\n"
+    );
+    refused(&rate, band, "band belongs to law = \"memory\"");
+    let end = format!(
+        "{run}[curves]\nnose = {{ model = \"lead.model\" }}\n{train}vehicles = [ {{ name = \"A1\", mass = \"24t\", ends = \"nose\" }} ]\n"
+    );
+    refused(&end, band, "and this one is the end of a vehicle");
+    assert_eq!(folder.names(), Vec::<String>::new());
+}
+
 /// A train that comes against the other has a speed below 0.
 #[test]
 fn oncoming_trains_have_their_speeds() {

@@ -613,6 +613,38 @@ fn limits_on_occupants_are_judged() {
     }
 }
 
+/// A limit is held against the contact that changes the speed most, too, whatever small one comes first.
+#[test]
+fn a_first_small_pulse_hides_no_other() {
+    let stages = [("200mm", "1MN"), ("50mm", "0N"), ("3m", "4MN")]
+        .map(|(stroke, from)| format!("{{ stroke = \"{stroke}\", from = \"{from}\" }}"));
+    let nose = format!("nose = {{ stages = [ {} ], unloading = \"80MN/m\" }}", stages.join(", "));
+    let cars = "vehicles = [ { name = \"A1\", mass = \"24t\" } ]\n[wall]";
+    let limits = "[limits]\nstandard = \"EN 15227\"\nedition = \"2020+A1:2024\"\nmean_deceleration_g = 5.0\n";
+    for (more, expected) in [("", "A1"), ("mean_deceleration_g = 18.0", "")] {
+        let limits = match more {
+            "" => limits.to_string(),
+            more => limits.replace("mean_deceleration_g = 5.0", more),
+        };
+        let result = run(&scenario(&nose, cars, &limits));
+        let body = &result["summary"]["bodies"][0];
+        let g = |of: f64| of / 24e3 / 9.80665;
+        let is_near = |name: &str, expected: f64| {
+            let found = body[name].as_f64().unwrap();
+            assert!((found / expected - 1.0).abs() < 0.01, "{name}: {found}, not {expected}");
+        };
+        is_near("mean_deceleration_g", g(1e6));
+        // What speed is left is lost at 4 MN; then a quarter of an oscillation unloads, which gives a speed back.
+        let (left, back) =
+            ((100.0 - 2.0 * 1e6 * 0.2 / 24e3_f64).sqrt(), 4e6 / (80e6 * 24e3_f64).sqrt());
+        let time_s = left * 24e3 / 4e6 + 0.5 * std::f64::consts::PI * (24e3_f64 / 80e6).sqrt();
+        is_near("main_mean_deceleration_g", g(24e3 * (left + back) / time_s));
+        let over = result["summary"]["limits"]["over"].as_array().unwrap();
+        let over: Vec<&str> = over.iter().filter_map(Value::as_str).collect();
+        assert_eq!(over.join(","), expected);
+    }
+}
+
 /// A run that is too short for its mean deceleration says so, by every method.
 #[test]
 fn a_run_that_ends_while_loading_is_said() {

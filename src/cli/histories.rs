@@ -47,7 +47,7 @@ pub(super) struct Args {
     /// Units of the file, such as mm-t-s, to be named in HDF5 [default: those of the deck next to it]
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
-    /// Write the values in HDF5 in single precision: half the size, and all six digits that solvers print
+    /// Write the values in HDF5 in single precision: half the size, and all six digits that solvers print (above 3.4e38 infinite)
     #[arg(long)]
     f32: bool,
     /// Store the values in HDF5 entity by entity, in chunks of all states, for programs that read few of many

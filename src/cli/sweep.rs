@@ -283,6 +283,11 @@ fn say(
                 false => String::new(),
             };
             writeln!(out, "rank corr.: Spearman's rank correlation{chance}")?;
+        } else if !report.sensitivities.is_empty() {
+            writeln!(
+                out,
+                "rank correlations of more than {MOST_VARIED} varied quantities: with --json"
+            )?;
         }
         print_share_over_limits(out, report, is_random)?;
         if let Some(reached) = reached {

@@ -174,7 +174,8 @@ fn free_travel(chain: &Chain, run: &Run) -> Vec<String> {
 
 /// Of bodies that a contact still loads at the end of the run.
 fn still_loaded(chain: &Chain, run: &Run, end_s: f64) -> Option<String> {
-    let loaded = chain.bodies().iter().zip(&run.bodies).filter(|(_, b)| b.is_loaded_at_end);
+    let is_cut = |b: &BodyHistory| b.main_contact.map_or(b.is_loaded_at_end, |(.., is_cut)| is_cut);
+    let loaded = chain.bodies().iter().zip(&run.bodies).filter(|(_, b)| is_cut(b));
     let bodies: Vec<&str> = loaded.map(|(body, _)| body.name.as_str()).collect();
     if bodies.is_empty() {
         return None;

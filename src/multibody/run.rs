@@ -60,6 +60,8 @@ pub enum Record {
     Histories,
     /// Nothing: histories stay empty.
     Summary,
+    /// Speeds of bodies, deflections and forces of interfaces alone: a run of which nobody asks what its bodies meet.
+    Closing,
 }
 
 /// Times of a run.
@@ -119,6 +121,9 @@ pub struct BodyHistory {
     pub is_loaded_at_end: bool,
     /// From when until when, in s; `None` without contact.
     pub loaded_s: Option<(f64, f64)>,
+    /// Of a later contact that changes the speed more than any other: the mean of `−a` in m/s², from when until when in s,
+    /// and whether the run ends while it acts. `None` if the first contact does.
+    pub main_contact: Option<(f64, (f64, f64), bool)>,
     /// Mean of `−a` over the 120 ms in which its magnitude is largest, with windows that end at
     /// the outputs; `None` in a shorter run and for outputs more than 5 ms apart.
     pub moving_mean_deceleration_m_per_s2: Option<f64>,
@@ -255,7 +260,7 @@ impl Grid {
         }
         let (bodies, interfaces) = (chain.bodies().len(), chain.interfaces().len());
         let values = outputs * (3 * bodies + 5 * interfaces) as f64;
-        if settings.record == Record::Histories && values > MAX_VALUES {
+        if settings.record != Record::Summary && values > MAX_VALUES {
             return Err(error!(
                 Simulation at "run.output_interval",
                 "the run would keep {values:.1e} values of {bodies} bodies at {outputs} outputs, more than {MAX_VALUES:.0e}: lengthen output_interval or shorten the train"
@@ -313,7 +318,13 @@ impl Run {
             // The moving mean needs the speeds in any case.
             b.v_m_per_s.reserve_exact(outputs);
         }
-        if record == Record::Summary {
+        if record == Record::Closing {
+            for i in &mut self.interfaces {
+                i.deflection_m.reserve_exact(outputs);
+                i.force_n.reserve_exact(outputs);
+            }
+        }
+        if record != Record::Histories {
             return;
         }
         self.time_s.reserve_exact(outputs);

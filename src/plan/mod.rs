@@ -416,10 +416,11 @@ impl Design {
 impl Vary {
     pub(crate) fn spread(&self) -> Result<Spread, Error> {
         if let Some(name) = self.distribution {
-            self.refuse("distribution", &["values", "steps"])?;
+            self.refuse("distribution: remove one of them", &["values", "steps"])?;
             return Ok(Spread::Drawn(self.drawn(name)?));
         }
-        self.refuse("a grid", &["mean", "sd", "mode", "min", "max"])?;
+        let grid = "a grid, which takes values, or from, to and steps";
+        self.refuse(grid, &["mean", "sd", "mode", "min", "max"])?;
         match (&self.values, &self.from, &self.to, self.steps) {
             (Some(values), None, None, None) => {
                 if values.is_empty() {
@@ -453,17 +454,20 @@ impl Vary {
         let ends = || Ok::<_, Error>((self.need("from", &self.from)?, self.need("to", &self.to)?));
         match name {
             DistributionName::Uniform => {
-                self.refuse("uniform", &["mean", "sd", "mode", "min", "max"])?;
+                let uniform = "uniform, which takes from and to";
+                self.refuse(uniform, &["mean", "sd", "mode", "min", "max"])?;
                 let (from, to) = ends()?;
                 Ok(Distribution::uniform(from, to)?)
             }
             DistributionName::Triangular => {
-                self.refuse("triangular", &["mean", "sd", "min", "max"])?;
+                let triangular = "triangular, which takes from, mode and to";
+                self.refuse(triangular, &["mean", "sd", "min", "max"])?;
                 let (from, to) = ends()?;
                 Ok(Distribution::triangular(from, self.need("mode", &self.mode)?, to)?)
             }
             DistributionName::Normal | DistributionName::Lognormal => {
-                self.refuse("normal and lognormal", &["from", "to", "mode"])?;
+                let normal = "normal and lognormal, which take mean, sd, min and max";
+                self.refuse(normal, &["from", "to", "mode"])?;
                 let (mean, sd) = (self.need("mean", &self.mean)?, self.need("sd", &self.sd)?);
                 let bound = |key: &'static str, entry: &Option<Entry>, open: f64| {
                     entry.as_ref().map_or(Ok(open), |entry| self.number(key, entry))
@@ -499,10 +503,7 @@ impl Vary {
             _ => self.max.is_some(),
         };
         match keys.iter().find(|key| given(key)) {
-            Some(&key) => {
-                Err(error!(Sweep at key, "{key} does not go with {with}: remove one of them")
-                    .itself())
-            }
+            Some(&key) => Err(error!(Sweep at key, "{key} does not go with {with}").itself()),
             None => Ok(()),
         }
     }
@@ -624,7 +625,8 @@ mod tests {
             ("what = \"force\", from = 1, to = 2, steps = 1", "steps is 1: expected 2 or more"),
             ("what = \"force\", from = 1, to = 2", "give values = […], or from, to and steps, or a distribution"),
             ("what = \"force\", distribution = \"normal\", mean = 1", "the distribution needs sd = …"),
-            ("what = \"force\", distribution = \"uniform\", from = 1, to = 2, sd = 1", "sd does not go with uniform: remove one of them"),
+            ("what = \"force\", distribution = \"uniform\", from = 1, to = 2, sd = 1", "sd does not go with uniform, which takes from and to"),
+            ("what = \"force\", from = 1, max = 2", "max does not go with a grid, which takes values, or from, to and steps"),
             ("what = \"force\", values = [1]", "sweep.samples is given, but no variable has a distribution: remove samples"),
         ];
         cases.into_iter().for_each(|(vary, expected)| t(vary, expected));

@@ -29,7 +29,7 @@ pub(super) struct Ran {
 
 /// What a run comes to.
 pub(super) struct Numbers {
-    /// By vehicle: mean, largest filtered and largest 120 ms mean deceleration, in g, and what its occupants meet.
+    /// By vehicle: mean as held against limits, largest filtered and largest 120 ms mean deceleration, in g, and what its occupants meet.
     pub vehicles: Vec<(String, [Option<f64>; 5])>,
     /// By interface: largest crush in m and energy in J.
     pub interfaces: Vec<(String, [Option<f64>; 2])>,
@@ -62,7 +62,11 @@ pub(super) fn add(
     let uncertainty = origins.iter().filter_map(|of| Some(of.left_out.as_ref()?.force_l1));
     let uncertainty = uncertainty.fold(0.0, f64::max);
     let found = Numbers::of(&summary);
-    let edges = edges(path, &read, &sources);
+    let edges = edges(path, &read, &sources).unwrap_or_else(|error| {
+        let text = format!("no results over the bands of the curves: {}", error.message());
+        content.warn(ToDo::CheckScenario, &name, text);
+        Vec::new()
+    });
     add_verdicts(content, &name, &summary, uncertainty, &edges);
     let mut parts = vec![
         Part::Text(conditions(&prepared, &read.run.duration.0, &run)),
@@ -134,7 +138,7 @@ impl Numbers {
         let vehicles = summary.bodies.iter().filter(|body| !body.is_crush_zone);
         let of_vehicle = vehicles.map(|body| {
             let of = [
-                Some(body.mean_deceleration_g),
+                body.largest_mean_g().or(Some(body.mean_deceleration_g)),
                 body.peak_deceleration_g,
                 body.moving_mean_deceleration_g,
                 body.secondary_impact_m_per_s,
@@ -150,14 +154,16 @@ impl Numbers {
     }
 }
 
-/// The runs with all curves at the lower, and at the upper edge of their bands; none where a curve has no band or a run ends with an error.
-fn edges(path: &Path, read: &Scenario, sources: &Sources) -> Vec<Numbers> {
-    let at = |member: f64| {
-        let prepared = scenario::at_band_edge(path, read, sources, member)?;
-        let run = prepared.run().ok()?;
-        Some(Numbers::of(&prepared.summary(&run)))
-    };
-    [at(-1.0), at(1.0)].into_iter().collect::<Option<_>>().unwrap_or_default()
+/// The runs with all curves at the lower, and at the upper edge of their bands; none if no curve has a band.
+fn edges(path: &Path, read: &Scenario, sources: &Sources) -> Result<Vec<Numbers>, Error> {
+    let mut edges = Vec::new();
+    for member in [-1.0, 1.0] {
+        if let Some(prepared) = scenario::at_band_edge(path, read, sources, member)? {
+            let run = prepared.run()?;
+            edges.push(Numbers::of(&prepared.summary(&run)));
+        }
+    }
+    Ok(edges)
 }
 
 /// The least and the largest of the value that `of` finds in a run and at the edges.
@@ -398,7 +404,7 @@ fn interfaces(summary: &Summary<'_>) -> impl Into<Table> {
         .column("peak force", move |of| of.load_n().map_or("–".into(), |n| force.text(n)))
         .column("maximum crush", |of| metres(of.history.max_deflection_m))
         .column("time of it", |of| format!("{:.1} ms", 1e3 * of.history.max_deflection_time_s))
-        .column("energy dissipated", |of| {
+        .column("energy dissipated, dampers included", |of| {
             energy.text(of.history.dissipated_at_end_j + of.history.damped_j.unwrap_or(0.0))
         })
         .column("energy stored", |of| energy.text(of.history.stored_at_end_j))

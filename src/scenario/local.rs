@@ -14,8 +14,8 @@ use super::assemble::assemble_at;
 use super::layout::{ConnectionKind, Role, layout};
 use super::{CheckedScenario, CurveSource, InterfaceSpeed, Prepared, Sources};
 use crate::error::Error;
-use crate::multibody::{Chain, Method, Run, simulate};
-use crate::signal::peaks::peaks;
+use crate::multibody::{Chain, Method, Record, Run, RunSettings, simulate};
+use crate::signal::peaks::first_peak;
 use crate::unit::km_per_h;
 
 /// The speeds are found when none changes by more, in m/s.
@@ -52,7 +52,7 @@ pub(crate) fn assemble(
     }
     let mut before = vec![0.0; own.len()];
     for _ in 0..ROUNDS {
-        let mut settings = prepared.settings;
+        let mut settings = RunSettings { record: Record::Closing, ..prepared.settings };
         settings.duration_s = settings.duration_s.min(LONGEST_S);
         settings.output_interval_s = INTERVAL_S.min(settings.duration_s);
         if !prepared.chain.has_rates() {
@@ -154,7 +154,7 @@ fn closing_speed(chain: &Chain, run: &Run, k: usize) -> Option<f64> {
     let begin = interface.deflection_m.iter().position(|&d| d > 0.0)?;
     let forces = &interface.force_n[begin..];
     let most = forces.iter().copied().fold(0.0, f64::max);
-    let until = peaks(forces, PROMINENCE * most).first().map_or(forces.len(), |&peak| peak + 1);
+    let until = first_peak(forces, PROMINENCE * most).map_or(forces.len(), |peak| peak + 1);
     let ahead = (k + 1 < chain.bodies().len()).then_some(k + 1);
     // An end follows its vehicles.
     let rate = chain.interfaces()[k].rate.as_ref();

@@ -130,6 +130,18 @@ pub(crate) fn check<'a>(path: &Path, scenario: &'a Scenario) -> Result<CheckedSc
     scenario.check().map_err(|error| error.placed(|_| Place::of_file(path)))
 }
 
+/// Whether an interface, or the slack of a coupling, takes the gap of a curve: not where contact, train or vehicle state one.
+///
+/// # Errors
+/// If the scenario is not one.
+pub(crate) fn takes_gap_of(scenario: &Scenario, curve: &str) -> Result<bool, Error> {
+    let checked = scenario.check()?;
+    let slots = layout::layout(&checked).slots;
+    let is_slack = scenario.curves.values().any(|of| of.tension.as_deref() == Some(curve));
+    let takes = slots.iter().any(|slot| slot.gap_m.is_none() && slot.joint.curve() == Some(curve));
+    Ok(takes || is_slack)
+}
+
 /// Reads and checks a scenario; curves are not read.
 ///
 /// # Errors
@@ -155,12 +167,15 @@ pub(crate) fn load_with_origins(path: &Path) -> Result<(Prepared, Vec<CurveOrigi
 
 /// A scenario whose curves of models and predictions all have the same edge of their bands, the lower (−1) or the upper (1); `None` if
 /// none has one. Ends of vehicles and curves with a rate have none, and a `band` of the scenario stays.
+///
+/// # Errors
+/// If a band does not reach to the speed of an interface.
 pub(crate) fn at_band_edge(
     path: &Path,
     read: &Scenario,
     sources: &Sources,
     member: f64,
-) -> Option<Prepared> {
+) -> Result<Option<Prepared>, Error> {
     let zones = read.train.iter().flat_map(|train| &train.vehicles).flat_map(VehicleTable::zones);
     let ends: Vec<&str> = zones.map(|zone| zone.curve).collect();
     let mut changed = read.clone();
@@ -172,8 +187,7 @@ pub(crate) fn at_band_edge(
     };
     let free = changed.curves.iter_mut().filter(is_free);
     if free.map(|(_, table)| table.band = Some(member)).count() == 0 {
-        return None;
+        return Ok(None);
     }
-    // A model may have a band that does not reach to the speed of an interface.
-    assemble(path, &check(path, &changed).ok()?, sources).ok()
+    assemble(path, &check(path, &changed)?, sources).map(Some)
 }

@@ -36,6 +36,9 @@ pub(crate) struct BodySummary<'a> {
     pub(crate) mean_deceleration_g: f64,
     /// From when until when it is the mean; null for a body without contact.
     pub(crate) mean_deceleration_span_s: Option<(f64, f64)>,
+    /// The same of a later contact that changes the speed more than any other; null if the first one does.
+    pub(crate) main_mean_deceleration_g: Option<f64>,
+    pub(crate) main_mean_deceleration_span_s: Option<(f64, f64)>,
     /// Largest in magnitude of the deceleration filtered with CFC 60 (SAE J211-1), and its time; null where the outputs
     /// are too coarse for the filter.
     pub(crate) peak_deceleration_g: Option<f64>,
@@ -43,7 +46,7 @@ pub(crate) struct BodySummary<'a> {
     /// Whether it is the crush zone of a vehicle's end, which stops at once: its decelerations are
     /// no vehicle's.
     pub(crate) is_crush_zone: bool,
-    /// The run ended before the contact of that mean did: it is the mean of a part.
+    /// The run ended before the contact of a mean did: it is the mean of a part.
     pub(crate) still_loaded_at_end: bool,
     /// Over the 120 ms in which it is largest in magnitude; null in a shorter run.
     pub(crate) moving_mean_deceleration_g: Option<f64>,
@@ -55,16 +58,29 @@ pub(crate) struct BodySummary<'a> {
 }
 
 impl BodySummary<'_> {
-    /// The mean deceleration and over which time it is the mean.
+    /// The mean decelerations and over which times they are the mean.
     pub(crate) fn mean_text(&self) -> String {
-        let span = match self.mean_deceleration_span_s {
-            Some((from_s, _)) if self.still_loaded_at_end => {
-                format!(" so far, from {:.0} ms", 1e3 * from_s)
+        let of = |mean_g: f64, span_s: Option<(f64, f64)>, is_last: bool| match span_s {
+            Some((from_s, _)) if is_last && self.still_loaded_at_end => {
+                format!("{mean_g:.2} g so far, from {:.0} ms", 1e3 * from_s)
             }
-            Some((from_s, to_s)) => format!(", {:.0} to {:.0} ms", 1e3 * from_s, 1e3 * to_s),
-            None => String::new(),
+            Some((from, to)) => format!("{mean_g:.2} g, {:.0} to {:.0} ms", 1e3 * from, 1e3 * to),
+            None => format!("{mean_g:.2} g"),
         };
-        format!("{:.2} g{span}", self.mean_deceleration_g)
+        let main_g = self.main_mean_deceleration_g;
+        let first = of(self.mean_deceleration_g, self.mean_deceleration_span_s, main_g.is_none());
+        let main = main_g.map(|mean_g| of(mean_g, self.main_mean_deceleration_span_s, true));
+        [Some(first), main].into_iter().flatten().collect::<Vec<_>>().join("; then ")
+    }
+
+    /// Of the mean decelerations that are not of a part of a contact the one with the largest magnitude: it is held
+    /// against a limit.
+    pub(crate) fn largest_mean_g(&self) -> Option<f64> {
+        let whole = |is_last: bool| !(is_last && self.still_loaded_at_end);
+        let main_g = self.main_mean_deceleration_g;
+        let first = whole(main_g.is_none()).then_some(self.mean_deceleration_g);
+        let main = main_g.filter(|_| whole(true));
+        [first, main].into_iter().flatten().reduce(|a, b| if b.abs() > a.abs() { b } else { a })
     }
 
     /// The largest filtered deceleration and when it is.
@@ -95,7 +111,7 @@ pub(crate) struct InterfaceSummary<'a> {
     pub(crate) used: &'a CurveInUse,
 }
 
-/// Mean decelerations against a limit.
+/// Mean decelerations against a limit: of the first contact of a body, and of the one that changes its speed most.
 #[derive(Serialize)]
 pub(crate) struct Limits<'a> {
     pub(crate) standard: &'a str,
@@ -185,10 +201,14 @@ impl Prepared {
                 mean_deceleration_m_per_s2: history.mean_deceleration_m_per_s2,
                 mean_deceleration_g: in_g(history.mean_deceleration_m_per_s2),
                 mean_deceleration_span_s: history.loaded_s,
+                main_mean_deceleration_g: history.main_contact.map(|(mean, ..)| in_g(mean)),
+                main_mean_deceleration_span_s: history.main_contact.map(|(_, span_s, _)| span_s),
                 peak_deceleration_g: peak.map(|(_, a)| in_g(a)),
                 peak_deceleration_time_s: peak.map(|(time_s, _)| time_s),
                 is_crush_zone: is_crush_zone(i),
-                still_loaded_at_end: history.is_loaded_at_end,
+                still_loaded_at_end: history
+                    .main_contact
+                    .map_or(history.is_loaded_at_end, |(.., is_cut)| is_cut),
                 moving_mean_deceleration_g: history.moving_mean_deceleration_m_per_s2.map(in_g),
                 secondary_impact_m_per_s: history
                     .secondary_impact_m_per_s
@@ -223,17 +243,20 @@ impl Prepared {
             };
             asked.map(judged).collect()
         };
+        let is_over = |body: &BodySummary<'_>| {
+            let limit_g = self.limits.as_ref().map_or(f64::INFINITY, |of| of.mean_deceleration_g);
+            body.largest_mean_g().is_some_and(|mean_g| mean_g.abs() > limit_g)
+        };
         let limits = self.limits.as_ref().map(|limits| Limits {
             standard: &limits.standard,
             edition: &limits.edition,
             mean_deceleration_limit_g: limits.mean_deceleration_g,
             trains: &limits.trains,
-            over: judged()
-                .filter(|body| !body.still_loaded_at_end)
-                .filter(|body| body.mean_deceleration_g.abs() > limits.mean_deceleration_g)
+            over: judged().filter(|body| is_over(body)).map(|body| body.name).collect(),
+            unknown: judged()
+                .filter(|body| body.still_loaded_at_end && !is_over(body))
                 .map(|body| body.name)
                 .collect(),
-            unknown: judged().filter(|b| b.still_loaded_at_end).map(|body| body.name).collect(),
             occupants: occupants(limits),
             beyond_data: run.beyond_data().map(|k| &*interfaces[k].name).collect(),
             statement: format!(

@@ -13,28 +13,49 @@ const MATCH: f64 = 0.1;
 /// the way to a larger maximum, or to the end. Of a plateau the first point counts; the
 /// ends count if the values fall from them. Takes a time in proportion to the number of values.
 pub(crate) fn peaks(values: &[f64], prominence: f64) -> Vec<usize> {
-    let n = values.len();
     let left = saddles(values.iter());
     let mut right = saddles(values.iter().rev());
     right.reverse();
-    let rises = |i: usize| i == 0 || values[i - 1] < values[i];
-    let falls = |i: usize| {
+    (0..values.len())
+        .filter(|&i| is_maximum(values, i) && values[i] - base(left[i], right[i]) >= prominence)
+        .collect()
+}
+
+/// The first of [`peaks`], in a time in proportion to what lies before it and up to the next larger value.
+pub(crate) fn first_peak(values: &[f64], prominence: f64) -> Option<usize> {
+    let mut passed = Passed::default();
+    (0..values.len()).find(|&i| {
+        let left = passed.saddle_before(values[i]);
+        // Between two larger values the base is not below either saddle.
+        if left.higher && values[i] - left.lowest < prominence || !is_maximum(values, i) {
+            return false;
+        }
+        let after = &values[i + 1..];
+        let larger = after.iter().position(|&v| v > values[i]);
+        let lower = &after[..larger.unwrap_or(after.len())];
+        let lowest = lower.iter().copied().fold(values[i], f64::min);
+        values[i] - base(left, Saddle { lowest, higher: larger.is_some() }) >= prominence
+    })
+}
+
+/// Whether a value is larger than the one before, and than the next that differs.
+fn is_maximum(values: &[f64], i: usize) -> bool {
+    let falls = || {
         let after = values[i..].iter().find(|&&v| v != values[i]);
         after.is_none_or(|&v| v < values[i])
     };
-    (0..n)
-        .filter(|&i| rises(i) && falls(i))
-        .filter(|&i| {
-            let base = match (left[i], right[i]) {
-                (Saddle { lowest, higher: true }, Saddle { higher: false, .. })
-                | (Saddle { higher: false, .. }, Saddle { lowest, higher: true }) => lowest,
-                // The highest of all, or between two higher ones.
-                (l, r) if l.higher => l.lowest.max(r.lowest),
-                (l, r) => l.lowest.min(r.lowest),
-            };
-            values[i] - base >= prominence
-        })
-        .collect()
+    (i == 0 || values[i - 1] < values[i]) && falls()
+}
+
+/// What the prominence of a value counts from, of the saddles on both sides.
+fn base(left: Saddle, right: Saddle) -> f64 {
+    match (left, right) {
+        (Saddle { lowest, higher: true }, Saddle { higher: false, .. })
+        | (Saddle { higher: false, .. }, Saddle { lowest, higher: true }) => lowest,
+        // The highest of all, or between two higher ones.
+        (l, r) if l.higher => l.lowest.max(r.lowest),
+        (l, r) => l.lowest.min(r.lowest),
+    }
 }
 
 /// What lies before a value, back to the first larger one.
@@ -45,21 +66,27 @@ struct Saddle {
     higher: bool,
 }
 
-/// The saddle before each value. The stack holds what no later value has yet exceeded, falling
-/// from bottom to top, each with the lowest value after the one below it.
+/// What no later value has yet exceeded, falling from bottom to top, each with the lowest value after the one
+/// below it.
+#[derive(Default)]
+struct Passed(Vec<(f64, f64)>);
+
+impl Passed {
+    /// The saddle before the next value.
+    fn saddle_before(&mut self, value: f64) -> Saddle {
+        let mut lowest = value;
+        while let Some((_, low)) = self.0.pop_if(|(top, _)| *top <= value) {
+            lowest = lowest.min(low);
+        }
+        let higher = !self.0.is_empty();
+        self.0.push((value, lowest));
+        Saddle { lowest, higher }
+    }
+}
+
 fn saddles<'a>(values: impl Iterator<Item = &'a f64>) -> Vec<Saddle> {
-    let mut stack: Vec<(f64, f64)> = Vec::new();
-    values
-        .map(|&value| {
-            let mut lowest = value;
-            while let Some((_, low)) = stack.pop_if(|(top, _)| *top <= value) {
-                lowest = lowest.min(low);
-            }
-            let higher = !stack.is_empty();
-            stack.push((value, lowest));
-            Saddle { lowest, higher }
-        })
-        .collect()
+    let mut passed = Passed::default();
+    values.map(|&value| passed.saddle_before(value)).collect()
 }
 
 /// A peak of a reference and the one of a prediction that matches it.
@@ -149,6 +176,7 @@ mod tests {
                 let expected: Vec<usize> =
                     all.iter().copied().filter(|&i| prominence(&values, i) >= least).collect();
                 assert_eq!(peaks(&values, least), expected, "{values:?}");
+                assert_eq!(first_peak(&values, least), expected.first().copied(), "{values:?}");
             }
         }
     }
@@ -160,6 +188,7 @@ mod tests {
         assert_eq!(peaks(&saw, 0.5).len(), 1);
         let saw: Vec<f64> = (0..1_000_000).map(|i| f64::from(i % 2 * 4 - i)).collect();
         assert_eq!(peaks(&saw, 0.5).len(), 500_000);
+        assert_eq!([first_peak(&saw, 0.5), first_peak(&saw, 2e6)], [Some(1), None]);
     }
 
     #[test]

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::error::{Error, KeyPath, error};
 use crate::plan::{Design, Plan, Vary, Vehicles, What};
-use crate::scenario::{InterfaceSpeed, Scenario};
+use crate::scenario::{self, InterfaceSpeed, Scenario};
 use crate::unit::{LengthText, MassText, SignedSpeedText};
 
 /// One column of varied values.
@@ -99,6 +99,12 @@ impl Binder<'_> {
                         "curve \"{curve}\" has no band: only a model and a predicted curve (.json) have one"
                     ));
                 }
+                // An end of a vehicle and a law with a rate have none.
+                let mut banded = self.scenario.clone();
+                banded.curves.entry(curve.into()).and_modify(|table| table.band = Some(0.0));
+                if let Err(error) = banded.check() {
+                    return Err(error!(Sweep at "curve", "{}", error.message()));
+                }
                 self.one("band", "band", curve, Target::Band(curve.into()))
             }
             What::Force => {
@@ -114,6 +120,14 @@ impl Binder<'_> {
                 self.one("curve", "curve", curve, Target::Curve(curve.into()))
             }
         }
+    }
+
+    /// Whether the plan puts a curve in place of others.
+    fn replaces(&self, curve: &str) -> bool {
+        let replaces = |v: &Vary| {
+            v.what == What::Curve && v.values.iter().flatten().any(|value| value.0 == curve)
+        };
+        self.plan.vary.iter().any(replaces)
     }
 
     fn gaps(&self) -> Result<Vec<Variable>, Error> {
@@ -134,18 +148,10 @@ impl Binder<'_> {
                         "curve \"{curve}\" has no gap that a factor could change"
                     ));
                 }
-                if self.scenario.contact.gap.is_some()
-                    && !self
-                        .scenario
-                        .clone()
-                        .curve_names_mut()
-                        .into_iter()
-                        .skip(usize::from(self.scenario.contact.curve.is_some()))
-                        .any(|name| name == curve)
-                {
+                if !self.replaces(curve) && !scenario::takes_gap_of(self.scenario, curve)? {
                     return Err(error!(
                         Sweep at "curve",
-                        "the contact has its own gap, so that of curve \"{curve}\" has no effect: write interface = \"contact\""
+                        "where curve \"{curve}\" is used, the contact, a train or a vehicle has its own gap, so that of the curve has no effect: remove these (of the contact, vary interface = \"contact\")"
                     ));
                 }
                 self.one("gap_m", "gap_factor", curve, Target::CurveGap(curve.clone()))
@@ -283,13 +289,9 @@ impl Binder<'_> {
     /// A curve that is there, and that some item uses.
     fn check_curve(&self, curve: &str) -> Result<(), Error> {
         self.known_curve("curve", curve)?;
-        let replaces = |v: &Vary| {
-            v.what == What::Curve && v.values.iter().flatten().any(|value| value.0 == curve)
-        };
         let mut scenario = self.scenario.clone();
-        let used = scenario.curve_names_mut().iter().any(|name| *name == curve)
-            || self.plan.vary.iter().any(replaces);
-        if used {
+        let used = scenario.curve_names_mut().iter().any(|name| *name == curve);
+        if used || self.replaces(curve) {
             Ok(())
         } else {
             Err(error!(

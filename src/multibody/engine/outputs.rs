@@ -29,6 +29,7 @@ fn kinds(record: Record) -> (&'static [OfBody], &'static [OfInterface]) {
     match record {
         Record::Histories => (&OF_BODY, &OF_INTERFACE),
         Record::Summary => (&OF_BODY[..1], &[]),
+        Record::Closing => (&OF_BODY[..1], &OF_INTERFACE[..2]),
     }
 }
 
@@ -135,11 +136,16 @@ impl Engine<'_> {
         self.events.output_bodies::<N>(&self.v, time_s);
         let (v, x, a) = (self.v.values(n), self.x_m.values(n), self.a.values(n));
         recorder.recent.keep(0, n, |c| v[c]);
-        if recorder.record == Record::Histories {
-            run.time_s.push(time_s);
-            recorder.recent.keep(1, n, |c| x[c]);
-            recorder.recent.keep(2, n, |c| a[c]);
-            self.record_interfaces::<N>(recorder);
+        match recorder.record {
+            Record::Histories => {
+                run.time_s.push(time_s);
+                recorder.recent.keep(1, n, |c| x[c]);
+                recorder.recent.keep(2, n, |c| a[c]);
+                self.record_contacts::<N>(3, recorder);
+                self.record_energies::<N>(5, recorder);
+            }
+            Record::Closing => self.record_contacts::<N>(1, recorder),
+            Record::Summary => {}
         }
         recorder.recent.outputs += 1;
         if recorder.recent.outputs == OUTPUTS {
@@ -175,25 +181,30 @@ impl Engine<'_> {
         }
     }
 
+    /// Deflections and forces, as kinds from `first` on.
     #[inline(always)]
-    fn record_interfaces<const N: usize>(&self, recorder: &mut OutputRecorder) {
+    fn record_contacts<const N: usize>(&self, first: usize, recorder: &mut OutputRecorder) {
+        let n = self.fixed.layout.known::<N>();
+        let d = self.push.deflections_m(StepPoint::End).values(n);
+        let f = self.forces_n(StepPoint::End).values(n);
+        // A branch ends at zero but for rounding.
+        let least = [if self.net_n.is_none() { 0.0 } else { f64::NEG_INFINITY }; LANES];
+        recorder.recent.keep(first, n, |c| d[c]);
+        recorder.recent.keep(first + 1, n, |c| larger(f[c], least));
+    }
+
+    /// Largest deflections, what is stored and what is dissipated, as kinds from `first` on.
+    #[inline(always)]
+    fn record_energies<const N: usize>(&self, first: usize, recorder: &mut OutputRecorder) {
         let n = self.fixed.layout.known::<N>();
         self.split_work::<N>(recorder);
         let OutputRecorder { recent, work_j, largest_m, dissipated_j, .. } = recorder;
-        let (d, f) = (
-            self.push.deflections_m(StepPoint::End).values(n),
-            self.forces_n(StepPoint::End).values(n),
-        );
         let (work_j, lost_j) = (work_j.values(n), dissipated_j.values(n));
         let largest_m = largest_m.values(n);
-        // A branch ends at zero but for rounding.
-        let least = [if self.net_n.is_none() { 0.0 } else { f64::NEG_INFINITY }; LANES];
         let stored = |c: usize| each(|j| work_j[c][j] - lost_j[c][j]);
-        recent.keep(3, n, |c| d[c]);
-        recent.keep(4, n, |c| larger(f[c], least));
-        recent.keep(5, n, |c| largest_m[c]);
-        recent.keep(6, n, |c| larger(stored(c), [0.0; LANES]));
-        recent.keep(7, n, |c| lost_j[c]);
+        recent.keep(first, n, |c| largest_m[c]);
+        recent.keep(first + 1, n, |c| larger(stored(c), [0.0; LANES]));
+        recent.keep(first + 2, n, |c| lost_j[c]);
     }
 
     /// Fills in what is known at the end of the run.

@@ -16,7 +16,7 @@ mod spans;
 use super::chain::Chain;
 use super::rows::{LANES, LaneIndex, Layout, Row, Rows, each, larger};
 use super::run::{InterfaceHistory, Record, Run};
-use occupant::{occupant_load_m_per_s2, secondary_impact_m_per_s};
+use occupant::Flight;
 use spans::{LEAST_N, Look, Phase, Spans};
 pub(super) use spans::{LOOK_S, Moment};
 
@@ -189,11 +189,12 @@ impl EventRecorder {
                 spans.close(span);
             }
             history.final_v_m_per_s = final_v_m_per_s;
-            history.moving_mean_deceleration_m_per_s2 = moving_mean(&history.v_m_per_s, interval_s);
-            if interval_s <= COARSEST_S {
+            if record != Record::Closing && interval_s <= COARSEST_S {
                 let speeds = &history.v_m_per_s;
-                history.secondary_impact_m_per_s = secondary_impact_m_per_s(speeds, interval_s);
-                history.occupant_load_m_per_s2 = occupant_load_m_per_s2(speeds, interval_s);
+                let flight = Flight::new(speeds, interval_s);
+                history.moving_mean_deceleration_m_per_s2 = moving_mean(speeds, interval_s);
+                history.secondary_impact_m_per_s = flight.secondary_impact_m_per_s();
+                history.occupant_load_m_per_s2 = flight.occupant_load_m_per_s2();
             }
             if record == Record::Summary {
                 history.v_m_per_s = Vec::new();
@@ -203,6 +204,8 @@ impl EventRecorder {
                 history.is_loaded_at_end = contact.is_cut;
                 history.loaded_s = Some(contact.times_s());
             }
+            history.main_contact =
+                spans.main().map(|span| (span.mean_deceleration(), span.times_s(), span.is_cut));
         }
     }
 }

@@ -183,14 +183,16 @@ impl Span {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Spans {
     closed: Vec<Span>,
-    /// Largest change of speed so far.
-    largest_change: f64,
+    /// The one with the largest change of speed so far.
+    largest: Option<Span>,
 }
 
 impl Spans {
     /// Keeps a span that may count: before it there may be many that do not.
     pub(crate) fn close(&mut self, span: Span) {
-        self.largest_change = self.largest_change.max(span.change());
+        if self.largest.is_none_or(|largest| span.change() > largest.change()) {
+            self.largest = Some(span);
+        }
         if self.counts(&span) && self.closed.len() < MOST_SPANS {
             self.closed.push(span);
         }
@@ -198,11 +200,18 @@ impl Spans {
 
     /// Whether a span counts beside the largest so far.
     fn counts(&self, span: &Span) -> bool {
-        span.change() >= LEAST_SHARE * self.largest_change && span.end.time_s > span.begin.time_s
+        let largest = self.largest.map_or(0.0, |largest| largest.change());
+        span.change() >= LEAST_SHARE * largest && span.end.time_s > span.begin.time_s
     }
 
     pub(crate) fn first(&self) -> Option<&Span> {
         self.closed.iter().find(|span| self.counts(span))
+    }
+
+    /// The one that changes the speed most, if a smaller one comes before it.
+    pub(crate) fn main(&self) -> Option<&Span> {
+        let first = self.first()?;
+        self.largest.as_ref().filter(|largest| self.counts(largest) && *largest != first)
     }
 }
 
@@ -276,6 +285,10 @@ mod tests {
         spans.close(span(0.0, 9.99));
         assert_eq!(spans.first(), Some(&span(0.0, 9.99)));
         spans.close(span(0.1, 5.0));
+        assert_eq!((spans.first(), spans.main()), (Some(&span(0.1, 5.0)), None));
+        spans.close(span(0.2, 1.0));
+        spans.close(span(0.3, 2.0));
         assert_eq!(spans.first(), Some(&span(0.1, 5.0)));
+        assert_eq!(spans.main(), Some(&span(0.2, 1.0)));
     }
 }
