@@ -1190,6 +1190,14 @@ fn forces_that_share_the_load_are_added() {
         case.curves.original.force_n().iter().copied().fold(0.0, f64::max)
     };
     assert!((peak_n("asked.h5") / peak_n("known.h5") - 1.0).abs() < 1e-6);
+    // Contacts that name the bodies in another order cannot be added.
+    let turned: Vec<f64> = half.iter().map(|f| -f).collect();
+    let contact = |id, along_n| Force { id, title: "", along_n, across_n: 0.0 };
+    let run = here.join("turned/50kmh");
+    layout.nodout(&run, &history, &car_nodes());
+    layout.rcforc(&run, &history, &[contact(1, &half), contact(2, &turned)]);
+    let said = warned(here, "init turned -o turned.toml");
+    says(&said, "on opposite sides: if these share the load, force and masses are those of a part");
     // A wall that is not there, or twice.
     for (ids, what) in [
         ("[1, 7]", "7"),
@@ -1259,5 +1267,5 @@ fn a_force_that_is_recorded_late_is_no_gravity() {
     assert!(!said.contains("free flight"), "{said}");
     layout.rwforc(&run, &history, &[wall(&force_n)]);
     let said = warned(here, "build s.toml -o s.h5");
-    says(&said, "nearly all of it in the second half of that time: the force is recorded late");
+    says(&said, "as neither gravity nor brakes change it: the force is recorded late");
 }

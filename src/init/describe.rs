@@ -247,15 +247,23 @@ impl Facts<'_> {
         if let Some(force) = &recipe.force
             && force.also.is_empty()
             && self.hints.force.is_none()
-            && !recipe.beside.ids.is_empty()
             && !self.records.iter().any(is_whole)
         {
             let (file, id, whole) = (force.file, force.id, recipe.beside.whole);
-            let ids: Vec<String> = recipe.beside.ids.iter().map(i64::to_string).collect();
-            let ids = ids.join(", ");
-            warnings.push(format!(
-                "the bodies follow {file} {ids} as they follow {file} {id}: if these share the load, write id = [{id}, {ids}] in force, and {whole:.2} times the masses"
-            ));
+            let listed =
+                |ids: &[i64]| ids.iter().map(i64::to_string).collect::<Vec<_>>().join(", ");
+            let ids = listed(&recipe.beside.ids);
+            if !ids.is_empty() {
+                warnings.push(format!(
+                    "the bodies follow {file} {ids} as they follow {file} {id}: if these share the load, write id = [{id}, {ids}] in force, and {whole:.2} times the masses"
+                ));
+            }
+            let opposite = listed(&recipe.beside.opposite);
+            if !opposite.is_empty() {
+                warnings.push(format!(
+                    "the bodies follow {file} {opposite} as they follow {file} {id}, on opposite sides: if these share the load, force and masses are those of a part, and a recipe cannot add them: let the deck's contacts name the bodies in one order"
+                ));
+            }
         }
         if self.force_is_of_section() {
             warnings.push(

@@ -55,6 +55,8 @@ pub(super) struct Beside {
     pub ids: Vec<i64>,
     /// The impulse of all, the chosen one among them, over that of the chosen one.
     pub whole: f64,
+    /// Others of the file act against it on the side that would be added, so that no recipe adds them.
+    pub opposite: Vec<i64>,
 }
 
 /// What else could be meant, and how well it would do.
@@ -348,13 +350,17 @@ fn chosen_force(views: &[RunView<'_>]) -> Option<(ForceCandidate, Vec<Alternativ
         .collect();
     let last = |force: &ForceCandidate| force.impulse.last().copied().unwrap_or(0.0);
     let shares = others.iter().filter(|(other, residual)| {
-        let is_alike = other.file == force.file && other.side == force.side;
         let is_contact = ["rwforc", "rcforc"].contains(&force.file);
-        is_alike && is_contact && *residual < FOLLOWS && last(other) * last(force) > 0.0
+        other.file == force.file && is_contact && *residual < FOLLOWS
     });
-    let (ids, sizes): (Vec<i64>, Vec<f64>) =
-        shares.map(|(other, _)| (other.id, other.size() / force.size())).unzip();
-    let beside = Beside { ids, whole: 1.0 + sizes.iter().sum::<f64>() };
+    let is_alike =
+        |other: &&ForceCandidate| other.side == force.side && last(other) * last(force) > 0.0;
+    let (alike, opposite): (Vec<_>, Vec<_>) = shares.map(|(other, _)| *other).partition(is_alike);
+    let beside = Beside {
+        ids: alike.iter().map(|other| other.id).collect(),
+        whole: 1.0 + alike.iter().map(|other| other.size() / force.size()).sum::<f64>(),
+        opposite: opposite.iter().map(|other| other.id).collect(),
+    };
     let others = others
         .into_iter()
         .take(NAMED)

@@ -45,7 +45,7 @@ pub(crate) struct LimitsTable {
     pub(crate) standard: String,
     /// Such as "2020+A1:2024".
     pub(crate) edition: String,
-    /// Of the mean deceleration while the net contact force acts, in g.
+    /// Of the mean decelerations of the first contact and of the one that changes the speed most, in g.
     pub(crate) mean_deceleration_g: f64,
     /// Limit of the speed at which an unrestrained occupant meets the interior after 0.6 m.
     pub(crate) secondary_impact: Option<ImpactSpeedText>,

@@ -33,9 +33,11 @@ const OTHER_FILES: &str = "likely files of two runs, the wrong node or wall, or 
 /// A peak is a spike above these multiples of its neighbours and of all others.
 const SPIKE: (f64, f64) = (2.5, 1.2);
 /// Masses of two bodies whose ratio differs from that of their changes of velocity by more are doubtful.
-const RATIO: f64 = 0.1;
+const RATIO: f64 = 0.25;
 /// Gravity changes half of the speed in half of a flight; what has changed less than this share of it begins later.
 const SUDDEN: f64 = 0.2;
+/// Neither gravity nor brakes change a speed faster, in m/s².
+const STEEPEST: f64 = 40.0;
 /// Free flight in fewer states says nothing of gravity.
 const FLIGHT: usize = 5;
 /// Work of another force, as a share of the kinetic energy, that deserves a warning.
@@ -103,19 +105,24 @@ pub(super) fn displacement(record: &Record) -> Result<Notes, ImpossibleRun> {
     Ok(remarks)
 }
 
-/// Of two bodies, whether their changes of velocity are in the ratio of their masses: `m₁Δv₁ = −m₂Δv₂`.
+/// Of two bodies, whether their changes of velocity are in the ratio of their masses while they close: `m₁Δv₁ = −m₂Δv₂`.
+/// Brakes change the velocities as well, but little in that time.
 pub(super) fn masses(measured: &Measured<'_>, masses: Masses) -> Option<String> {
     let changes = |history: &History| -> Vec<f64> {
         history.values.iter().map(|v| v - history.values[0]).collect()
     };
-    let (own, other) = (changes(measured.velocity?), changes(measured.minus_velocity?));
-    let sum = |of: &dyn Fn(usize) -> f64| -> f64 { (0..own.len().min(other.len())).map(of).sum() };
+    let velocities = [measured.velocity?, measured.minus_velocity?];
+    let closing = velocities[0].values.iter().zip(&velocities[1].values).map(|(a, b)| a - b);
+    let first = velocities[0].values.first()? - velocities[1].values.first()?;
+    let states = closing.take_while(|closing| closing * first > 0.0).count();
+    let [own, other] = velocities.map(changes);
+    let sum = |of: &dyn Fn(usize) -> f64| -> f64 { (0..states).map(of).sum() };
     let found = -sum(&|i| own[i] * other[i]) / sum(&|i| other[i] * other[i]);
     let stated = masses.other_kg? / masses.body_kg;
     let is_off = |stated: f64| (found / stated - 1.0).abs() > RATIO;
     (found.is_finite() && found > 0.0 && is_off(stated)).then(|| {
         let what_to_do = match is_off(1.0 / stated) {
-            true => "one of them is wrong, or the node of another body",
+            true => "one of them is wrong, the node of another body, or brakes act on one",
             false => "they are exchanged",
         };
         format!(
@@ -311,9 +318,10 @@ impl<'a> Motion<'a> {
         let energy = 0.5 * self.contact.closing_m_per_s[0].powi(2);
         let share = rate * crush_m / energy;
         let halfway = record.rate_m_per_s[states / 2].abs();
-        if share.abs() > OTHER_WORK && (halfway - first).abs() < SUDDEN * (last - first).abs() {
+        let is_sudden = (halfway - first).abs() < SUDDEN * (last - first).abs();
+        if share.abs() > OTHER_WORK && (is_sudden || rate.abs() > STEEPEST) {
             remarks.warn(format!(
-                "free flight: the speed changes by {:.3} m/s before contact, nearly all of it in the second half of that time: the force is recorded late, or another one acts before it: check the times of both files",
+                "free flight: the speed changes by {:.3} m/s before contact, as neither gravity nor brakes change it: the force is recorded late, or another one acts before it: check the times of both files",
                 last - first
             ));
         } else if share.abs() > OTHER_WORK {
