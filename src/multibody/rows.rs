@@ -13,7 +13,12 @@ pub(super) type Row = [f64; LANES];
 
 #[inline(always)]
 pub(super) fn each(value: impl Fn(usize) -> f64) -> Row {
-    std::array::from_fn(value)
+    // Not `std::array::from_fn`: without link-time optimisation its closures stay calls.
+    let mut row = [0.0; LANES];
+    for (j, lane) in row.iter_mut().enumerate() {
+        *lane = value(j);
+    }
+    row
 }
 
 #[inline(always)]
