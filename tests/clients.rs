@@ -261,23 +261,18 @@ fn forest_is_as_accurate_as_scikit_learn_on_the_fe_table() {
     let set = TrainingSet::new("lead-car-wall", database.cases("lead-car-wall")).unwrap();
     let table = set.table(TableKind::Samples);
     agrees_with_scikit_learn("FE table, states", table.records(), table.targets());
-    // The same with more rows, which takes scikit-learn minutes.
+    // More rows and a smooth function, which take scikit-learn minutes.
     if is_thorough() {
         let table = set.table(TableKind::Grid);
         agrees_with_scikit_learn("FE table, grid", table.records(), table.targets());
+        // Quasi-random points (generalised golden ratio) in the unit square.
+        let point = |i: usize, step: f64| (0.5 + step * i as f64).fract();
+        let records = Array2::from_shape_fn((700, 2), |(i, k)| {
+            point(i, [0.754_877_666_246_692_7, 0.569_840_290_998_053_3][k])
+        });
+        let targets = records.map_axis(Axis(1), |r| (6.0 * r[0]).sin() + r[1] * r[1] * r[0]);
+        agrees_with_scikit_learn("smooth function", &records, &targets);
     }
-}
-
-#[test]
-#[ignore = "needs the Python clients (tests/run installs them)"]
-fn forest_is_as_accurate_as_scikit_learn_on_a_smooth_function() {
-    // Quasi-random points (generalised golden ratio) in the unit square.
-    let point = |i: usize, step: f64| (0.5 + step * i as f64).fract();
-    let records = Array2::from_shape_fn((700, 2), |(i, k)| {
-        point(i, [0.754_877_666_246_692_7, 0.569_840_290_998_053_3][k])
-    });
-    let targets = records.map_axis(Axis(1), |r| (6.0 * r[0]).sin() + r[1] * r[1] * r[0]);
-    agrees_with_scikit_learn("smooth function", &records, &targets);
 }
 
 /// Records that fall on thresholds or just below them, and others between, as raw doubles.

@@ -706,6 +706,21 @@ fn compare_at_all_speeds_with_one_fixed_curve() {
     let mean = result["means"][2]["velocity_l1"].as_f64().unwrap();
     let sum: f64 = comparisons.iter().map(|c| c["rows"][2]["velocity_l1"].as_f64().unwrap()).sum();
     assert!((mean - sum / 5.0).abs() < 1e-12);
+    // Where the mass goes further than the fixed curve, its last force is held, and that is said.
+    let row = &comparisons[4]["rows"][2];
+    assert!(
+        row["data_end_m"].as_f64().unwrap() < 0.2 && row["max_crush_m"].as_f64().unwrap() > 0.5
+    );
+    let inner = [&base[..], &["--fixed-speed", "36km/h"]].concat();
+    let text = crumple_ok(folder.path(), &inner);
+    says(&text, "fdrm: at 48 km/h, 60 km/h the mass goes beyond its curve's data");
+    says(&text, "FE at 36 km/h, held from 0.566 m");
+    says(&text, "means over 18 km/h, 25 km/h, 48 km/h, 60 km/h");
+    // 48 and 72 km/h are equally near.
+    let nearest = [&base[..], &["--speed", "60km/h", "--json"]].concat();
+    let nearest = json(&crumple_ok(folder.path(), &nearest));
+    assert_eq!(nearest["rows"][2]["curve"], "FE at 48 km/h");
+    assert_eq!(nearest["window_is_cut"], false);
     let own = [&base[..], &["--fixed-speed", "48km/h", "--speed", "48km/h"]].concat();
     says(&crumple_fails(folder.path(), 1, &own), "the speed that is left out: choose another one");
 }

@@ -1250,7 +1250,7 @@ fn short_impacts_get_a_filter_that_leaves_their_work() {
 
 /// A body that slows down shortly before the force begins: nothing that acts on it all the time.
 #[test]
-fn a_force_that_is_recorded_late_is_no_gravity() {
+fn a_late_force_is_not_taken_for_gravity() {
     let history = Crash { gap_m: 0.3, ..Crash::default() }.run();
     let late = 25;
     let mut force_n = vec![0.0; late];
@@ -1268,4 +1268,42 @@ fn a_force_that_is_recorded_late_is_no_gravity() {
     layout.rwforc(&run, &history, &[wall(&force_n)]);
     let said = warned(here, "build s.toml -o s.h5");
     says(&said, "as neither gravity nor brakes change it: the force is recorded late");
+}
+
+/// A body that falls through its impact takes more impulse than its mass times its change of speed.
+#[test]
+fn gravity_does_not_falsify_the_mass() {
+    let (mass_kg, speed, gravity, force_n) = (24e3, 10.0, 9.81, 3e6);
+    let mut history = History { bodies: vec![Default::default()], ..History::default() };
+    let (mut x, mut v): (f64, f64) = (0.0, speed);
+    // It leaves the ground again at 1 m/s.
+    let mut is_over = false;
+    for k in 0..1800 {
+        let time_s = 1e-4 * f64::from(k);
+        is_over |= v <= -1.0;
+        let acting_n = if time_s > 0.02 && !is_over { force_n } else { 0.0 };
+        history.time_s.push(time_s);
+        history.contact_n.push(acting_n);
+        history.kinetic_j.push(0.5 * mass_kg * v * v);
+        history.bodies[0].displacement_m[4].push(x);
+        history.bodies[0].velocity_m_per_s[4].push(v);
+        x += 1e-4 * v;
+        v += 1e-4 * (gravity - acting_n / mass_kg);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
+    let run = here.join("drop/a");
+    let ground = Node { id: 1, title: "ground", on: None, shakes: 0.0 };
+    layout.nodout(&run, &history, &[ground, node(5, "", 0, 4, 0.0)]);
+    let wall = Force { id: 1, title: "", along_n: &history.contact_n, across_n: 0.0 };
+    layout.rwforc(&run, &history, &[wall]);
+    let said = warned(here, "init drop --units mm-t-s -o without.toml");
+    says(
+        &said,
+        "the body's speed changes without the force too (gravity, brakes, another contact)",
+    );
+    layout.glstat(&run, &history);
+    crumple_ok(here, "init drop --units mm-t-s -o with.toml");
+    assert_eq!(study(here, "with.toml")["run"][0]["mass"].as_str(), Some("24t"));
 }

@@ -695,6 +695,35 @@ fn a_restart_replaces_the_states_it_writes_again() {
 }
 
 /// The first state is the damaged one: the others decide which entities there are.
+/// A restart that continues a file puts its header below the states before it.
+#[test]
+fn a_second_header_is_no_damage() {
+    let states = |from: u32, to: u32| -> String {
+        (from..to)
+            .map(|k| {
+                let time = format!("{:.7E}", f64::from(k)).replace('E', "E+0");
+                state(k, &time) + TRANSLATIONS + &row("7", &format!("{k}.00000E+00"), 12)
+            })
+            .collect()
+    };
+    let legend = "\n{BEGIN LEGEND}\n Entity #        Title\n        7     seat\n{END LEGEND}\n";
+    let later = HEADER.replace("12/12/2022", "13/12/2022");
+    for blank in ["", "\n"] {
+        let text = format!("{legend}{}{blank}{later}{legend}{}", states(0, 5), states(5, 9));
+        let file = read("nodout", &text);
+        assert_eq!(file.problems, []);
+        let expected: Vec<f64> = (0..9).map(f64::from).collect();
+        assert_eq!(
+            (&file.time[..], values(&file, 7, "z_coordinate")),
+            (&expected[..], expected.clone())
+        );
+        assert_eq!(file.entities[0].title.as_deref(), Some("seat"));
+    }
+    // What only looks like a title is damage as before.
+    let text = states(0, 5) + "\n title of another file\n" + &states(5, 9);
+    assert!(codes(&read("nodout", &text)).contains(&ProblemCode::BadLine));
+}
+
 #[test]
 fn a_first_state_that_differs_is_left_out() {
     let forces = |id: u32, time: &str| side("slave", id, time, FORCES);

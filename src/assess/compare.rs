@@ -32,6 +32,8 @@ pub(crate) struct Comparison {
     pub mass_kg: f64,
     /// From contact to 30 ms after FE's maximum deflection, as far as the record reaches.
     pub window_s: f64,
+    /// Whether the record ends before that.
+    pub window_is_cut: bool,
     /// Peak force of FE's record, in N.
     #[serde(rename = "reference_peak_force_N")]
     pub reference_peak_force_n: f64,
@@ -81,8 +83,12 @@ pub(crate) struct NsdmFit {
 }
 
 /// The speeds of a group that lie between others, for a comparison at each, in m/s, and the names of the cases there that ended while
-/// loading and cannot serve as a reference.
-pub(crate) fn inner_speeds(group: &str, cases: &[Case]) -> Result<(Vec<f64>, Vec<String>), Error> {
+/// loading and cannot serve as a reference. The speed of a fixed curve, in m/s, is not one of them.
+pub(crate) fn inner_speeds(
+    group: &str,
+    cases: &[Case],
+    fixed_m_per_s: Option<f64>,
+) -> Result<(Vec<f64>, Vec<String>), Error> {
     let set = TrainingSet::new(group, cases)?;
     let mut speeds = set.speeds_m_per_s();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
@@ -90,12 +96,18 @@ pub(crate) fn inner_speeds(group: &str, cases: &[Case]) -> Result<(Vec<f64>, Vec
         return Err(too_few(speeds.len()));
     }
     let ends = [speeds[0], speeds[speeds.len() - 1]];
-    let is_inner = |v: f64| ends.iter().all(|end| !is_same_speed(*end, v));
+    let is_inner = |v: f64| ends.iter().chain(&fixed_m_per_s).all(|s| !is_same_speed(*s, v));
     let inner = set.cases.iter().filter(|case| is_inner(case.speed_m_per_s));
     let (cut, whole): (Vec<_>, Vec<_>) = inner.partition(|case| case.truncated);
     let mut speeds: Vec<f64> = whole.iter().map(|case| case.speed_m_per_s).collect();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
     let cut: Vec<String> = cut.iter().map(|case| case.name.clone()).collect();
+    if speeds.is_empty() && cut.is_empty() {
+        return Err(error!(
+            Comparison,
+            "the fixed curve is that of the only inner speed: choose another one"
+        ));
+    }
     if speeds.is_empty() {
         return Err(error!(
             Comparison,
@@ -158,6 +170,7 @@ pub(crate) fn compare(
         inner: left_out.inner,
         mass_kg: case.conditions.masses.effective_kg(),
         window_s: reference.window_s(),
+        window_is_cut: reference.is_cut(),
         reference_peak_force_n: case.peak_force_n(),
         reference_max_crush_m: case.max_deflection_m(),
         fe_time_s: case.provenance.solver_wall_time_s,
@@ -203,7 +216,8 @@ fn too_few(cases: usize) -> Error {
 }
 
 fn no_case(group: &str, asked_m_per_s: f64, set: &TrainingSet) -> Error {
-    let known: Vec<String> = set.speeds_m_per_s().into_iter().map(km_per_h).collect();
+    let mut known: Vec<String> = set.speeds_m_per_s().into_iter().map(km_per_h).collect();
+    known.dedup();
     error!(
         Comparison,
         "group \"{group}\" has no case at {asked}: it has {known}",

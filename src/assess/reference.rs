@@ -25,6 +25,8 @@ pub struct Reference {
     time_s: Vec<f64>,
     /// States inside the window.
     inside: usize,
+    /// Whether the record ends inside the window.
+    is_cut: bool,
     velocity: Vec<f64>,
     acceleration: Vec<f64>,
     /// CFC 60.
@@ -67,6 +69,7 @@ impl Reference {
             mass_kg: case.conditions.masses.effective_kg(),
             speed_m_per_s: case.conditions.speed.m_per_s,
             acceleration_filtered: filtered(&time_s, acceleration.clone()),
+            is_cut: end_s - time_s[time_s.len() - 1] > 1.5 * (time_s[1] - time_s[0]),
             time_s,
             inside,
             velocity,
@@ -77,6 +80,11 @@ impl Reference {
     /// Length of the window in s.
     pub(crate) fn window_s(&self) -> f64 {
         self.time_s[self.inside - 1]
+    }
+
+    /// Whether the record ends before the window.
+    pub(crate) fn is_cut(&self) -> bool {
+        self.is_cut
     }
 
     /// Runs one body of the case's effective mass against a wall with a force curve.

@@ -40,6 +40,8 @@ pub(crate) struct Row {
     pub peak_force_n: f64,
     /// Maximum deflection of the run, in m.
     pub max_crush_m: f64,
+    /// Deflection up to which the curve has data, in m; beyond it the run holds the last force. Null for a spring and damper.
+    pub data_end_m: Option<f64>,
     /// By the acceptance rule for numerical crash models, as one stage.
     pub acceptance: Acceptance,
     /// Time to fit, from the training cases on.
@@ -56,6 +58,16 @@ pub(crate) struct Row {
     pub velocity: Rating,
     /// Every measure of the acceleration, CFC 60.
     pub acceleration: Rating,
+}
+
+/// A crush beyond the data by less than this share is that of another unloading or step.
+const BEYOND: f64 = 0.01;
+
+impl Row {
+    /// Where the curve's data end, in m, if the run crushes further.
+    pub(crate) fn held_from_m(&self) -> Option<f64> {
+        self.data_end_m.filter(|end| self.max_crush_m > (1.0 + BEYOND) * end)
+    }
 }
 
 /// What all rows of one comparison share.
@@ -84,6 +96,7 @@ impl RowBuilder<'_> {
         let Method { name, made_from, curve, forces: (truth, ours), times } = method;
         let start = Instant::now();
         let run = self.reference.run(&curve)?;
+        let data_end_m = Some(curve.data_end_m.unwrap_or(curve.loading.end_m()));
         let simulation_s = start.elapsed().as_secs_f64();
         let velocity = self.reference.velocity_of(&run)?;
         let motion = Motion {
@@ -95,7 +108,7 @@ impl RowBuilder<'_> {
         let along = grid(truth.end_m(), STEPS);
         let force_l1 = Some(l1_ratio(&forces_n(&truth, &along), &forces_n(&ours, &along)));
         let row = self.rated(name, made_from, curve.kind, motion, times)?;
-        Ok(Row { force_l1, ..row })
+        Ok(Row { force_l1, data_end_m, ..row })
     }
 
     /// The row of a spring and damper.
@@ -160,6 +173,7 @@ impl RowBuilder<'_> {
             force_l1: None,
             peak_force_n,
             max_crush_m,
+            data_end_m: None,
             acceptance: self.acceptance(&velocity[..inside], max_crush_m),
             fit_time_s: times.fit_s,
             predict_time_s: times.predict_s,

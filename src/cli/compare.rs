@@ -92,7 +92,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let (group, cases) = database.group_or_only(path, args.group.as_deref())?;
     let (speeds, cut) = match args.speed {
         Some(speed) => (vec![speed], Vec::new()),
-        None => compare::inner_speeds(group, cases)?,
+        None => compare::inner_speeds(group, cases, args.fixed_speed)?,
     };
     for case in &cut {
         options.warn(&format!(
@@ -123,10 +123,14 @@ fn percent(error: f64) -> String {
 }
 
 fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
-    let fe_time = comparison.fe_time_s.map_or(String::new(), |t| format!(", run in {t:.0} s"));
+    let mut more = comparison.fe_time_s.map_or(String::new(), |t| format!(", run in {t:.0} s"));
+    if comparison.window_is_cut {
+        let window_ms = comparison.window_s * 1e3;
+        more += &format!("; its record ends at {window_ms:.0} ms, and the comparison with it");
+    }
     writeln!(
         out,
-        "{} at {} ({}), left out; FE: peak force {}, max crush {:.4} m{fe_time}",
+        "{} at {} ({}), left out; FE: peak force {}, max crush {:.4} m{more}",
         comparison.group,
         km_per_h(comparison.speed_m_per_s),
         comparison.speed_kind.name(),
@@ -142,7 +146,10 @@ fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
     let table = Table::of(&comparison.rows)
         .column("method", |row| &row.method)
         .column("driven by", |row| driven_by(row.driven_by))
-        .column("curve", |row| &row.curve)
+        .column("curve", |row| match row.held_from_m() {
+            Some(end) => format!("{}, held from {end:.3} m", row.curve),
+            None => row.curve.clone(),
+        })
         .column("velocity", |row| percent(row.velocity_l1))
         .column("acceleration", |row| {
             let unfiltered = row.acceleration_unfiltered_l1 * 100.0;
@@ -251,6 +258,20 @@ fn several(comparisons: &[Comparison], options: GlobalOptions) -> CommandResult 
             .column("acceleration", |m| format!("{:.3}", m.acceleration_iso18571))
             .column("within 10 %", |m| format!("{} of {}", m.accepted, comparisons.len()));
         output::table(out, table)?;
+        for m in &means {
+            let held = comparisons.iter().filter(|c| {
+                c.rows.iter().any(|row| row.method == *m.method && row.held_from_m().is_some())
+            });
+            let speeds: Vec<String> = held.map(|c| km_per_h(c.speed_m_per_s)).collect();
+            if !speeds.is_empty() {
+                writeln!(
+                    out,
+                    "{}: at {} the mass goes beyond its curve's data, where the last force is held",
+                    m.method,
+                    speeds.join(", ")
+                )?;
+            }
+        }
         writeln!(out, "within 10 %: {ACCEPTANCE} ({STANDARD})")
     })
 }

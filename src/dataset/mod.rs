@@ -268,13 +268,17 @@ pub(crate) fn grid(end_m: f64, fewest: usize) -> Vec<f64> {
     (0..=steps).map(|i| end_m * i as f64 / steps as f64).collect()
 }
 
-/// Index of the speed nearest to `v`; of two equally near ones the first.
+/// Index of the speed nearest to `v`; of equally near ones the first.
 pub(crate) fn nearest(speeds_m_per_s: impl Iterator<Item = f64>, v: f64) -> usize {
-    let closer = |best: (usize, f64), (i, s): (usize, f64)| {
-        let distance = (s - v).abs();
-        if distance < best.1 { (i, distance) } else { best }
+    least(speeds_m_per_s.map(|s| (s - v).abs()))
+}
+
+/// Index of the smallest distance; of those that only rounding tells apart the first.
+pub(crate) fn least(distances: impl Iterator<Item = f64>) -> usize {
+    let closer = |best: (usize, f64), (i, distance): (usize, f64)| {
+        if distance < best.1 * (1.0 - 1e-9) { (i, distance) } else { best }
     };
-    speeds_m_per_s.enumerate().fold((0, f64::INFINITY), closer).0
+    distances.enumerate().fold((0, f64::INFINITY), closer).0
 }
 
 /// Whether all cases have one kind of speed and of force.

@@ -208,6 +208,7 @@ impl Record {
         let estimates = |k| MassEstimates {
             by_momentum: kg(&by_momentum, k),
             in_free_flight: in_free_flight.unwrap_or_default(),
+            unexplained: self.unexplained(k),
             by_energy: kg(&by_energy, k),
         };
         (0..self.velocities.len()).map(estimates).collect()
@@ -247,6 +248,25 @@ impl Record {
         (states >= FREE.0 && share >= FREE.1).then_some(from)
     }
 
+    /// What other forces than the contact's may change a mass by momentum, as a share: the acceleration of body `k` before or
+    /// after the contact, over the time and the change of velocity that the mass is taken from.
+    fn unexplained(&self, k: usize) -> f64 {
+        let (Some((first, _)), Ok(end)) = (self.contact(), self.loading_end()) else { return 0.0 };
+        let free = self.free_flight(end);
+        let before = self.time.partition_point(|&t| t < first);
+        let velocity = &self.velocities[k];
+        let acceleration = |from: usize, to: usize| match to.saturating_sub(from) {
+            states if states < FREE.0 => 0.0,
+            _ => slope(&self.time[from..to], &velocity[from..to]).abs(),
+        };
+        let all = self.time.len();
+        let most = acceleration(0, before).max(acceleration(free.unwrap_or(all), all));
+        let at = free.map_or(end, |from| (from + all - 1) / 2);
+        let change = (velocity[at] - velocity[0]).abs();
+        let share = most * (self.time[at] - self.time[0]) / change;
+        if share.is_finite() { share } else { 0.0 }
+    }
+
     /// Mass of the other body over the first one's, by their changes of velocity while loading:
     /// no force is needed for that. `None` for one body.
     pub(super) fn mass_ratio(&self) -> Option<f64> {
@@ -270,6 +290,17 @@ impl Record {
         let body = 2.0 * kinetic / squares.sum::<f64>();
         (kinetic > 0.0 && body.is_finite()).then(|| shares.iter().map(|s| s * body).collect())
     }
+}
+
+/// Slope of the line of least squares through values over time.
+fn slope(time: &[f64], values: &[f64]) -> f64 {
+    let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
+    let (t0, v0) = (mean(time), mean(values));
+    let (of, by) = time
+        .iter()
+        .zip(values)
+        .fold((0.0, 0.0), |(of, by), (t, v)| (of + (t - t0) * (v - v0), by + (t - t0).powi(2)));
+    of / by
 }
 
 /// The first damage of a source, found when it was listed or when it was read.

@@ -321,7 +321,7 @@ impl Validated<'_> {
             MethodSpeeds::None => Vec::new(),
             MethodSpeeds::Worst => self.worst().map(|row| row.speed_m_per_s).into_iter().collect(),
             MethodSpeeds::All => {
-                inner_speeds(group, cases).map(|(speeds, _)| speeds).unwrap_or_default()
+                inner_speeds(group, cases, None).map(|(speeds, _)| speeds).unwrap_or_default()
             }
         };
         let asked = ComparisonSettings {

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::entry::ModelEntry;
 use super::{CaseCurve, QueryPoint, Surrogate};
+use crate::dataset::least;
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {
     name: "nearest",
@@ -32,7 +33,7 @@ impl Surrogate for Nearest {
 }
 
 /// Index of the case nearest in speed and features, each relative to its range; of equally
-/// near ones the first.
+/// near ones the first, which is the slowest.
 fn nearest(cases: &[CaseCurve], at: &QueryPoint<'_>) -> usize {
     let value = |case: &CaseCurve, k: usize| match k {
         0 => case.speed_m_per_s,
@@ -55,6 +56,5 @@ fn nearest(cases: &[CaseCurve], at: &QueryPoint<'_>) -> usize {
         }
         ranges.iter().enumerate().map(|r| share(r).powi(2)).sum()
     };
-    let closer = |best: (usize, f64), (i, d): (usize, f64)| if d < best.1 { (i, d) } else { best };
-    cases.iter().map(distance).enumerate().fold((0, f64::INFINITY), closer).0
+    least(cases.iter().map(distance))
 }

@@ -84,13 +84,8 @@ pub(crate) struct Sensitivity {
 
 /// Rank correlations are not given for fewer rows.
 const LEAST_ROWS: usize = 10;
-/// Results that follow nothing: errors of the method, a verdict, a ratio that is often absent.
-const NO_MEASURES: [ResultName; 4] = [
-    ResultName::EnergyError,
-    ResultName::MomentumError,
-    ResultName::Restitution,
-    ResultName::OverLimits,
-];
+/// Results that follow nothing: errors of the method.
+const NO_MEASURES: [ResultName; 2] = [ResultName::EnergyError, ResultName::MomentumError];
 
 /// The result that a column holds, by its name; `None` for what is varied.
 pub(super) fn result_of(name: &str) -> Option<ResultName> {
@@ -169,16 +164,18 @@ const Z: f64 = 1.959_963_985;
 const LEAST_NUMBERS: u64 = 30;
 
 impl ColumnStatistics {
-    /// Half the width of the interval that holds the mean of all possible rows with 95 % probability, if these are drawn
-    /// at random; of [`OVER_LIMITS`] that of the share of all `rows`, those of which it is not known taken as either. `None`
+    /// How far the mean of all possible rows is from this one at most, with 95 % probability, if these are drawn
+    /// at random; of [`OVER_LIMITS`] the share of all `rows`, those of which it is not known taken as either. `None`
     /// for fewer numbers than the normal distribution is good for.
     pub(crate) fn half_width(&self, rows: u64) -> Option<f64> {
         if self.column == OVER_LIMITS {
-            let over = self.mean? * self.count as f64;
+            let mean = self.mean?;
             let share = |over: f64| over / rows as f64;
+            let over = mean * self.count as f64;
+            // The interval of a rare event is not centred on the share that was seen.
             let (low, _) = share_interval(share(over), rows);
             let (_, high) = share_interval(share(over + (rows - self.count) as f64), rows);
-            return Some(0.5 * (high - low));
+            return Some((mean - low).max(high - mean));
         }
         (self.count >= LEAST_NUMBERS).then_some(Z * self.sd? / (self.count as f64).sqrt())
     }
@@ -199,13 +196,59 @@ fn kind(message: &str) -> String {
     message.chars().filter(|c| !is_of_a_number(c)).collect()
 }
 
+/// A warning of several rows, with the range of each number that differs between them.
+struct Reason {
+    kind: String,
+    /// Of the first row.
+    words: Vec<String>,
+    /// Smallest and largest of each word that is a number, as they are written.
+    ranges: Vec<Option<[(f64, String); 2]>>,
+    count: u64,
+}
+
+impl Reason {
+    fn new(kind: String, message: &str) -> Self {
+        let words: Vec<String> = message.split(' ').map(String::from).collect();
+        let range = |word: &String| {
+            let value: f64 = word.trim_matches(|c: char| !c.is_ascii_digit()).parse().ok()?;
+            Some([(value, word.clone()), (value, word.clone())])
+        };
+        Self { kind, ranges: words.iter().map(range).collect(), words, count: 1 }
+    }
+
+    fn add(&mut self, message: &str) {
+        self.count += 1;
+        let Self { words, ranges, .. } = Self::new(String::new(), message);
+        if words.len() != self.words.len() {
+            return;
+        }
+        for (known, new) in self.ranges.iter_mut().zip(ranges) {
+            if let (Some([low, high]), Some([one, _])) = (known, new) {
+                if one.0 < low.0 {
+                    *low = one;
+                } else if one.0 > high.0 {
+                    *high = one;
+                }
+            }
+        }
+    }
+
+    fn text(&self) -> String {
+        let word = |(word, range): (&String, &Option<[(f64, String); 2]>)| match range {
+            Some([low, high]) if low.1 != high.1 => format!("{} to {}", low.1, high.1),
+            _ => word.clone(),
+        };
+        let words: Vec<String> = self.words.iter().zip(&self.ranges).map(word).collect();
+        words.join(" ")
+    }
+}
+
 /// A report, row by row.
 pub(super) struct Tally {
     head: ShardHeader,
     pub report: Report,
     columns: Vec<Column>,
-    /// Of the reasons of warnings, in their order.
-    kinds: Vec<String>,
+    reasons: Vec<Reason>,
     /// An item is in the sample if its hash is not above this.
     threshold: u64,
 }
@@ -242,7 +285,7 @@ impl Tally {
                 sensitivities: Vec::new(),
             },
             columns: head.number_columns().map(column).collect(),
-            kinds: Vec::new(),
+            reasons: Vec::new(),
             head: head.clone(),
             threshold,
         }
@@ -277,11 +320,10 @@ impl Tally {
         report.warned += u64::from(status == Status::Warned);
         if status == Status::Warned {
             let kind = kind(message);
-            match self.kinds.iter().position(|known| *known == kind) {
-                Some(k) => report.reasons[k].1 += 1,
-                None if self.kinds.len() < REASONS => {
-                    self.kinds.push(kind);
-                    report.reasons.push((message.into(), 1));
+            match self.reasons.iter().position(|known| known.kind == kind) {
+                Some(k) => self.reasons[k].add(message),
+                None if self.reasons.len() < REASONS => {
+                    self.reasons.push(Reason::new(kind, message));
                 }
                 None => {}
             }
@@ -313,6 +355,7 @@ impl Tally {
 
     pub(crate) fn close(mut self) -> Report {
         self.report.sensitivities = sensitivities(&self.columns);
+        self.report.reasons = self.reasons.iter().map(|r| (r.text(), r.count)).collect();
         self.report.columns = self.columns.into_iter().map(Column::close).collect();
         self.report
     }
@@ -354,6 +397,11 @@ mod tests {
         assert!((found[1].rank_correlation - expected).abs() < 1e-12, "{found:?}");
         let (low, high) = share_interval(0.0, 20);
         assert!(low == 0.0 && (high - 0.161).abs() < 1e-3, "{high}");
+        // None of 20 over a limit: the true share may be 16 % all the same.
+        let none: &dyn Fn(u32) -> f64 = &|_| 0.0;
+        let verdicts = Column { count: 20, ..column((&OVER_LIMITS, &none)) };
+        let half_width = verdicts.close().half_width(20).unwrap();
+        assert!((half_width - high).abs() < 1e-12, "{half_width}");
     }
 
     #[test]

@@ -21,11 +21,11 @@ for seed in range(seeds):
     for split in range(splits):
         for fold in np.unique(folds[:, split]):
             held_out = folds[:, split] == fold
-            forest = RandomForestRegressor(n_estimators=50, random_state=seed, n_jobs=2)
+            forest = RandomForestRegressor(n_estimators=50, random_state=seed, n_jobs=1)
             forest.fit(records[~held_out], targets[~held_out])
             residuals[split, held_out] = forest.predict(records[held_out]) - targets[held_out]
     errors.append(float(np.sqrt(np.mean(residuals**2))))
-    forest = RandomForestRegressor(n_estimators=50, random_state=seed, n_jobs=2)
+    forest = RandomForestRegressor(n_estimators=50, random_state=seed, n_jobs=1)
     importances.append(forest.fit(records, targets).feature_importances_)
 importance = np.mean(importances, axis=0).tolist()
 print(json.dumps({"rmse": float(np.mean(errors)), "importance": importance}))

@@ -87,7 +87,7 @@ def run(points, mass, speed, stiffness, times):
         return y[1]
 
     rest.terminal, rest.direction = True, -1
-    options = {"rtol": 1e-9, "atol": 1e-9, "max_step": 1e-4}
+    options = {"rtol": 1e-7, "atol": 1e-9, "max_step": 5e-4}
     there = solve_ivp(loading, (0, times[-1]), [0, speed], events=rest, dense_output=True, **options)
     turn, crush = there.t[-1], there.y[0, -1]
     top = numpy.interp(crush, deflection, force)

@@ -84,6 +84,8 @@ pub(crate) struct AsciiReader<'a> {
     legend: Vec<(i64, Option<String>)>,
     title: Option<String>,
     version: Option<String>,
+    /// Whether the line above is the title once more: a restart has put a header below the states before it.
+    is_title_again: bool,
 }
 
 /// Longest line of a header or legend; real ones have at most 94 columns.
@@ -153,6 +155,7 @@ impl<'a> AsciiReader<'a> {
             legend: Vec::new(),
             title: None,
             version: None,
+            is_title_again: false,
         }
     }
 
@@ -204,6 +207,11 @@ impl<'a> AsciiReader<'a> {
                 }
             } else if text.is_empty() {
                 body.blank(states);
+            } else if self.is_title_again && version(text).is_some() {
+                self.is_title_again = false;
+            } else if self.version.is_some() && is_title(text, self.title.as_deref()) {
+                self.is_title_again = true;
+                body.blank(states);
             } else if body.line(&line, states).is_none() {
                 states.unexpected(&line, None, B::EXPECTED, 40);
             }
@@ -252,6 +260,12 @@ impl<'a> AsciiReader<'a> {
             ..file
         }
     }
+}
+
+/// Whether a line is the title of the file.
+fn is_title(text: &[u8], title: Option<&str>) -> bool {
+    let rest = title.and_then(|title| text.strip_prefix(title.as_bytes()));
+    rest.is_some_and(|rest| rest.trim_ascii().is_empty())
 }
 
 /// Whether a line is text; says if not, or if it is too long.

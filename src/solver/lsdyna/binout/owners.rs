@@ -144,9 +144,14 @@ impl EntityList {
             let again = rows().filter(|(row, _)| **row == limit + 1).count();
             let first = rows().find(|(row, _)| **row == limit + 1).map(|(_, id)| id.to_string());
             let message = format!(
-                "{again} ids, the first {}, occur more than {} in one state; rows beyond the first {MAX_ROWS} are left out",
+                "{again} ids, the first {}, occur more than {} in one state; {}",
                 first.unwrap_or_default(),
                 if limit == 1 { "once".to_string() } else { format!("{limit} times") },
+                if limit == 1 {
+                    "their further rows are components whose names end with _2, _3, …".into()
+                } else {
+                    format!("rows beyond the first {MAX_ROWS} are left out")
+                },
             );
             section.problem(ProblemCode::RepeatedLabel, &message)
         });
