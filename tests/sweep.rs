@@ -171,6 +171,15 @@ fn what_has_no_effect_is_refused() {
         "{run}[curves]\nnose = {{ model = \"lead.model\" }}\n{train}vehicles = [ {{ name = \"A1\", mass = \"24t\", ends = \"nose\" }} ]\n"
     );
     refused(&end, band, "and this one is the end of a vehicle");
+    // A curve that another variable replaces everywhere; among several it has an effect.
+    let force = "what = \"force\", curve = \"nose\", values = [1, 2]";
+    let by = |values: &str| {
+        format!("{force} }}, {{ what = \"curve\", curve = \"nose\", values = [{values}]")
+    };
+    refused(SCENARIO, &by("\"soft\""), "puts other curves in the place of \"nose\" in every item");
+    let both = by("\"soft\", \"nose\"");
+    folder.put("s.toml", &format!("{SCENARIO}[sweep]\nvary = [ {{ {both} }} ]\n"));
+    folder.ok("sweep s.toml -q --dry-run");
     assert_eq!(folder.names(), Vec::<String>::new());
 }
 
@@ -228,7 +237,7 @@ fn rows_are_those_of_single_runs() {
 #[test]
 fn further_results_and_what_they_follow() {
     let plan = "[sweep]\nseed = 5\nsamples = 60\n\
-        results = [\"peak_force\", \"moving_mean_deceleration\", \"secondary_impact\", \"occupant_load\", \"energy\", \"over_limits\"]\n\
+        results = [\"peak_force\", \"moving_mean_deceleration\", \"main_mean_deceleration\", \"secondary_impact\", \"occupant_load\", \"energy\", \"over_limits\"]\n\
         vary = [ { what = \"speed\", train = \"A\", distribution = \"uniform\", from = \"20km/h\", to = \"60km/h\" },\n\
         { what = \"mass\", vehicle = \"B2\", distribution = \"uniform\", from = \"19t\", to = \"21t\" } ]\n";
     let limits = "[limits]\nstandard = \"own\"\nedition = \"1\"\nmean_deceleration_g = 100.0\n\
@@ -264,6 +273,10 @@ fn further_results_and_what_they_follow() {
                 let name = body["name"].as_str().unwrap();
                 for (key, expected) in [
                     ("moving_mean_deceleration_m_per_s2", g(&body["moving_mean_deceleration_g"])),
+                    (
+                        "main_mean_deceleration_m_per_s2",
+                        g(&body["main_mean_deceleration_g"]).or(g(&body["mean_deceleration_g"])),
+                    ),
                     ("secondary_impact_m_per_s", body["secondary_impact_m_per_s"].as_f64()),
                     ("occupant_load_m_per_s2", g(&body["occupant_load_g"])),
                 ] {

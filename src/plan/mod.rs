@@ -81,6 +81,8 @@ pub(crate) enum ResultName {
     MomentumError,
     /// Of each body: over 120 ms.
     MovingMeanDeceleration,
+    /// Of each body: over the contact that changes its speed most.
+    MainMeanDeceleration,
     /// Of each vehicle: speed of an unrestrained occupant after 0.6 m.
     SecondaryImpact,
     /// Of each vehicle: occupant load criterion.
@@ -104,6 +106,7 @@ impl ResultName {
             Self::EnergyError => "energy_error",
             Self::MomentumError => "momentum_error",
             Self::MovingMeanDeceleration => "moving_mean_deceleration_m_per_s2",
+            Self::MainMeanDeceleration => "main_mean_deceleration_m_per_s2",
             Self::SecondaryImpact => "secondary_impact_m_per_s",
             Self::OccupantLoad => "occupant_load_m_per_s2",
             Self::Energy => "energy_J",
@@ -119,7 +122,7 @@ pub(crate) const OVER_LIMITS: &str = "over_limits";
 pub(crate) const USUAL_RESULTS: usize = 8;
 
 /// All results, in the order of their columns.
-pub(crate) const RESULTS: [ResultName; 13] = [
+pub(crate) const RESULTS: [ResultName; 14] = [
     ResultName::PeakForce,
     ResultName::MaxDeflection,
     ResultName::MaxDeflectionTime,
@@ -129,6 +132,7 @@ pub(crate) const RESULTS: [ResultName; 13] = [
     ResultName::EnergyError,
     ResultName::MomentumError,
     ResultName::MovingMeanDeceleration,
+    ResultName::MainMeanDeceleration,
     ResultName::SecondaryImpact,
     ResultName::OccupantLoad,
     ResultName::Energy,

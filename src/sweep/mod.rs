@@ -287,7 +287,8 @@ fn result_columns(results: &[ResultName], base: &Prepared) -> Vec<String> {
             | ResultName::Energy => chain.interfaces().iter().map(|i| of(&i.name)).collect(),
             ResultName::FinalSpeed
             | ResultName::MeanDeceleration
-            | ResultName::MovingMeanDeceleration => {
+            | ResultName::MovingMeanDeceleration
+            | ResultName::MainMeanDeceleration => {
                 order.iter().map(|&i| of(&chain.bodies()[i].name)).collect()
             }
             ResultName::SecondaryImpact | ResultName::OccupantLoad => {

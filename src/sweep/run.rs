@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::Sweep;
 use super::row::{Row, Status};
 use crate::error::{Error, ErrorCode};
-use crate::multibody::{Record, Run, RunSettings, simulate};
+use crate::multibody::{BodyHistory, Record, Run, RunSettings, simulate};
 use crate::plan::ResultName;
 use crate::scenario::{self, Prepared, Scenario};
 
@@ -216,6 +216,10 @@ fn push_results(results: &[ResultName], prepared: &Prepared, run: &Run, values: 
             ResultName::MomentumError => values.push(run.ledger.max_momentum_error),
             ResultName::MovingMeanDeceleration => {
                 values.extend(bodies().map(|b| known(b.moving_mean_deceleration_m_per_s2)));
+            }
+            ResultName::MainMeanDeceleration => {
+                let first = |b: &BodyHistory| b.mean_deceleration_m_per_s2;
+                values.extend(bodies().map(|b| b.main_contact.map_or(first(b), |main| main.0)));
             }
             ResultName::SecondaryImpact => {
                 values.extend(vehicles().map(|b| known(b.secondary_impact_m_per_s)));

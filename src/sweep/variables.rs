@@ -105,10 +105,12 @@ impl Binder<'_> {
                 if let Err(error) = banded.check() {
                     return Err(error!(Sweep at "curve", "{}", error.message()));
                 }
+                self.refuse_if_replaced(curve)?;
                 self.one("band", "band", curve, Target::Band(curve.into()))
             }
             What::Force => {
                 let curve = self.curve()?;
+                self.refuse_if_replaced(curve)?;
                 self.one("force_factor", "force_factor", curve, Target::Force(curve.into()))
             }
             What::Curve => {
@@ -120,6 +122,18 @@ impl Binder<'_> {
                 self.one("curve", "curve", curve, Target::Curve(curve.into()))
             }
         }
+    }
+
+    /// Refuses to vary a curve that the plan replaces in every item.
+    fn refuse_if_replaced(&self, curve: &str) -> Result<(), Error> {
+        let is_replaced = |v: &Vary| v.what == What::Curve && v.curve.as_deref() == Some(curve);
+        if self.plan.vary.iter().any(is_replaced) && !self.replaces(curve) {
+            return Err(error!(
+                Sweep at "curve",
+                "another variable puts other curves in the place of \"{curve}\" in every item, so this one has no effect: name it among the values of that variable, or vary those curves"
+            ));
+        }
+        Ok(())
     }
 
     /// Whether the plan puts a curve in place of others.
