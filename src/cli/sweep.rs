@@ -37,7 +37,7 @@ use super::{
   crumple sweep merge -o results.csv part1.csv part2.csv part3.csv
 Results that [sweep] may name: peak_force, max_deflection, max_deflection_time, restitution, final_speed,
 mean_deceleration, energy_error, momentum_error (these if none are named), moving_mean_deceleration,
-secondary_impact, occupant_load, energy, over_limits."
+main_mean_deceleration, secondary_impact, occupant_load, energy, over_limits."
 )]
 pub(super) struct Args {
     #[command(subcommand)]
