@@ -190,10 +190,16 @@ pub(crate) fn share_interval(share: f64, count: u64) -> (f64, f64) {
     ((centre - half).max(0.0) / scale, (centre + half) / scale)
 }
 
+/// The number that a word of a message is, without the punctuation about it; names with digits are not numbers.
+fn number(word: &str) -> Option<f64> {
+    let bare = word.trim_matches(['(', ')', ',', ';', ':', '.', '%', '±']);
+    bare.parse().ok().filter(|_| bare.contains(|c: char| c.is_ascii_digit()))
+}
+
 /// What a warning says without its numbers.
 fn kind(message: &str) -> String {
-    let is_of_a_number = |c: &char| c.is_ascii_digit() || ['.', '-', 'e'].contains(c);
-    message.chars().filter(|c| !is_of_a_number(c)).collect()
+    let words = message.split(' ').map(|word| number(word).map_or(word, |_| ""));
+    words.collect::<Vec<_>>().join(" ")
 }
 
 /// A warning of several rows, with the range of each number that differs between them.
@@ -210,7 +216,7 @@ impl Reason {
     fn new(kind: String, message: &str) -> Self {
         let words: Vec<String> = message.split(' ').map(String::from).collect();
         let range = |word: &String| {
-            let value: f64 = word.trim_matches(|c: char| !c.is_ascii_digit()).parse().ok()?;
+            let value = number(word)?;
             Some([(value, word.clone()), (value, word.clone())])
         };
         Self { kind, ranges: words.iter().map(range).collect(), words, count: 1 }
@@ -402,6 +408,24 @@ mod tests {
         let verdicts = Column { count: 20, ..column((&OVER_LIMITS, &none)) };
         let half_width = verdicts.close().half_width(20).unwrap();
         assert!((half_width - high).abs() < 1e-12, "{half_width}");
+    }
+
+    /// Interfaces whose names differ by a digit have their own warnings, each with the range of its numbers.
+    #[test]
+    fn warnings_are_counted_by_their_words() {
+        let warning = |of: &str, share: f64| format!("{of} is crushed {share} m (4.5 %), -1e-3.");
+        let messages = [("A1|A2", 2.0), ("A2|A3", 9.0), ("A1|A2", 0.5), ("A1|A2", 1.0)];
+        let mut reasons: Vec<Reason> = Vec::new();
+        for (of, share) in messages {
+            let message = warning(of, share);
+            match reasons.iter_mut().find(|reason| reason.kind == kind(&message)) {
+                Some(known) => known.add(&message),
+                None => reasons.push(Reason::new(kind(&message), &message)),
+            }
+        }
+        let texts: Vec<(String, u64)> = reasons.iter().map(|r| (r.text(), r.count)).collect();
+        let first = "A1|A2 is crushed 0.5 to 2 m (4.5 %), -1e-3.".to_string();
+        assert_eq!(texts, [(first, 3), (warning("A2|A3", 9.0), 1)]);
     }
 
     #[test]
