@@ -694,7 +694,42 @@ fn a_restart_replaces_the_states_it_writes_again() {
     assert!(file.problems[0].byte.is_some());
 }
 
-/// The first state is the damaged one: the others decide which entities there are.
+/// A node that two lists of the deck name has two equal rows in every state.
+#[test]
+fn a_node_that_is_written_twice_is_read_once() {
+    let states = |again: &dyn Fn(u32) -> String| -> String {
+        (0..4)
+            .map(|k| {
+                let time = format!("{k}.0000000E+00");
+                let [first, last] = ["7", "8"].map(|id| row(id, VALUES[k as usize], 12));
+                state(k, &time) + TRANSLATIONS + &first + &again(k) + &last
+            })
+            .collect()
+    };
+    let text = states(&|k| row("7", VALUES[k as usize], 12));
+    let file = read("nodout", &text);
+    assert_eq!(codes(&file), [ProblemCode::RepeatedLabel]);
+    assert_eq!(file.problems[0].message, "7 is in every state twice; its first row is kept");
+    for id in [7, 8] {
+        assert_eq!(values(&file, id, "x_velocity"), [0.0, 1.0, 2.0, 3.0]);
+        let one = read_with(
+            "nodout",
+            &text,
+            &Selection { ids: Some(vec![id.to_string().parse().unwrap()]), ..Selection::all() },
+        );
+        assert_eq!(values(&one, id, "x_velocity"), [0.0, 1.0, 2.0, 3.0]);
+    }
+    // Another value is another row, and the state that has it is damaged.
+    let other = states(&|k| row("7", if k == 2 { "9.00000E+00" } else { VALUES[k as usize] }, 12));
+    let file = read("nodout", &other);
+    assert_eq!(&file.time[..], [0.0, 1.0, 3.0]);
+    // So is one that has it for the first time.
+    let late = states(&|k| if k < 2 { String::new() } else { row("7", VALUES[k as usize], 12) });
+    assert_eq!(&read("nodout", &late).time[..], [0.0, 1.0]);
+}
+
+const VALUES: [&str; 4] = ["0.00000E+00", "1.00000E+00", "2.00000E+00", "3.00000E+00"];
+
 /// A restart that continues a file puts its header below the states before it.
 #[test]
 fn a_second_header_is_no_damage() {
@@ -999,7 +1034,7 @@ fn details_of_elements_in_all_their_forms() {
     }
 }
 
-/// The time of a state that has lost a digit is no other time.
+/// A time that has lost a digit is not another time.
 #[test]
 fn a_time_that_lost_digits_is_named() {
     let nodes = |time: &str| state(1, time) + TRANSLATIONS + &row("7", "1.50000E+00", 12);

@@ -1,7 +1,7 @@
 //! Rows of the same components, and the end of states and files: a complete state is kept, an incomplete one is left out and reported; complete states
 //! become histories. States that a restart wrote again are resolved.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use super::{ABSENT_CELLS, ABSENT_PER_PRESENT, Pending, StateReader};
@@ -114,6 +114,7 @@ impl StateReader<'_> {
         self.places.push(pending.place);
         self.cycles.push(pending.cycle);
         for table in &mut self.tables {
+            table.lines = HashMap::new();
             if table.varies {
                 table.last_row = table.filled_rows.iter().max().copied();
                 for &row in &table.filled_rows {
@@ -306,6 +307,10 @@ pub(crate) struct Table {
     /// The rows that it has, so that a state costs what it has and not what others had.
     pub filled_rows: Vec<usize>,
     pub next_row: usize,
+    /// Per row, until a state is kept: a hash of its line.
+    pub lines: HashMap<usize, u64>,
+    /// Rows that stand twice in the first state, with the same bytes: two lists of the deck name the entity.
+    pub twice: HashSet<usize>,
 }
 
 /// One kept history: values of complete states, and the pending state's value.
@@ -338,6 +343,18 @@ impl Table {
             Some(&expected) if expected == entity => Some(self.next_row),
             _ => self.row_of.get(&entity).copied(),
         }
+    }
+
+    /// Whether a row that the pending state has already only repeats it: an entity of which the first state had two equal lines,
+    /// with the same values in all selected columns.
+    pub(crate) fn is_repeated(&self, row: usize, value: impl Fn(usize) -> Option<f64>) -> bool {
+        let Some(first) = self.channel_of[row].filter(|_| self.twice.contains(&row)) else {
+            return self.twice.contains(&row);
+        };
+        self.wanted_columns.iter().zip(&self.channels[first..]).all(|(&column, channel)| {
+            let value = value(column).unwrap_or(f64::NAN);
+            value == channel.pending || value.is_nan() && channel.pending.is_nan()
+        })
     }
 
     pub(crate) fn forget_rows(&mut self) {

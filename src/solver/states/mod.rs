@@ -8,6 +8,7 @@
 pub(in crate::solver) mod finish;
 pub(in crate::solver) mod repeat;
 
+use std::hash::{DefaultHasher, Hasher};
 use std::sync::Arc;
 
 use super::Selection;
@@ -312,7 +313,23 @@ impl<'a> StateReader<'a> {
             }
         };
         if std::mem::replace(&mut table.filled[row], true) {
+            let is_new = !self.sealed
+                && table.lines.get(&row) == Some(&hash(line.text))
+                && table.twice.insert(row);
+            if table.is_repeated(row, |column| {
+                field(column).map(|(from, to)| read_field(line, [from, to]).0)
+            }) {
+                let message = format!("{entity} is in every state twice; its first row is kept");
+                if is_new {
+                    self.note(ProblemCode::RepeatedLabel, line, &message);
+                }
+                // The row of the next state may have other values, so it is to be compared too.
+                return self.mark_unlike();
+            }
             return self.damage(line, None, format!("{entity} appears twice in one state"));
+        }
+        if !self.sealed {
+            table.lines.insert(row, hash(line.text));
         }
         table.filled_rows.push(row);
         table.next_row = row + 1;
@@ -400,6 +417,12 @@ impl<'a> StateReader<'a> {
             trace.note(line, columns[0], columns[1], Part::Scalar(index));
         }
     }
+}
+
+fn hash(text: &[u8]) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    hasher.write(text);
+    hasher.finish()
 }
 
 /// The field's value; NaN and a problem where it holds no number. The problem is boxed, so that the

@@ -1,6 +1,7 @@
 //! States that are laid out like one that was read line by line: what the parts of its lines are,
 //! and how states that were read by their layout are added.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
 use super::finish::{Channel, Table};
@@ -118,6 +119,8 @@ impl<'a> StateReader<'a> {
             filled: vec![false; table.rows.len()],
             filled_rows: Vec::new(),
             next_row: 0,
+            lines: HashMap::new(),
+            twice: table.twice.clone(),
         };
         let scalar = |scalar: &Scalar| Scalar {
             component: scalar.component.clone(),
