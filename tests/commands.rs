@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::common::{
     build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, fixture, json, read_json,
-    says, shared,
+    says, shared, study_in,
 };
 use serde_json::Value;
 
@@ -723,6 +723,37 @@ fn compare_at_all_speeds_with_one_fixed_curve() {
     assert_eq!(nearest["window_is_cut"], false);
     let own = [&base[..], &["--fixed-speed", "48km/h", "--speed", "48km/h"]].concat();
     says(&crumple_fails(folder.path(), 1, &own), "the speed that is left out: choose another one");
+}
+
+/// Three speeds, and a record that ends before the body is free again.
+#[test]
+fn compare_says_where_the_reference_ends() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let study = study_in(here, WALL);
+    let text = std::fs::read_to_string(&study).unwrap();
+    let (head, runs) = text.split_once("[[run]]").unwrap();
+    let mut three = head.to_string();
+    for run in runs.split("[[run]]") {
+        let is_one_of = |speeds: &[&str]| {
+            speeds.iter().any(|speed| run.contains(&format!("speed = \"{speed}km/h\"")))
+        };
+        if is_one_of(&["25", "36", "48"]) {
+            let cut = if is_one_of(&["36"]) { "truncate = \"130ms\"\n\n" } else { "" };
+            three += &format!("[[run]]{run}{cut}");
+        }
+    }
+    std::fs::write(&study, three).unwrap();
+    crumple_ok(here, &["build", study.to_str().unwrap(), "-o", "curves.h5"]);
+    let base = format!("compare curves.h5 --group {WALL} --nsdm-seeds 0");
+    let said = crumple_ok(here, &*format!("{base} --speed 36km/h"));
+    says(&said, "; its record ends at 130 ms, and the comparison with it");
+    let compared = json(&crumple_ok(here, &*format!("{base} --speed 36km/h --json")));
+    assert_eq!(compared["window_is_cut"], true);
+    says(
+        &crumple_fails(here, 1, &*format!("{base} --fixed-speed 36km/h")),
+        "the fixed curve is that of the only inner speed: choose another one",
+    );
 }
 
 #[test]

@@ -561,7 +561,7 @@ fn the_mass_of_a_body_force_is_held_against_the_contact() {
     }
 }
 
-/// A light specimen is no other structure: forces and mass of a millionth give a millionth.
+/// A light specimen is not another structure: forces and mass of a millionth give a millionth.
 #[test]
 fn the_contact_is_relative_to_the_peak() {
     let whole = Run::read(36).after_flight(20).extract();

@@ -1230,12 +1230,7 @@ fn short_impacts_get_a_filter_that_leaves_their_work() {
     }
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
-    let run = here.join("sled/a");
-    let ground = Node { id: 1, title: "ground", on: None, shakes: 0.0 };
-    layout.nodout(&run, &history, &[ground, node(5, "", 0, 4, 0.0)]);
-    let wall = Force { id: 1, title: "", along_n: &history.contact_n, across_n: 0.0 };
-    layout.rwforc(&run, &history, &[wall]);
+    one_body(&here.join("sled/a"), &history);
     crumple_ok(here, "init sled --units mm-t-s --mass 50kg -o s.toml");
     let filter = study(here, "s.toml")["recipe"]["filter"].as_str().unwrap().to_string();
     assert_ne!(filter, "CFC60");
@@ -1246,6 +1241,15 @@ fn short_impacts_get_a_filter_that_leaves_their_work() {
     let usual = text.replace(&format!("filter = \"{filter}\""), "filter = \"CFC60\"");
     fs::write(here.join("s.toml"), usual).unwrap();
     says(&warned(here, "build s.toml -o s.h5"), "filter: CFC60 takes");
+}
+
+/// Writes the run of one body that a wall stops.
+fn one_body(run: &Path, history: &History) {
+    let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
+    let ground = Node { id: 1, title: "ground", on: None, shakes: 0.0 };
+    layout.nodout(run, history, &[ground, node(5, "", 0, 4, 0.0)]);
+    let wall = Force { id: 1, title: "", along_n: &history.contact_n, across_n: 0.0 };
+    layout.rwforc(run, history, &[wall]);
 }
 
 /// A body that slows down shortly before the force begins: nothing that acts on it all the time.
@@ -1292,18 +1296,14 @@ fn gravity_does_not_falsify_the_mass() {
     }
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
     let run = here.join("drop/a");
-    let ground = Node { id: 1, title: "ground", on: None, shakes: 0.0 };
-    layout.nodout(&run, &history, &[ground, node(5, "", 0, 4, 0.0)]);
-    let wall = Force { id: 1, title: "", along_n: &history.contact_n, across_n: 0.0 };
-    layout.rwforc(&run, &history, &[wall]);
+    one_body(&run, &history);
     let said = warned(here, "init drop --units mm-t-s -o without.toml");
     says(
         &said,
         "the body's speed changes without the force too (gravity, brakes, another contact)",
     );
-    layout.glstat(&run, &history);
+    Layout { units: MM_T_S, axis: 0, sign: 1.0 }.glstat(&run, &history);
     crumple_ok(here, "init drop --units mm-t-s -o with.toml");
     assert_eq!(study(here, "with.toml")["run"][0]["mass"].as_str(), Some("24t"));
 }

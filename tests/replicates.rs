@@ -198,7 +198,7 @@ fn runs_of_the_same_bytes_change_no_prediction() {
         }
         let [one, two] = [one, two].map(|model| model.leave_one_out.unwrap());
         assert_eq!(one.means, two.means);
-        // A copy is no repetition: that it differs in nothing says nothing of the scatter.
+        // A copy is not a repetition: it says nothing about the scatter.
         assert!(one.scatter.is_none() && two.scatter.is_none());
     }
 }

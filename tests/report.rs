@@ -196,7 +196,7 @@ fn designs_and_trains_stand_side_by_side() {
     ] {
         assert!(page.contains(text), "{text}");
     }
-    // The third scenario has one vehicle of eight in common: it is no variant.
+    // The third scenario has one vehicle of eight in common: it is not a variant.
     let side_by_side = page
         .split("Scenarios side by side</h2>")
         .nth(1)

@@ -677,7 +677,7 @@ fn a_run_that_ends_while_loading_is_said() {
     says(&crumple_ok(folder.path(), "simulate s.toml"), " g so far");
 }
 
-/// A mean that may still fall below a limit is no verdict, and neither is one that may rise above it.
+/// A mean that may still fall below a limit decides nothing, nor does one that may rise above it.
 #[test]
 fn a_limit_is_not_judged_while_the_contact_loads() {
     let nose = "nose = { stages = [ { stroke = \"100mm\", from = \"3MN\" }, { stroke = \"3m\", from = \"0.4MN\" } ], unloading = \"80MN/m\" }";

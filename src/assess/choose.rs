@@ -45,7 +45,7 @@ pub enum Selection<'a> {
 
 /// The chosen model and why, by its errors `of` the speeds that count for the purpose; `None` without any model.
 ///
-/// The default is the simplest model whose force follows the closing speed, without such a one that with the smallest mean error.
+/// The default is the simplest model whose force follows the closing speed, or if there is none, the one with the smallest mean error.
 /// Another takes its place if the mean of the paired differences is larger than their standard deviation, from three speeds on; or, of
 /// fewer, if it is grossly better at each.
 pub(crate) fn choose(of: &[(&str, Vec<f64>)], purpose: Purpose) -> Option<(String, String)> {

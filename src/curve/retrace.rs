@@ -72,7 +72,7 @@ const MAX_STATES: usize = 200_000;
 /// No step is shorter than this share of its segment, so that a crawl ends.
 const SHORTEST: f64 = 1e-6;
 /// Nor than this share of the maximum deflection: states closer than a millionth of it are none of a
-/// loading branch, and its last one shall be the table's.
+/// loading branch, and its last one is to be the table's.
 const FINEST: f64 = 5e-6;
 
 /// The motion of a table under an impact.

@@ -393,7 +393,7 @@ impl Format {
     }
 }
 
-/// States that a deck's histories shall have, as in the reference data.
+/// States of a deck's histories, as in the reference data.
 const NUMBER_OF_STATES: f64 = 400.0;
 
 /// Time in s until a body on this curve has rebounded: a constant force takes 2 d/v to stop it.

@@ -150,7 +150,7 @@ def states(fmu, kind):
         check(f"{kind} another goes on from bytes", crush(fresh, 150, 70) == whole[70:])
         fresh.i.freeFMUState(read)
         check(f"{kind} size of a state", len(saved) <= 256)
-        refuses(fresh, f"{kind} bytes that are no state",
+        refuses(fresh, f"{kind} bytes that are not a state",
                 lambda: fresh.i.deserializeFMUState(b"\x07" * len(saved)))
         refuses(fresh, f"{kind} too few bytes", lambda: fresh.i.deserializeFMUState(saved[:20]))
         fresh.i.terminate()

@@ -47,7 +47,7 @@ def write(folder, curve):
         other = np.arange(10.0)
         file.append([Signal(other, other, name="temperature", unit="C")])
         file.save(f"{folder}/way{k}.mf4", overwrite=True, compression=compression)
-    # Several groups with a curve, and one that is no curve at all.
+    # Several groups with a curve, and one that is not a curve.
     file = MDF(version="4.10")
     for share in (1.0, 0.5):
         file.append(signals("double", time, deflection, share * force), common_timebase=True)

@@ -133,7 +133,7 @@ pub(super) fn masses(measured: &Measured<'_>, masses: Masses) -> Option<String> 
     })
 }
 
-/// What a filter takes from the work up to the maximum deflection: the pulses of a short impact are no noise. `recorded_n`
+/// What a filter takes from the work up to the maximum deflection: the pulses of a short impact are not noise. `recorded_n`
 /// ends with the states of `filtered`.
 pub(super) fn filter(class: u32, filtered: &Curve, recorded_n: &[f64]) -> Option<String> {
     // The first of the curve lies between two states.

@@ -222,7 +222,7 @@ pub(super) fn moving_mean(speeds: &[f64], interval_s: f64) -> Option<f64> {
         return None;
     }
     let window = MOVING_MEAN_S / interval_s;
-    // Rounding shall not make 160 intervals of 0.75 ms a little more than 120 ms.
+    // Rounding must not make 160 intervals of 0.75 ms a little more than 120 ms.
     let back = (window - 1e-9).ceil();
     let share = back - window;
     let back = (back as usize).max(1);
