@@ -1,13 +1,15 @@
 //! Assembly: bodies, interfaces and their laws become a chain, for given speeds.
 
+use std::collections::HashMap;
 use std::path::Path;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::layout::{Connection, ConnectionKind, End, Layout, Role, layout};
 use super::place::{self, Origin};
 use super::spring::{Crush, Spring, crush_between, crush_end, plates, scale_error, spring};
 use super::{
-    CheckedScenario, CurveInUse, CurveSource, LawName, LimitsTable, Prepared, Sources, TrainTable,
+    CheckedScenario, CurveInUse, CurveSource, CurveTable, LawName, LimitsTable, Prepared, Sources,
+    TrainTable,
 };
 use crate::curve::Masses;
 use crate::error::{Error, ErrorCode, KeyPath, error};
@@ -25,8 +27,8 @@ pub(super) fn assemble_at(
 ) -> Result<Prepared, Error> {
     let layout = layout(scenario);
     let (slots, bodies) = (&layout.slots, &layout.bodies);
-    let (made, of_one, warnings) = (Vec::new(), Vec::new(), Vec::new());
-    let mut builder = Builder { path, scenario, sources, made, of_one, warnings };
+    let (of_files, of_one, warnings) = (LawCache::default(), Vec::new(), Vec::new());
+    let mut builder = Builder { path, scenario, sources, of_files, of_one, warnings };
     let (mut interfaces, mut used) = (Vec::new(), Vec::new());
     for (k, (slot, &speed)) in slots.iter().zip(speeds_m_per_s).enumerate() {
         let (interface, of_curve) = match &slot.joint {
@@ -216,21 +218,45 @@ impl OfOneImpact {
 /// What results name as the curve where plates meet.
 pub(crate) const PLATES: &str = "plates";
 
-/// A law that has been made, and for what.
-#[derive(Clone)]
+/// A law that has been made, and what it said.
+#[derive(Clone, Debug)]
 struct CachedLaw {
-    curve: String,
-    /// What decides it: role, speed and mass if a model gives it, whether vehicles are split.
-    key: (bool, bool, bool, u64, u64),
     law: Arc<ForceLaw>,
     used: CurveInUse,
+    warnings: Vec<String>,
+}
+
+/// What decides a law: its curve; role, and whether vehicles are split; speed and mass if a model gives it.
+type LawKey = (String, (bool, bool, bool, u64, u64));
+
+/// Laws of models, with the table that each was made for, so that a sweep, whose interfaces close at few different speeds,
+/// makes each once.
+#[derive(Debug, Default)]
+pub(super) struct LawCache(Mutex<HashMap<LawKey, (CurveTable, CachedLaw)>>);
+
+/// A law of 400 points takes about 20 kB.
+const MOST_LAWS: usize = 2000;
+
+impl LawCache {
+    fn get(&self, key: &LawKey, table: &CurveTable) -> Option<CachedLaw> {
+        let laws = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        laws.get(key).filter(|(of, _)| of == table).map(|(_, law)| law.clone())
+    }
+
+    fn put(&self, key: LawKey, table: CurveTable, law: CachedLaw) {
+        let mut laws = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if laws.len() >= MOST_LAWS {
+            laws.clear();
+        }
+        laws.insert(key, (table, law));
+    }
 }
 
 struct Builder<'a> {
     path: &'a Path,
     scenario: &'a CheckedScenario<'a>,
     sources: &'a Sources,
-    made: Vec<CachedLaw>,
+    of_files: LawCache,
     of_one: Vec<OfOneImpact>,
     warnings: Vec<String>,
 }
@@ -402,13 +428,35 @@ impl<'a> Builder<'a> {
             of_model(speed),
             of_model(slot.mass_kg),
         );
-        if let Some(made) = self.made.iter().find(|m| m.curve == curve && m.key == key) {
-            return Ok(made.clone());
-        }
+        let key = (curve.to_string(), key);
+        // What belongs to the interface and not to its law.
+        let of_law = CurveTable { gap: None, tension: None, damping: None, ..table.clone() };
+        let laws = if is_model { &self.sources.laws } else { &self.of_files };
+        let made = match laws.get(&key, &of_law) {
+            Some(made) => made,
+            None => {
+                let made = self.make_law(slot, curve, speed)?;
+                let laws = if is_model { &self.sources.laws } else { &self.of_files };
+                laws.put(key, of_law, made.clone());
+                made
+            }
+        };
+        self.warnings.extend(made.warnings.iter().cloned());
+        Ok(made)
+    }
+
+    fn make_law(
+        &mut self,
+        slot: &Connection<'_>,
+        curve: &str,
+        speed: f64,
+    ) -> Result<CachedLaw, Error> {
+        let (table, source) = (&self.scenario.curves[curve], &self.sources.curves[curve]);
         let spring =
             spring(source, table, slot, speed).map_err(|error| self.no_spring(curve, error))?;
         self.check_kind(slot, curve, spring.curve.speed_kind)?;
         let speed_m_per_s = spring.curve.speed_m_per_s;
+        let is_model = matches!(source, CurveSource::Model(_));
         if !is_model && matches!(slot.role, Role::Wall | Role::Noses) {
             self.of_one.push(OfOneImpact::new(curve, &slot.name, &spring, source));
         }
@@ -417,9 +465,7 @@ impl<'a> Builder<'a> {
             spring.law_with_warnings(table).map_err(|source| self.no_spring(curve, source))?;
         let stages = table.stage_begins().into();
         let used = CurveInUse { curve: curve.into(), force, speed_m_per_s, stages };
-        self.warnings.extend(said.iter().map(|w| format!("curve \"{curve}\": {w}")));
-        let made = CachedLaw { curve: curve.into(), key, law: Arc::new(law), used };
-        self.made.push(made.clone());
-        Ok(made)
+        let warnings = said.iter().map(|w| format!("curve \"{curve}\": {w}")).collect();
+        Ok(CachedLaw { law: Arc::new(law), used, warnings })
     }
 }

@@ -4,7 +4,7 @@
 //! depends on all curves, so both are determined together, by iteration.
 //!
 //! Local speeds are a fixed point: curves for the present speeds; a run; each interface's largest closing speed up to the
-//! first peak of its force; and again, until none changes by 0.1 m/s. Models are used beyond their maximum crush here,
+//! first peak of its force, to 0.01 m/s; and again, until none changes by 0.1 m/s. Models are used beyond their maximum crush here,
 //! because neighbours keep pushing; the closing speed that rate effects follow is then zero.
 
 use std::collections::BTreeMap;
@@ -21,12 +21,16 @@ use crate::unit::km_per_h;
 /// The speeds are found when none changes by more, in m/s.
 const CHANGE_M_PER_S: f64 = 0.1;
 const ROUNDS: usize = 10;
+/// The first guess, as a share of the speed at which the trains meet: most interfaces close at 0.2 to 0.3 of it.
+const START: f64 = 0.25;
+/// Curves are predicted for multiples of 0.01 m/s, so that many interfaces share one.
+const GRID_PER_M_PER_S: f64 = 100.0;
 /// Of a change that goes back and forth only this share is made.
 const RELAXATION: f64 = 0.5;
 /// The first maximum of the force is one that stands out by this share of the largest.
 const PROMINENCE: f64 = 0.1;
-/// States for the speeds, in s; forces rise within a few.
-const INTERVAL_S: f64 = 0.25e-3;
+/// States for the speeds, in s; forces rise within some milliseconds.
+const INTERVAL_S: f64 = 0.5e-3;
 /// What closes for the first time after this is not looked for, in s.
 const LONGEST_S: f64 = 5.0;
 /// No curve is requested below this speed, in m/s: an interface that hardly closes.
@@ -45,11 +49,16 @@ pub(crate) fn assemble(
         .iter()
         .map(|slot| is_local(&slot.joint, slot.role, sources))
         .collect();
-    let mut speeds_m_per_s = vec![scenario.meeting_m_per_s(); own.len()];
-    let mut prepared = assemble_at(path, scenario, sources, &speeds_m_per_s)?;
+    let meeting_m_per_s = scenario.meeting_m_per_s();
     if scenario.run.interface_speed != InterfaceSpeed::Local || !own.contains(&true) {
-        return Ok(prepared);
+        return assemble_at(path, scenario, sources, &vec![meeting_m_per_s; own.len()]);
     }
+    let start_m_per_s = (START * meeting_m_per_s).max(SLOWEST_M_PER_S);
+    // To the tolerance, so that the runs of a sweep begin with the same curves.
+    let start_m_per_s = on_grid(start_m_per_s, 1.0 / CHANGE_M_PER_S);
+    let first = |is_own: &bool| if *is_own { start_m_per_s } else { meeting_m_per_s };
+    let mut speeds_m_per_s: Vec<f64> = own.iter().map(first).collect();
+    let mut prepared = assemble_at(path, scenario, sources, &speeds_m_per_s)?;
     let mut before = vec![0.0; own.len()];
     for _ in 0..ROUNDS {
         let mut settings = RunSettings { record: Record::Closing, ..prepared.settings };
@@ -61,12 +70,14 @@ pub(crate) fn assemble(
         let failed =
             |error: Error| prepared.failed(error.of("while the interface speeds were determined"));
         let run = simulate(&prepared.chain, &settings).map_err(failed)?;
-        let largest = follow(&prepared.chain, &run, &own, &mut speeds_m_per_s, &mut before);
+        let largest =
+            follow(&prepared.chain, &run, &own, meeting_m_per_s, &mut speeds_m_per_s, &mut before);
+        prepared = assemble_at(path, scenario, sources, &speeds_m_per_s)?;
+        // The next change would be smaller still.
         if largest < CHANGE_M_PER_S {
             prepared.warnings.extend(slow_interfaces(&prepared, sources));
             return Ok(prepared);
         }
-        prepared = assemble_at(path, scenario, sources, &speeds_m_per_s)?;
     }
     let unsettled = before
         .iter()
@@ -87,19 +98,21 @@ pub(crate) fn assemble(
     Ok(prepared)
 }
 
-/// Takes the closing speeds of a run for the interfaces with curves of their `own`; `before` holds the
-/// last changes. The largest change in m/s.
+/// Takes the closing speeds of a run for the interfaces with curves of their `own`, and the trains' for those that never
+/// close; `before` holds the last changes. The largest change in m/s.
 fn follow(
     chain: &Chain,
     run: &Run,
     own: &[bool],
+    meeting_m_per_s: f64,
     speeds_m_per_s: &mut [f64],
     before: &mut [f64],
 ) -> f64 {
     let mut largest: f64 = 0.0;
     for k in (0..own.len()).filter(|&k| own[k]) {
         let Some(closing) = closing_speed(chain, run, k) else {
-            before[k] = 0.0;
+            largest = largest.max((meeting_m_per_s - speeds_m_per_s[k]).abs());
+            (speeds_m_per_s[k], before[k]) = (meeting_m_per_s, 0.0);
             continue;
         };
         let mut change = closing.max(SLOWEST_M_PER_S) - speeds_m_per_s[k];
@@ -108,9 +121,14 @@ fn follow(
             change *= RELAXATION;
         }
         before[k] = change;
-        speeds_m_per_s[k] += change;
+        speeds_m_per_s[k] = on_grid(speeds_m_per_s[k] + change, GRID_PER_M_PER_S);
     }
     largest
+}
+
+/// The nearest multiple of a decimal step, of which `per_m_per_s` are 1 m/s.
+fn on_grid(speed_m_per_s: f64, per_m_per_s: f64) -> f64 {
+    (speed_m_per_s * per_m_per_s).round() / per_m_per_s
 }
 
 /// Advice for every model whose interfaces close below its slowest run: one run there shows what no

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::assemble::LawCache;
 use super::{CheckedScenario, CurveTable, Scenario, StageTable, place};
 use crate::curve::{Case, Envelope, ForceCurve, ForceKind};
 use crate::database::Database;
@@ -15,9 +16,17 @@ use crate::surrogate::{Model, PredictedCurve};
 use crate::unit::{Shown, km_per_h};
 
 /// What the curves of a scenario are made of: the same for every variation of it.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Sources {
     pub(super) curves: BTreeMap<String, CurveSource>,
+    pub(super) laws: LawCache,
+}
+
+impl Clone for Sources {
+    /// Without the laws: the copy may get other curves.
+    fn clone(&self) -> Self {
+        Self { curves: self.curves.clone(), laws: LawCache::default() }
+    }
 }
 
 /// What a curve is made of.
@@ -124,7 +133,7 @@ impl Sources {
             })?;
             curves.insert(name.clone(), source);
         }
-        Ok(Self { curves })
+        Ok(Self { curves, laws: LawCache::default() })
     }
 
     /// What each curve comes from, but for those of tension.
@@ -171,12 +180,14 @@ impl Sources {
     pub(crate) fn without_stopped_mass(&mut self, curve: &str) {
         if let Some(CurveSource::Model(model)) = self.curves.get_mut(curve) {
             model.without_stopped_mass();
+            self.laws = LawCache::default();
         }
     }
 
     /// Puts another source in place of a curve's.
     pub(crate) fn replace(&mut self, curve: &str, source: CurveSource) {
         self.curves.insert(curve.into(), source);
+        self.laws = LawCache::default();
     }
 }
 

@@ -117,7 +117,7 @@ pub(crate) enum InterfaceSpeed {
 }
 
 /// One curve: exactly one of `model`, `file`, `database` and `stages`.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CurveTable {
     /// Model file; the curve is predicted for the speed of the interface.

@@ -81,6 +81,8 @@ fn all_outputs<'a, const N: usize>(
     let ahead_s = engine.fixed.ahead_s();
     let steps_per_look = (LOOK_S / h).max(1.0) as usize;
     let stops = !engine.taken.is_empty();
+    // What bodies meet is not asked of a run for closing speeds.
+    let looks = recorder.record != Record::Closing;
     let (mut done, mut until_look) = (0, steps_per_look);
     for output in 1..=grid.outputs {
         engine.kick::<N>(ahead_s);
@@ -98,8 +100,8 @@ fn all_outputs<'a, const N: usize>(
             if stops {
                 engine.stop_mass();
             }
-            until_look -= 1;
-            if until_look == 0 || step == grid.steps_per_output {
+            until_look = until_look.saturating_sub(1);
+            if looks && (until_look == 0 || step == grid.steps_per_output) {
                 engine.look::<N>(ahead_s);
                 until_look = steps_per_look;
             }

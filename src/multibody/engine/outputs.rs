@@ -36,7 +36,7 @@ fn kinds(record: Record) -> (&'static [OfBody], &'static [OfInterface]) {
 /// What the outputs gather.
 pub(super) struct OutputRecorder {
     account: Account,
-    record: Record,
+    pub(super) record: Record,
     recent: Recent,
     /// Work of the interfaces, their largest deflections, what is dissipated.
     work_j: Rows,
