@@ -167,6 +167,7 @@ fn differences_of_two_databases_are_named() {
         assert!((of[key].as_f64().unwrap() - 0.1).abs() < 1e-9, "{key}: {of}");
     }
     let text = ok(folder, &format!("db diff {database} after.h5 --accept-changed"));
+    says(&text, " mass  max crush ");
     says(&text, "1 case added, 2 removed, 1 changed, ");
     says(
         &ok(folder, &format!("db diff {database} {database}")),

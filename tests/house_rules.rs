@@ -40,7 +40,7 @@ const MAY_NAME: [(&str, &str); 38] = [
     ("multibody", "curve piecewise unit"),
     ("nsdm", "curve signal piecewise stream"),
     ("formats", "guess plural multibody surrogate dataset forest curve signal hdf5 file unit"),
-    ("import", "formats database curve file unit clock"),
+    ("import", "formats database curve history file unit clock"),
     ("plan", "stream unit"),
     ("scenario", "guess plan multibody surrogate formats database curve signal manifest unit"),
     ("sweep", "guess scenario plan multibody hdf5 stream manifest file unit"),
@@ -207,7 +207,7 @@ fn no_unwrap_outside_tests() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 80014), ("files", 304), ("public types", 164), ("error types", 9)];
+    [("lines", 80209), ("files", 304), ("public types", 164), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {

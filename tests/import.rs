@@ -634,7 +634,7 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
         let f = if (0.0..half).contains(&t) { -k * d } else { 0.0 };
         text += &format!("{};{};{}\n", t * 1e3, (d + 0.1) * 1e3, f * 1e-3).replace('.', ",");
     }
-    fs::write(here.join("nose.csv"), text).unwrap();
+    fs::write(here.join("nose.csv"), &text).unwrap();
     let added = crumple_ok(here, &adding(&["--speed", "10m/s", "--kind", "wall", "--mass", "24t"]));
     says(&added, "motion: that of the file's times");
     says(&added, "force: sign flipped, positive in compression");
@@ -644,6 +644,19 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
     assert!((crush / (v / omega) - 1.0).abs() < 6e-3, "{crush}");
     assert!((case["work_over_energy"].as_f64().unwrap() - 1.0).abs() < 6e-3);
     assert!(case["contact_time_s"].as_f64().unwrap().abs() < 2e-4);
+    assert!(!added.contains("there is no state between"), "{added}");
+    // A hole in time is drawn across, and that is said.
+    let kept = |line: &(usize, &str)| !(1_200..1_230).contains(&line.0);
+    let lines: Vec<&str> = text.lines().enumerate().filter(kept).map(|(_, line)| line).collect();
+    fs::write(here.join("nose.csv"), lines.join("\n") + "\n").unwrap();
+    let output = crumple_in(
+        here,
+        &*adding(&["--speed", "10m/s", "--kind", "wall", "--mass", "24t", "--case", "hole"]),
+    );
+    says(
+        &String::from_utf8_lossy(&output.stderr),
+        "warning: hole: time: there is no state between time 0.1098",
+    );
     // Through another unit system, the likely cause is found as in a build.
     let error = crumple_fails(
         here,

@@ -1418,6 +1418,17 @@ fn a_crush_gives_its_speed() {
             predicted(&["--speed", &format!("{low}km/h")])["max_deflection_m"].as_f64().unwrap();
         assert!((at_low / crush - 1.0 + of("crush_error").unwrap()).abs() < 1e-6);
     }
+    // Each rule has its own error.
+    let model: Value =
+        serde_json::from_str(&std::fs::read_to_string(here.join("lead.model")).unwrap()).unwrap();
+    let means = model["leave_one_out"]["means"].as_array().unwrap();
+    let kind = predicted(&["--crush", "620mm"])["model"].clone();
+    let own = means.iter().find(|means| means["model"] == kind).unwrap();
+    for rule in ["spline", "monotone", "energy", "motion"] {
+        let found = predicted(&["--crush", "620mm", "--max-crush", rule]);
+        let expected = &own["max_crush_errors"][rule];
+        assert!(expected.is_number() && found["found_by_crush"]["crush_error"] == *expected);
+    }
     for (code, arguments, says) in [
         (
             1,
@@ -1591,12 +1602,17 @@ fn an_earlier_validation_is_compared() {
     let against = &fewer["against"];
     assert_eq!(against["chosen_before"], now["chosen"]);
     assert_eq!(against["band_share"][0], now["band"]["pointwise_share"]);
+    // Means over the one speed that both have left out.
+    assert_eq!(against["inner_speeds"], serde_json::json!([2, 1, 1]));
     for model in rows(against, "models") {
         for (k, of) in [&now, &fewer].into_iter().enumerate() {
-            let mean = rows(of, "means").into_iter().find(|m| m["model"] == model["name"]);
+            let is_common = |row: &&serde_json::Value| {
+                row["model"] == model["name"] && row["inner"] == true && row["case"] == "60kmh"
+            };
+            let row = rows(of, "rows").iter().find(is_common).cloned();
             for key in ["force_l1", "max_crush_error", "velocity_l1", "acceleration_l1"] {
-                let expected = mean.as_ref().map_or(serde_json::Value::Null, |m| m[key].clone());
-                assert_eq!(model[key][k], expected, "{model}");
+                let expected = row.as_ref().map(|row| row[key].as_f64().unwrap().abs());
+                assert_eq!(model[key][k].as_f64(), expected, "{model}");
             }
         }
     }
@@ -1604,6 +1620,7 @@ fn an_earlier_validation_is_compared() {
     assert!(gone["force_l1"][0].is_number() && gone["force_l1"][1].is_null());
     let text = crumple_ok(here, "validate curves.h5 --against old.json");
     says(&text, "lead-car-pair: since the earlier validation: ");
+    says(&text, "means over 1 inner speed that both left out, of 2 before and 1 now");
     says(&text, " -> -");
     let mut other = now.clone();
     other["group"] = "another".into();

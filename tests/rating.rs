@@ -188,6 +188,35 @@ fn the_table_shows_every_measure() {
     }
 }
 
+/// A prediction of a part of the reference is rated on that part, and units that differ are not converted: both are said.
+#[test]
+fn parts_and_units_are_said() {
+    let folder = folder();
+    let here = folder.path();
+    write(here, "short.csv", "time_s,a_m_per_s2[A1]", 120, |t| format!("{t:?},{:?}", pulse(t)));
+    let of = rate(here, &["a.csv:a_m_per_s2[A1]", "short.csv:a_m_per_s2[A1]"]);
+    let said = of["warnings"][0].as_str().unwrap();
+    says(said, "the prediction goes from 0 s to 0.119 s: 40 % of the reference");
+    let asked = ["--to", "110ms"];
+    let of =
+        rate(here, &[&["a.csv:a_m_per_s2[A1]", "short.csv:a_m_per_s2[A1]"], &asked[..]].concat());
+    assert!(!of["warnings"].to_string().contains("is not rated"), "{of}");
+    // A longer prediction covers its reference.
+    let of = rate(here, &["short.csv:a_m_per_s2[A1]", "a.csv:a_m_per_s2[A1]"]);
+    assert!(!of["warnings"].to_string().contains("is not rated"), "{of}");
+    for (header, unit) in [("time_s,acc_g", "g"), ("time_s,acc [mm/s^2]", "mm/s²")] {
+        write(here, "c.csv", header, 200, |t| format!("{t:?},{:?}", pulse(t)));
+        let column = header.split_once(',').unwrap().1;
+        let other = format!("c.csv:{column}");
+        let of = rate(here, &["a.csv:a_m_per_s2[A1]", &other]);
+        let expected =
+            format!("by their names the reference is in m/s² and the prediction in {unit}");
+        says(&of["warnings"].to_string(), &expected);
+        let of = rate(here, &["a.csv:a_m_per_s2[A1]", &format!("{other},scale=0.5")]);
+        assert!(!of["warnings"].to_string().contains("by their names"), "{of}");
+    }
+}
+
 /// The way over crumple histories and the direct one are the same.
 #[test]
 fn a_solver_file_rates_as_its_csv() {
@@ -368,7 +397,8 @@ fn degenerate_and_long_signals_are_rated() {
     let here = folder.path();
     write(here, "zero.csv", "t,v", 100, |t| format!("{t:?},0"));
     write(here, "one.csv", "t,v", 50, |t| format!("{t:?},1"));
-    let text = crumple_in(here, "rate zero.csv one.csv --json --strict");
+    write(here, "short.csv", "t,v", 50, |t| format!("{t:?},0"));
+    let text = crumple_in(here, "rate short.csv one.csv --json --strict");
     assert_eq!(text.status.code(), Some(3), "a warning");
     let of: Value = serde_json::from_slice(&text.stdout).unwrap();
     assert_eq!((&of["l1_ratio"], &of["samples"]), (&Value::Null, &491.into()));

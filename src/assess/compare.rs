@@ -11,7 +11,7 @@ use super::row::{Row, RowBuilder};
 use crate::curve::Case;
 use crate::dataset::{TrainingCase, TrainingSet, is_same_speed, nearest};
 use crate::error::{Error, ErrorCode, error};
-use crate::nsdm::{self, Identifiability, Start};
+use crate::nsdm::{self, Identifiability, Nsdm, Start};
 use crate::plural::counted;
 use crate::unit::{SpeedKind, km_per_h};
 
@@ -66,7 +66,7 @@ pub(crate) struct NsdmReport {
 }
 
 /// One fit of the spring and damper.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub(crate) struct NsdmFit {
     /// Seed of its random draws.
     pub seed: u64,
@@ -80,6 +80,10 @@ pub(crate) struct NsdmFit {
     pub acceleration_l1: f64,
     /// Time the fit took, in s.
     pub fit_time_s: f64,
+    /// Secant stiffness over the deflection and damping over the speed, linear between the points and held beyond:
+    /// `deflection_m`, `stiffness_N_per_m`, `speed_m_per_s`, `damping_N_s_per_m`; the force is `k(x) x + c(|x'|) x'`.
+    #[schemars(with = "serde_json::Value")]
+    pub law: Nsdm,
 }
 
 /// The speeds of a group that lie between others, for a comparison at each, in m/s, and the names of the cases there that ended while
@@ -274,6 +278,7 @@ fn nsdm_report(
             velocity_l1: here.velocity_l1,
             acceleration_l1: here.acceleration_l1,
             fit_time_s: *fit_time_s,
+            law: fit.model.clone(),
         });
     }
     let all: Vec<nsdm::Fit> = fitted.fits.iter().map(|(fit, _)| fit.clone()).collect();

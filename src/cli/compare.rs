@@ -10,6 +10,7 @@ use crate::assess::{ComparisonSettings, Row};
 use crate::curve::ForceKind;
 use crate::database::Database;
 use crate::nsdm::Start;
+use crate::plural::counted;
 use crate::rating::Rating;
 use crate::rating::acceptance::{ACCEPTANCE, STANDARD};
 use crate::scenario;
@@ -192,12 +193,15 @@ fn print_nsdm(out: &mut dyn Write, nsdm: &NsdmReport) -> io::Result<()> {
     let range = |of: fn(&compare::NsdmFit) -> f64| {
         let all = || nsdm.fits.iter().map(of);
         let (low, high) = (all().fold(f64::INFINITY, f64::min), all().fold(0.0, f64::max));
-        format!("{:.2} to {:.2} %", low * 100.0, high * 100.0)
+        match nsdm.fits.len() {
+            1 => percent(low),
+            _ => format!("{:.2} to {:.2} %", low * 100.0, high * 100.0),
+        }
     };
     writeln!(
         out,
-        "nsdm over {} seeds ({} start): velocity {} at its own {}, {} here; acceleration {} and {}",
-        nsdm.fits.len(),
+        "nsdm over {} ({} start): velocity {} at its own {}, {} here; acceleration {} and {}",
+        counted(nsdm.fits.len(), "seed"),
         nsdm.start,
         range(|f| f.own_velocity_l1),
         km_per_h(nsdm.fitted_at_m_per_s),

@@ -200,7 +200,38 @@ struct LoadedSignal {
     signal: Signal,
     column: String,
     is_table: bool,
+    /// Of its values, where its name says it and they are not scaled.
+    unit: Option<&'static str>,
     problems: usize,
+}
+
+/// Units of values, and how the names of columns write them.
+const VALUE_UNITS: [(&str, &str); 11] = [
+    ("m/s²", "m_per_s2 m/s2 m/s^2 m/s**2 m/s²"),
+    ("mm/s²", "mm_per_s2 mm/s2 mm/s^2 mm/s**2 mm/s²"),
+    ("g", "g"),
+    ("m/s", "m_per_s m/s"),
+    ("mm/s", "mm_per_s mm/s"),
+    ("km/h", "km_per_h km/h"),
+    ("m", "m"),
+    ("mm", "mm"),
+    ("N", "n"),
+    ("kN", "kn"),
+    ("MN", "mn"),
+];
+
+/// The unit at the end of a column's name: `acc_g`, `v_m_per_s[A1]`, `force [kN]`.
+fn value_unit(column: &str) -> Option<&'static str> {
+    let name = column.to_lowercase();
+    let (head, inside) = name
+        .strip_suffix([']', ')'])
+        .and_then(|name| name.rsplit_once(['[', '(']))
+        .unwrap_or((&name, ""));
+    let end = |unit: &str| {
+        unit == inside || head.strip_suffix(unit).is_some_and(|quantity| quantity.ends_with('_'))
+    };
+    let units = VALUE_UNITS.into_iter();
+    units.filter(|(_, ways)| ways.split(' ').any(end)).map(|(unit, _)| unit).next()
 }
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
@@ -220,7 +251,15 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         None => Quantity::Other,
     };
     let settings = RatingSettings { quantity, cfc: args.cfc, from_s: args.from, to_s: args.to };
-    let rating = rating::rate(&reference.signal, &prediction.signal, &settings)?;
+    let mut rating = rating::rate(&reference.signal, &prediction.signal, &settings)?;
+    if let (Some(of_a), Some(of_b)) = (reference.unit, prediction.unit)
+        && of_a != of_b
+    {
+        rating.warnings.push(format!(
+            "by their names the reference is in {of_a} and the prediction in {of_b}, and they are compared as they stand: write the factor after a file's name, such as {},scale=0.001",
+            b.path().display()
+        ));
+    }
     let outcome = options.warn_all(&rating.warnings);
     options.show(&rating, |out| print(out, &rating))?;
     Ok(outcome.max(Outcome::warned_if(reference.problems + prediction.problems > 0)))
@@ -443,7 +482,8 @@ impl SignalRequest<'_> {
         }
         let signal = self.signal(&read.name, &read.time, &read.values)?;
         let column = format!("{} {}", read.name, read.title);
-        Ok(LoadedSignal { signal, column, is_table: true, problems: 0 })
+        let unit = value_unit(&read.name).filter(|_| self.address.scale == 1.0);
+        Ok(LoadedSignal { signal, column, is_table: true, unit, problems: 0 })
     }
 
     fn read_solver_file(&self, options: GlobalOptions) -> Result<LoadedSignal, Failure> {
@@ -485,7 +525,8 @@ impl SignalRequest<'_> {
             )));
         }
         let signal = self.signal(&label, &history.time, &history.values)?;
-        Ok(LoadedSignal { signal, column: label, is_table: false, problems: file.problems.len() })
+        let problems = file.problems.len();
+        Ok(LoadedSignal { signal, column: label, is_table: false, unit: None, problems })
     }
 
     /// The signal in s and scaled.

@@ -288,11 +288,25 @@ fn print_against(out: &mut dyn Write, now: &Validation, against: &Against) -> io
         false => format!("{} is chosen, it was {}", now.chosen, against.chosen_before),
     };
     let group = &now.group;
+    let [then, today, both] = against.inner_speeds;
+    let band = match against.band_span_m_per_s {
+        [Some(a), Some(b)] if !is_same_speed(a, b) => {
+            format!(" (between speeds {} and {} apart)", km_per_h(a), km_per_h(b))
+        }
+        _ => String::new(),
+    };
     writeln!(
         out,
-        "{group}: since the earlier validation: {chosen}; band {}",
+        "{group}: since the earlier validation: {chosen}; band {}{band}",
         changed(against.band_share)
     )?;
+    if then.max(today) > both {
+        writeln!(
+            out,
+            "{group}: means over {} that both left out, of {then} before and {today} now",
+            counted(both, "inner speed")
+        )?;
+    }
     output::table(out, table("mean of", &against.models))?;
     output::table(out, table("left out", &against.speeds))
 }

@@ -8,6 +8,7 @@ use crate::curve::{Envelope, ForceCurve, ForceKind, Tail};
 use crate::error::{Error, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw};
 use crate::surrogate::PredictedCurve;
+use crate::surrogate::recorded::RECORDED;
 use crate::unit::{Shown, km_per_h};
 
 /// One curve of one force, as writers take it; SI.
@@ -315,6 +316,12 @@ impl ExportCurve {
         }
         if curve.data_end_m() != curve.max_deflection_m {
             facts.push(("data_end_m", nine_digits(curve.data_end_m())));
+        }
+        if curve.model == RECORDED && kind == ForceKind::Body {
+            facts.push((
+                "filter",
+                "none beyond the recipe's, so that a body moves as in the run; body_force_N in the database is filtered, and its peaks are lower".into(),
+            ));
         }
         if let Some(case) = &curve.provenance.case {
             facts.insert(1, ("case", case.replace(char::is_control, " ")));

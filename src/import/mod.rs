@@ -17,6 +17,7 @@ use crate::database::{self, Database};
 use crate::error::{Error, ErrorCode, error};
 use crate::file::WriterLock;
 use crate::formats::read::{self, Metadata, ReadCurve, ReadOptions};
+use crate::history::time_gaps;
 use crate::unit::{Shown, Speed, SpeedKind, UnitSystem, km_per_h};
 
 /// One file that is to become a case, with its metadata.
@@ -169,6 +170,8 @@ pub(crate) fn case_of(
         let (format, title) = (format.into(), curve.title.clone());
         SourceFile { format, title, ..file.clone() }
     });
+    let gaps = time_gaps(curve.time_s.as_deref().unwrap_or_default());
+    let gaps = gaps.iter().map(|gap| format!("time: {gap}; the curve is drawn straight across"));
     let notes = curve.notes.iter().cloned().chain(both.notes).chain(quality.notes);
     Ok(Case {
         id: CaseId { study: IMPORTED.into(), group: settings.group.clone(), name },
@@ -177,7 +180,7 @@ pub(crate) fn case_of(
         quality: Quality {
             audit: quality.audit,
             notes: notes.collect(),
-            warnings: both.warnings.into_iter().chain(quality.warnings).collect(),
+            warnings: both.warnings.into_iter().chain(gaps).chain(quality.warnings).collect(),
         },
         provenance: Provenance {
             fingerprint: hash.finalize().to_hex().to_string(),

@@ -48,7 +48,7 @@ impl Quantity {
         let column = column.to_ascii_lowercase();
         let units = ["m/s^2", "m/s2", "m/s²", "m/s**2", "[g]", "(g)"];
         let is_acceleration = column.contains("acceleration")
-            || column.starts_with("a_m_per_s2")
+            || column.contains("m_per_s2")
             || units.iter().any(|unit| column.contains(unit));
         if is_acceleration { Self::Acceleration } else { Self::Other }
     }
@@ -231,6 +231,9 @@ fn first_peaks(pair: &Pair) -> Vec<Peak> {
     matched.into_iter().filter(|peak| peak.reference.1 > 0.0).map(peak).collect()
 }
 
+/// A part of the reference up to this share may be left out unsaid.
+const UNRATED: f64 = 0.05;
+
 fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Vec<String> {
     let mut warnings = Vec::new();
     let (from_s, to_s) =
@@ -239,6 +242,20 @@ fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Ve
         warnings.push(format!(
             "{from_s} s to {to_s} s was requested, but the signals have in common only {} s to {} s",
             rating.from_s, rating.to_s
+        ));
+    }
+    let whole = &rating.reference;
+    let [first_s, last_s] = [
+        whole.first_s.max(settings.from_s.unwrap_or(f64::NEG_INFINITY)),
+        whole.last_s.min(settings.to_s.unwrap_or(f64::INFINITY)),
+    ];
+    let unrated = 1.0 - (rating.to_s - rating.from_s) / (last_s - first_s);
+    if unrated > UNRATED {
+        warnings.push(format!(
+            "the prediction goes from {} s to {} s: {:.0} % of the reference, which goes from {first_s} s to {last_s} s, is not rated",
+            rating.prediction.first_s,
+            rating.prediction.last_s,
+            100.0 * unrated
         ));
     }
     if reference.iter().all(|&r| r == 0.0) {

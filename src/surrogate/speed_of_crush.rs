@@ -15,7 +15,7 @@ pub(crate) struct SpeedOfCrush {
     /// model's speeds, and if no speed was left out.
     pub(crate) low_m_per_s: Option<f64>,
     pub(crate) high_m_per_s: Option<f64>,
-    /// That mean error, relative.
+    /// That mean error of the rule in use, relative; null too if that rule has no answer at some of these speeds.
     pub(crate) crush_error: Option<f64>,
 }
 
@@ -63,7 +63,10 @@ pub(crate) fn speed_of_crush(
     })?;
     let means = model.leave_one_out.as_ref();
     let means = means.and_then(|of| of.means.iter().find(|means| means.model == model.kind.name()));
-    let crush_error = means.map(|means| means.max_crush_error);
+    let crush_error = means.and_then(|means| match query.rule {
+        Some(rule) => means.max_crush_errors.get(&rule).copied(),
+        None => Some(means.max_crush_error),
+    });
     let off =
         |share: f64| crush_error.map_or(Ok(None), |error| find(crush_m * (1.0 + share * error)));
     let (low_m_per_s, high_m_per_s) = (off(-1.0)?, off(1.0)?);

@@ -56,6 +56,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             let table = Table::of(&changed)
                 .column("changed", |(name, _)| name)
                 .column("speed", |(_, of)| km_per_h(of.speed_m_per_s))
+                .column("mass", |(_, of)| percent(of.mass_difference))
                 .column("max crush", |(_, of)| percent(of.max_deflection_difference))
                 .column("energy", |(_, of)| percent(of.work_difference))
                 .column("peak force", |(_, of)| percent(of.peak_force_difference))

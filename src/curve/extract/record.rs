@@ -287,7 +287,7 @@ impl Motion {
     }
 
     fn differentiated(deflection: Signal, missing: String, remarks: &mut Notes) -> Self {
-        remarks.note("closing speed: displacement differentiated, the file has no velocity");
+        remarks.note("closing speed: displacement differentiated, because no velocity was read");
         Self {
             rate_m_per_s: derivative(&deflection.time_s, &deflection.values),
             time_s: deflection.time_s,
