@@ -335,8 +335,28 @@ fn a_restart_goes_on_where_the_run_ended() {
             assert_eq!(said, expected);
         }
     }
+    // A state that is cut off the first is missing in the middle.
+    let [first, second] = restarted(&bytes, header, 100, 0);
+    fs::write(at("runT01"), &first[..first.len() - 10]).unwrap();
+    fs::write(at("runT02"), second).unwrap();
+    let joined = section(&at("runT01"), "rwforc");
+    let before = joined.time[98];
+    let expected = format!(
+        "states after time {before:?} are missing: the forces on both sides are differences across the hole"
+    );
+    assert!(
+        joined.problems.iter().any(|p| p.message.starts_with(&expected)),
+        "{:?}",
+        joined.problems
+    );
+    assert!(joined.problems.iter().all(|p| !p.message.contains("will change")));
+    let [first, second] = restarted(&bytes, header, 100, 20);
+    fs::write(at("runT01"), first).unwrap();
+    fs::write(at("runT02"), second).unwrap();
     let alone = section(&at("runT02"), "nodout");
     assert_eq!(alone.time.len(), section(&at("wholeT01"), "nodout").time.len() - 80);
+    let message = alone.problems[0].to_string();
+    assert_eq!(message, "it continues runT01: read runT01 for the whole record");
     // Both are one file of the run; without the first the beginning is missing.
     let listed = crumple_ok(folder.path(), "inspect .");
     assert!(listed.contains("runT01") && !listed.contains("runT02"), "{listed}");

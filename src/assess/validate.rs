@@ -54,7 +54,7 @@ pub(crate) enum GroupReport {
         subsets: Vec<OverSubsets>,
         /// What has changed since an earlier validation; absent if none was given, or it lacks the group.
         #[serde(skip_serializing_if = "Option::is_none")]
-        against: Option<Against>,
+        against: Option<Box<Against>>,
     },
     /// There is no table.
     Failed {

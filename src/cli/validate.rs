@@ -201,7 +201,7 @@ fn validated(
     if args.against.is_some() && before.is_none() {
         validation.notes.push("the earlier validation does not have this group".into());
     }
-    let against = before.map(|before| Against::of(before, &validation));
+    let against = before.map(|before| Box::new(Against::of(before, &validation)));
     let validation = Box::new(validation);
     Ok(GroupReport::Validated { validation, next_run: next, subsets: over_subsets, against })
 }

@@ -238,9 +238,15 @@ const MAX_MISSING_FILES: usize = 20;
 pub(crate) fn missing_continuation(path: &Path) -> Result<Option<String>, Error> {
     if let Some(number) = restart_number(&name_of(path)) {
         let before = restart(path, number.saturating_sub(1));
-        if number > 1 && !is_file(&before)? {
-            let missing = name_of(&before);
-            return Ok(Some(format!("{missing} is missing, so the record starts late")));
+        if number > 1 {
+            let (is_there, before) = (is_file(&before)?, name_of(&before));
+            return Ok(Some(match is_there {
+                true => {
+                    let first = name_of(&restart(path, 1));
+                    format!("it continues {before}: read {first} for the whole record")
+                }
+                false => format!("{before} is missing, so the record starts late"),
+            }));
         }
         let next = number + family(path)?.len() as u32;
         return unread_behind((next..=LAST_RESTART).map(|n| restart(path, n)));

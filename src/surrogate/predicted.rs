@@ -85,7 +85,8 @@ pub struct PredictedCurve {
 }
 
 /// The forces beyond the maximum crush, along faster runs: neighbours in a train push on where a
-/// body by itself would have stopped. They are continued at the level with which the curve ends.
+/// body by itself would have stopped. They are those of the runs: exports and trains multiply them by one factor, so that
+/// they begin with the last force of the curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Beyond {
     /// Largest crush of the model's runs, in m: further on the forces are an assumption.

@@ -46,7 +46,8 @@ pub(crate) struct StateReader {
     lengths: Vec<usize>,
     starts: Vec<u64>,
     not_finite: usize,
-    is_cut: bool,
+    /// Times of the states before the cut ends of files.
+    cut_after: Vec<f64>,
     problems: Diagnostics,
 }
 
@@ -141,7 +142,7 @@ impl StateReader {
             lengths: header.lengths.clone(),
             starts: Vec::new(),
             not_finite: 0,
-            is_cut: false,
+            cut_after: Vec::new(),
             problems: Diagnostics::default(),
         }
     }
@@ -187,7 +188,7 @@ impl StateReader {
             }
             start += self.stride();
         }
-        self.is_cut |= damaged.is_some();
+        self.cut_after.extend(self.time.last().filter(|_| damaged.is_some()));
         self.leave_out(damaged, number + 1);
         self.look_for_zeros(header, &above, None);
         if self.not_finite > 0 {
@@ -367,7 +368,8 @@ impl StateReader {
                 }
                 if component.made.is_rate() && file.notes.is_empty() {
                     file.notes.push(DIFFERENTIATED.into());
-                    file.problems.extend(time.last().filter(|_| self.is_cut).map(goes_on));
+                    let is_last = |at: &f64| time.last() == Some(at);
+                    file.problems.extend(self.cut_after.iter().map(|at| cut(*at, is_last(at))));
                 }
             }
             for entity in entities(object.kind, object.id) {
@@ -405,9 +407,14 @@ impl StateReader {
 }
 
 /// What the end of a cut file means for forces.
-fn goes_on(last: &f64) -> Problem {
-    let message = format!(
-        "the record continues after time {last:?}: the forces there are differences over one interval, and will change"
-    );
+fn cut(after: f64, is_last: bool) -> Problem {
+    let message = match is_last {
+        true => format!(
+            "the record continues after time {after:?}: the forces there are differences over one interval, and will change"
+        ),
+        false => format!(
+            "states after time {after:?} are missing: the forces on both sides are differences across the hole, so they are not those of their times"
+        ),
+    };
     Problem::new(ProblemCode::CutRecord, message)
 }
