@@ -151,13 +151,14 @@ impl Index<LaneIndex> for Rows {
 
     #[inline(always)]
     fn index(&self, slot: LaneIndex) -> &f64 {
-        &self.0.as_flattened()[slot.0]
+        // Not `as_flattened`: without link-time optimisation it stays a call.
+        &self.0[slot.row()][slot.lane()]
     }
 }
 
 impl IndexMut<LaneIndex> for Rows {
     #[inline(always)]
     fn index_mut(&mut self, slot: LaneIndex) -> &mut f64 {
-        &mut self.0.as_flattened_mut()[slot.0]
+        &mut self.0[slot.row()][slot.lane()]
     }
 }

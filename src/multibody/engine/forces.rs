@@ -73,6 +73,10 @@ impl Engine<'_> {
         let (v, a, forces) = (&self.v, &self.a_start, self.push.forces_n(at));
         for rated in &self.fixed.rated {
             let Rated { interface: k, sides: [slot, next], behind, ahead, .. } = *rated;
+            // Nothing times any factor; what crosses its begin in this step needs the factor all the same.
+            if forces[slot] == 0.0 && self.crossings.is_empty() {
+                continue;
+            }
             let speed = |slot: LaneIndex| v[slot] + lag_s * a[slot];
             let factor = rated.rate.at(speed(behind) - ahead.map_or(0.0, speed));
             let extra_n = (factor - 1.0) * forces[slot];
