@@ -147,14 +147,15 @@ impl Pair {
         if common.0 >= common.1 {
             return Err(no_overlap());
         }
-        let asked = (from_s.unwrap_or(common.0), to_s.unwrap_or(common.1));
-        let (from_s, to_s) = (common.0.max(asked.0), common.1.min(asked.1));
+        let ends = [("from", from_s), ("to", to_s)];
+        let asked = ends.into_iter().filter_map(|(which, s)| Some(format!("{which} {} s", s?)));
+        let asked = asked.collect::<Vec<_>>().join(" ");
+        let from_s = common.0.max(from_s.unwrap_or(common.0));
+        let to_s = common.1.min(to_s.unwrap_or(common.1));
         if from_s >= to_s {
             return Err(error!(
                 Rating,
-                "the requested interval, from {} s to {} s, lies outside the common times from {} s to {} s",
-                asked.0,
-                asked.1,
+                "the requested interval, {asked}, lies outside the common times from {} s to {} s",
                 common.0,
                 common.1
             ));

@@ -234,8 +234,8 @@ type LawKey = (String, (bool, bool, bool, u64, u64));
 #[derive(Debug, Default)]
 pub(super) struct LawCache(Mutex<HashMap<LawKey, (CurveTable, CachedLaw)>>);
 
-/// A law of 400 points takes about 20 kB.
-const MOST_LAWS: usize = 2000;
+/// Laws that are kept: one of a model takes about 70 kB, so all take up to 35 MB.
+const MOST_LAWS: usize = 500;
 
 impl LawCache {
     fn get(&self, key: &LawKey, table: &CurveTable) -> Option<CachedLaw> {
