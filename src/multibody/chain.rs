@@ -135,6 +135,13 @@ impl Interface {
     }
 }
 
+/// The step follows the swing of undamped springs, whose energy error stays. From this share of
+/// critical damping on a swing is gone after a period, as between plates, and its step may be longer:
+/// ends of models then set it. One run of eight against eight such vehicles at 36 km/h keeps its energy to 3e-6
+/// with 2 and 5e-6 with 3 (1e-6 with 1), and the largest crushes move by 0.005 and 0.01 % (from 4 on, by 0.05).
+const STOPPING_RATIO: f64 = 0.2;
+const STOPPED_SWING: f64 = 3.0;
+
 /// Bodies from back to front (increasing x), each with the interface to the next one.
 ///
 /// Invariant: masses above 0; as many interfaces as bodies if the row ends at a rigid
@@ -286,8 +293,8 @@ impl Chain {
     }
 
     /// Shortest `sqrt(m/k)` of all interfaces in s, with the lighter of the two bodies and the
-    /// stiffest part of the law (a damper counts as `m/c`), and the interface's index;
-    /// infinite for interfaces without stiffness.
+    /// stiffest part of the law (a damper counts as `m/c`; one that stops any swing counts three
+    /// times), and the interface's index; infinite for interfaces without stiffness.
     pub(super) fn shortest_time_s(&self) -> (f64, usize) {
         let mass = |i: usize| self.bodies.get(i).map_or(f64::INFINITY, |b| b.mass_kg);
         let mut shortest = (f64::INFINITY, 0);
@@ -296,7 +303,11 @@ impl Chain {
             let spring = (lighter / interface.max_stiffness_n_per_m()).sqrt();
             let damper =
                 interface.damping.as_ref().map_or(f64::INFINITY, |d| lighter / d.largest());
-            let time = spring.min(damper);
+            let stops_swing = interface.damping.as_ref().is_some_and(|d| {
+                d.smallest()
+                    >= 2.0 * STOPPING_RATIO * (lighter * interface.max_stiffness_n_per_m()).sqrt()
+            });
+            let time = spring.min(damper) * if stops_swing { STOPPED_SWING } else { 1.0 };
             if time < shortest.0 {
                 shortest = (time, k);
             }
@@ -389,8 +400,12 @@ impl Damping {
         }
     }
 
-    pub(super) fn largest(&self) -> f64 {
+    fn largest(&self) -> f64 {
         self.coefficient_n_s_per_m.iter().copied().fold(0.0, f64::max)
+    }
+
+    fn smallest(&self) -> f64 {
+        self.coefficient_n_s_per_m.iter().copied().fold(f64::INFINITY, f64::min)
     }
 }
 

@@ -92,6 +92,7 @@ impl Engine<'_> {
     /// Crush zones take the mass that has been stopped in the step; their speed and that of what
     /// they take become one, which loses energy and no momentum.
     pub(super) fn stop_mass(&mut self) {
+        let ahead_s = self.fixed.ahead_s();
         for taken in &mut self.taken {
             let k = taken.interface;
             let Some(stopping) = &self.fixed.chain.interfaces()[k].stopping else { continue };
@@ -111,7 +112,9 @@ impl Engine<'_> {
                 continue;
             }
             let difference = self.v[body] - self.v[zone];
-            let lost_j = 0.5 * before_kg * taken_kg / now_kg * difference * difference;
+            // At the step's end: speeds are `ahead_s` ahead, and the force of what is taken stays with the body.
+            let mean = 0.5 * difference + ahead_s * self.a[zone];
+            let lost_j = before_kg * taken_kg / now_kg * difference * mean;
             self.losses.damped_j += lost_j;
             self.losses.of[k].damped_j += lost_j;
             self.v[zone] += taken_kg / now_kg * difference;
