@@ -697,6 +697,21 @@ fn groups_and_several_speeds_are_exported_at_once() {
     {
         assert!(!case[key].is_null(), "{key}");
     }
+    // The body force of a run is exported as it moved the body, and the file says so; others are smooth.
+    for (source, force, says) in [
+        ("case.json", &[][..], true),
+        ("case.json", &["--force", "contact"], false),
+        ("lead50.json", &[], false),
+    ] {
+        export(here, source, "facts.csv", force);
+        let head = fs::read_to_string(here.join("facts.csv")).unwrap();
+        assert_eq!(
+            head.contains("filter: none beyond the recipe's"),
+            says,
+            "{source} {force:?}\n{}",
+            &head[..800]
+        );
+    }
     let t = |code: i32, arguments: &[&str], expected: &str| {
         let error = crumple_fails(here, code, arguments);
         assert!(error.contains(expected), "{arguments:?} said:\n{error}");

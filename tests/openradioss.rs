@@ -366,6 +366,15 @@ fn a_restart_goes_on_where_the_run_ended() {
     fs::remove_file(at("runT01")).unwrap();
     let message = section(&at("runT03"), "nodout").problems[0].to_string();
     assert_eq!(message, "runT02 is missing, so the record starts late");
+    for (name, copy) in [("runT02", "runT03"), ("runT06", "runT03")] {
+        fs::copy(at(copy), at(name)).unwrap();
+    }
+    let message = section(&at("runT03"), "nodout").problems[0].to_string();
+    assert_eq!(
+        message,
+        "it continues runT02: read runT02 for all there is, since runT01 is missing; runT04 is missing, so its continuation is not read"
+    );
+    fs::remove_file(at("runT06")).unwrap();
     // What does not hold the same is not joined.
     fs::write(at("runT01"), written(3040, &[(0, 9, 9), (102, 1, 6)], 5)).unwrap();
     fs::write(at("runT02"), written(3040, &[(0, 8, 9), (102, 1, 6)], 5)).unwrap();

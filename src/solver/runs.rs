@@ -237,19 +237,14 @@ const MAX_MISSING_FILES: usize = 20;
 /// read.
 pub(crate) fn missing_continuation(path: &Path) -> Result<Option<String>, Error> {
     if let Some(number) = restart_number(&name_of(path)) {
-        let before = restart(path, number.saturating_sub(1));
-        if number > 1 {
-            let (is_there, before) = (is_file(&before)?, name_of(&before));
-            return Ok(Some(match is_there {
-                true => {
-                    let first = name_of(&restart(path, 1));
-                    format!("it continues {before}: read {first} for the whole record")
-                }
-                false => format!("{before} is missing, so the record starts late"),
-            }));
-        }
         let next = number + family(path)?.len() as u32;
-        return unread_behind((next..=LAST_RESTART).map(|n| restart(path, n)));
+        let unread = unread_behind((next..=LAST_RESTART).map(|n| restart(path, n)))?;
+        let before = match number > 1 {
+            true => Some(record_before(path, number)?),
+            false => None,
+        };
+        let said: Vec<String> = before.into_iter().chain(unread).collect();
+        return Ok((!said.is_empty()).then(|| said.join("; ")));
     }
     for part in family(path)?.iter().filter(|part| !is_continuation(part)) {
         let next = with_continuations(part)?.len();
@@ -260,6 +255,26 @@ pub(crate) fn missing_continuation(path: &Path) -> Result<Option<String>, Error>
         }
     }
     Ok(None)
+}
+
+/// What comes before a continuation read alone.
+fn record_before(path: &Path, number: u32) -> Result<String, Error> {
+    let mut first = number;
+    while first > 1 && is_file(&restart(path, first - 1))? {
+        first -= 1;
+    }
+    let name = |n: u32| name_of(&restart(path, n));
+    if first == number {
+        return Ok(format!("{} is missing, so the record starts late", name(number - 1)));
+    }
+    let (before, read) = (name(number - 1), name(first));
+    Ok(match first {
+        1 => format!("it continues {before}: read {read} for the whole record"),
+        _ => format!(
+            "it continues {before}: read {read} for all there is, since {} is missing",
+            name(first - 1)
+        ),
+    })
 }
 
 /// The files not read because the first of them is missing.

@@ -113,11 +113,11 @@ impl Engine<'_> {
                 None => self.missed_along(crossing),
             };
             let sign = direction.sign();
-            let factor = self.rate_factors.get(k).copied().unwrap_or(1.0);
+            let factor = self.rate_factors[crossing.slot];
             if factor != 1.0 {
                 let lost_j = (factor - 1.0) * impulse * self.closing(k);
                 self.losses.damped_j += lost_j;
-                self.losses.of[k].damped_j += lost_j;
+                self.losses.damped_of_j[self.fixed.layout.of(k)] += lost_j;
             }
             self.push_apart(k, factor * sign * impulse, factor * sign * moment);
             if what != Move::default() {
@@ -252,7 +252,7 @@ impl Engine<'_> {
         let impulse = part * self.fixed.step_s * damping.at(closing) * closing;
         if impulse.is_finite() {
             self.losses.damped_j += impulse * closing;
-            self.losses.of[m.k].damped_j += impulse * closing;
+            self.losses.damped_of_j[m.slot] += impulse * closing;
             self.push_apart(m.k, impulse, 0.0);
         }
     }

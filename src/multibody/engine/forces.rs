@@ -1,9 +1,9 @@
 //! Forces and accelerations at the present positions and speeds.
 
 use super::super::contacts::{Contacts, StepPoint};
-use super::super::rows::{LaneIndex, Rows, behind, each};
+use super::super::rows::{LANES, LaneIndex, Rows, ahead, behind, each, larger};
 use super::events::Speeds;
-use super::state::{Engine, Rated};
+use super::state::Engine;
 
 impl Engine<'_> {
     /// Forces at the present positions; interfaces that have left their piece are settled.
@@ -68,25 +68,36 @@ impl Engine<'_> {
 
     /// Multiplies the forces of crush zones by what the speeds of their vehicles make of them.
     fn add_rates(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
+        let n = self.fixed.layout.rows();
         self.losses.power.damper_w = 0.0;
-        self.losses.of.iter_mut().for_each(|of| of.power_w = 0.0);
+        self.losses.power_of_w.values_mut(n).fill([0.0; LANES]);
         let (v, a, forces) = (&self.v, &self.a_start, self.push.forces_n(at));
+        let mut acts = false;
         for rated in &self.fixed.rated {
-            let Rated { interface: k, sides: [slot, next], behind, ahead, .. } = *rated;
             // Nothing times any factor; what crosses its begin in this step needs the factor all the same.
-            if forces[slot] == 0.0 && self.crossings.is_empty() {
+            if forces[rated.slot] == 0.0 && self.crossings.is_empty() {
                 continue;
             }
             let speed = |slot: LaneIndex| v[slot] + lag_s * a[slot];
-            let factor = rated.rate.at(speed(behind) - ahead.map_or(0.0, speed));
-            let extra_n = (factor - 1.0) * forces[slot];
-            let closing = v[slot] - v[next] + lag_s * (a[slot] - a[next]);
-            net_n[slot] += extra_n;
-            self.rate_factors[k] = factor;
-            self.losses.power.damper_w += extra_n * closing;
-            self.losses.of[k].power_w += extra_n * closing;
-            self.events.interfaces[k].pressed(net_n[slot]);
+            let closing = speed(rated.behind) - rated.ahead.map_or(0.0, speed);
+            self.rate_factors[rated.slot] = rated.rate.at(closing);
+            acts = true;
         }
+        if !acts {
+            return;
+        }
+        let (v, a, forces) = (v.values(n), a.values(n), forces.values(n));
+        let power = self.losses.power_of_w.values_mut(n);
+        let peaks = self.peaks_n.values_mut(n);
+        for (c, net) in net_n.values_mut(n).iter_mut().enumerate() {
+            let factors = &self.rate_factors.values(n)[c];
+            let extra = each(|j| (factors[j] - 1.0) * forces[c][j]);
+            let (v_ahead, a_ahead) = (ahead(v, c), ahead(a, c));
+            power[c] = each(|j| extra[j] * (v[c][j] - v_ahead[j] + lag_s * (a[c][j] - a_ahead[j])));
+            *net = each(|j| net[j] + extra[j]);
+            peaks[c] = larger(peaks[c], *net);
+        }
+        self.losses.power.damper_w = self.losses.power_of_w.sum(n);
     }
 
     /// Crush zones take the mass that has been stopped in the step; their speed and that of what
@@ -95,13 +106,13 @@ impl Engine<'_> {
         let ahead_s = self.fixed.ahead_s();
         for taken in &mut self.taken {
             let k = taken.interface;
-            let Some(stopping) = &self.fixed.chain.interfaces()[k].stopping else { continue };
             // Only a zone that is crushed further takes mass.
             let largest_m = self.push.largest_m(StepPoint::End, k).max(0.0);
             if largest_m == taken.largest_m {
                 continue;
             }
             taken.largest_m = largest_m;
+            let Some(stopping) = &self.fixed.chain.interfaces()[k].stopping else { continue };
             let least_kg = self.fixed.chain.bodies()[stopping.zone].mass_kg;
             let body = self.fixed.layout.of(stopping.body);
             let zone = self.fixed.layout.of(stopping.zone);
@@ -116,30 +127,31 @@ impl Engine<'_> {
             let mean = 0.5 * difference + ahead_s * self.a[zone];
             let lost_j = before_kg * taken_kg / now_kg * difference * mean;
             self.losses.damped_j += lost_j;
-            self.losses.of[k].damped_j += lost_j;
+            self.losses.damped_of_j[self.fixed.layout.of(k)] += lost_j;
             self.v[zone] += taken_kg / now_kg * difference;
             for (slot, mass_kg) in [(zone, now_kg), (body, self.mass_kg[body] - taken_kg)] {
                 // The forces stay, and so does the momentum that the next half step takes back.
-                self.a[slot] *= self.mass_kg[slot] / mass_kg;
+                let per_kg = 1.0 / mass_kg;
+                self.a[slot] *= self.mass_kg[slot] * per_kg;
                 self.mass_kg[slot] = mass_kg;
-                self.per_kg[slot] = 1.0 / mass_kg;
+                self.per_kg[slot] = per_kg;
             }
         }
     }
 
     fn add_dampers(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
         for &k in &self.fixed.damped {
-            let interface = &self.fixed.chain.interfaces()[k];
-            let Some(damping) = &interface.damping else { continue };
+            let slot = self.fixed.layout.of(k);
             // At 0 only where bodies meet at the start.
             let touches = |contacts: &Contacts<'_>| {
-                contacts.deflection_m(at, k) >= 0.0 && !contacts.is_open(k)
+                contacts.deflections_m(at)[slot] >= 0.0 && !contacts.is_open(k)
             };
             let pulls = self.pull.as_ref().is_some_and(|pull| pull.has_law(k) && touches(pull));
             if !(touches(&self.push) || pulls) {
                 continue;
             }
-            let slot = self.fixed.layout.of(k);
+            let interface = &self.fixed.chain.interfaces()[k];
+            let Some(damping) = &interface.damping else { continue };
             let closing = self.closing(k) + lag_s * self.between(&self.a_start, k);
             let spring = net_n[slot];
             let mut force = spring + damping.at(closing) * closing;
@@ -149,7 +161,7 @@ impl Engine<'_> {
             }
             net_n[slot] = force;
             self.losses.power.damper_w += (force - spring) * closing;
-            self.losses.of[k].power_w += (force - spring) * closing;
+            self.losses.power_of_w[slot] += (force - spring) * closing;
             self.events.interfaces[k].pressed(force);
             self.events.interfaces[k].pulled(-force);
         }

@@ -42,7 +42,7 @@ use crate::error::Error;
 use events::Speeds;
 use outputs::OutputRecorder;
 pub(super) use state::Scheme;
-use state::{Engine, Fixed, Loss, Losses, Rated, Taken};
+use state::{Engine, Fixed, Losses, Rated, Taken};
 
 /// Runs the chain and fills in `run`.
 pub(super) fn run(
@@ -127,10 +127,7 @@ impl Engine<'_> {
             let mean = 0.5 * h;
             let now = self.losses.power;
             self.losses.damped_j += mean * (before.damper_w + now.damper_w);
-            for of in &mut self.losses.of {
-                of.damped_j += mean * (of.before_w + of.power_w);
-                of.before_w = of.power_w;
-            }
+            self.losses.add_of_interfaces(self.fixed.layout.known::<N>(), mean);
             self.losses.resisted_j += mean * (before.resistance_w + now.resistance_w);
             self.losses.impulse += mean * (before.resistance_n + now.resistance_n);
         }
@@ -196,18 +193,18 @@ impl<'a> Engine<'a> {
             .map(|k| Taken { interface: k, largest_m: f64::NAN, segment: 0 });
         let rated = |(k, interface): (usize, &Interface)| {
             let rate = interface.rate.clone()?;
-            let (sides, behind) = ([layout.of(k), layout.of(k + 1)], layout.of(rate.behind));
+            let (slot, behind) = (layout.of(k), layout.of(rate.behind));
             let ahead = rate.ahead.map(|body| layout.of(body));
-            Some(Rated { interface: k, sides, behind, ahead, rate })
+            Some(Rated { slot, behind, ahead, rate })
         };
         let rated: Vec<Rated> = interfaces.iter().enumerate().filter_map(rated).collect();
         let has_damper = |k: &usize| interfaces[*k].damping.is_some();
         let damped = (0..interfaces.len()).filter(has_damper).collect();
-        let rates = if rated.is_empty() { 0 } else { interfaces.len() };
         let mut engine = Self {
             mass_kg: of(&|i| bodies[i].mass_kg),
             per_kg: of(&|i| 1.0 / bodies[i].mass_kg),
-            rate_factors: vec![1.0; rates],
+            rate_factors: of(&|_| 1.0),
+            peaks_n: of(&|_| 0.0),
             taken: zones.collect(),
             x_m: of(&|_| 0.0),
             v: of(&|i| bodies[i].speed_m_per_s),
@@ -220,14 +217,14 @@ impl<'a> Engine<'a> {
             crossings: Vec::new(),
             left: Vec::new(),
             end_s: 0.0,
-            losses: Losses { of: vec![Loss::default(); interfaces.len()], ..Losses::default() },
+            losses: Losses::new(&layout),
             wall_impulse: 0.0,
             events: EventRecorder::new(chain, &layout),
             fixed: Fixed { chain, scheme, step_s, layout, rated, damped },
         };
         engine.move_to_first_contact();
         engine.accelerate_and_kick::<0>(StepPoint::End, 0.0, 0.0);
-        engine.losses.of.iter_mut().for_each(|of| of.before_w = of.power_w);
+        engine.losses.add_of_interfaces(engine.fixed.layout.rows(), 0.0);
         engine.record_first_contacts();
         engine
     }

@@ -221,8 +221,8 @@ impl Engine<'_> {
             history.dissipated_at_end_j = recorder.dissipated_j[slot];
             history.stored_at_end_j =
                 (recorder.work_j[slot] - recorder.dissipated_j[slot]).max(0.0);
-            history.damped_j = Some(self.losses.of[k].damped_j);
-            self.events.interfaces[k].pressed(self.push.peak_n(k));
+            history.damped_j = Some(self.losses.damped_of_j[slot]);
+            self.events.interfaces[k].pressed(self.push.peak_n(k).max(self.peaks_n[slot]));
             self.events.interfaces[k].deflected(self.push.deflection_m(StepPoint::End, k), end_s);
             if let Some(pull) = &self.pull {
                 self.events.interfaces[k].pulled(pull.peak_n(k));

@@ -27,9 +27,7 @@ pub(super) struct Fixed<'a> {
 
 /// An interface whose force follows the closing speed of two bodies.
 pub(super) struct Rated {
-    pub interface: usize,
-    /// The bodies at the interface.
-    pub sides: [LaneIndex; 2],
+    pub slot: LaneIndex,
     /// The bodies whose speed counts.
     pub behind: LaneIndex,
     pub ahead: Option<LaneIndex>,
@@ -74,8 +72,9 @@ pub(super) struct Engine<'a> {
     pub pull: Option<Contacts<'a>>,
     /// Net forces if more than the pushing ones act; for a while their gradient.
     pub net_n: Option<Rows>,
-    /// What the speeds multiply the force of each interface by; empty if none has a rate.
-    pub rate_factors: Vec<f64>,
+    /// What the speeds multiply the force of each interface by, and the largest forces with it.
+    pub rate_factors: Rows,
+    pub peaks_n: Rows,
     /// Of every interface with a crush zone.
     pub taken: Vec<Taken>,
     /// What has happened in the step.
@@ -99,16 +98,27 @@ pub(super) struct Losses {
     /// Of the resistance.
     pub impulse: f64,
     pub power: Power,
-    /// The part of each interface.
-    pub of: Vec<Loss>,
+    /// The part of each interface in `damped_j`, and its power now and a step before.
+    pub damped_of_j: Rows,
+    pub power_of_w: Rows,
+    pub before_of_w: Rows,
 }
 
-/// Work of what depends on speeds at one interface so far, and its power at the last step and the one before.
-#[derive(Clone, Copy, Default)]
-pub(super) struct Loss {
-    pub damped_j: f64,
-    pub power_w: f64,
-    pub before_w: f64,
+impl Losses {
+    pub(crate) fn new(layout: &Layout) -> Self {
+        let [damped_of_j, power_of_w, before_of_w] = std::array::from_fn(|_| Rows::zeros(layout));
+        Self { damped_of_j, power_of_w, before_of_w, ..Self::default() }
+    }
+
+    /// Adds the work of a step to the interfaces' parts: `half_s`, half its length, times the powers at both ends.
+    #[inline(always)]
+    pub(crate) fn add_of_interfaces(&mut self, n: usize, half_s: f64) {
+        let (before, power) = (self.before_of_w.values(n), self.power_of_w.values(n));
+        for (c, of) in self.damped_of_j.values_mut(n).iter_mut().enumerate() {
+            *of = each(|j| of[j] + half_s * (before[c][j] + power[c][j]));
+        }
+        std::mem::swap(&mut self.before_of_w, &mut self.power_of_w);
+    }
 }
 
 /// Power of dampers and resistance, and the resisting force, at the last step.
