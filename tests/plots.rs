@@ -244,7 +244,11 @@ fn every_kind_of_file_is_drawn() {
 fn sweeps_are_drawn_from_csv_and_hdf5() {
     let folder = demo_folder();
     let folder = folder.path();
-    for (samples, over) in [(50, "speed_m_per_s[A]"), (21_000, "force_factor[nose]")] {
+    for (samples, over, has_range) in [
+        (20, "speed_m_per_s[A]", false),
+        (50, "speed_m_per_s[A]", true),
+        (21_000, "force_factor[nose]", true),
+    ] {
         let plan = format!(
             "[sweep]\nsamples = {samples}\nvary = [ {{ what = \"speed\", train = \"A\", distribution = \"uniform\", from = \"30km/h\", to = \"40km/h\" }}, {{ what = \"force\", curve = \"nose\", distribution = \"normal\", mean = 1, sd = 0.1 }} ]\n"
         );
@@ -261,6 +265,7 @@ fn sweeps_are_drawn_from_csv_and_hdf5() {
         }
         let [a, b] = ["a.svg", "b.svg"].map(|name| fs::read_to_string(folder.join(name)).unwrap());
         assert!(a == b && a.contains("peak force"));
+        assert_eq!(a.contains("median") && a.contains("5 to 95 % of the runs"), has_range);
     }
     // By its content, whatever its name; an item or a status that is none is found, and so are values without bytes.
     fs::copy(folder.join("same.h5"), folder.join("same.data")).unwrap();

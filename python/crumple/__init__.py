@@ -108,6 +108,9 @@ class Component(_Mapping):
         super().__init__(values)
         self.name, self.time, self._titles = name, time, titles
 
+    def __getstate__(self):
+        return {**self.__dict__, "_items": {entity: self[entity] for entity in self}}
+
     @property
     def ids(self):
         return list(self._items)
@@ -361,7 +364,12 @@ class Curve:
 
     def __init__(self, document):
         def array(key):
-            return None if document.get(key) is None else np.array(document[key])
+            if document.get(key) is None:
+                return None
+            values = np.array(document[key])
+            # `document` is what is exported: a change here would be lost.
+            values.flags.writeable = False
+            return values
 
         self.document = document
         self.speed, self.max_deflection = document["speed_m_per_s"], document["max_deflection_m"]

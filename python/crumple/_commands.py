@@ -87,7 +87,7 @@ def _ended(child, command):
 
 
 def run(*arguments, check=True):
-    """Run a command of the program and return its JSON document.
+    """Run a command of the program and return its JSON document, or the text of one that has none (`--version`).
 
     `run("validate", "curves.h5", "--group", "lead-car-wall")`; warnings become Python warnings (`crumple.Warned`). Progress is
     shown by tqdm, if it is installed, on a terminal and in notebooks.
@@ -115,6 +115,9 @@ def run(*arguments, check=True):
         if re.search(r"(^|[\s'(])--[a-z]", str(error)):
             error.add_note("In Python, options are keyword arguments: --nsdm-seeds 3 is nsdm_seeds=3, --overwrite is overwrite=True.")
         raise error
+    if check and document is None and child.returncode == 0 and printed:
+        # Of --version and --help.
+        return printed.decode()
     if check and document is None:
         raise Error("\n".join(said).strip() or f"crumple ended with code {child.returncode}")
     return document

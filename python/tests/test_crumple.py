@@ -64,8 +64,21 @@ def test_one_or_several_of_any_kind():
     del component
     histories = crumple.read(NODOUT)
     view = histories.only()["x_velocity"][900001]
+    again = pickle.loads(pickle.dumps(histories))
     del histories
     assert np.array_equal(view, whole)
+    assert np.array_equal(again.only()["x_velocity"][900001], whole)
+
+
+def test_what_is_exported_cannot_be_changed_by_its_arrays():
+    curve = crumple.Model(DEMO / "lead.model").predict(10.0)
+    for values in (curve.force, curve.deflection, curve.body_force, *curve.band):
+        with pytest.raises(ValueError, match="read-only"):
+            values[:] = 1.0
+
+
+def test_a_command_without_a_document_gives_its_text():
+    assert crumple.run("--version").startswith("crumple ")
 
 
 def test_folders_of_the_user_are_not_looked_into(tmp_path, monkeypatch):

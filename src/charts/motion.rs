@@ -423,8 +423,11 @@ type Part = (Shown, Vec<f64>, Vec<f64>);
 /// further than its curve has data it is another part.
 fn crush(interface: &InterfaceMotion) -> Vec<Part> {
     let pairs = interface.deflection_m.iter().zip(&interface.force_n);
-    let closed: Vec<(f64, f64)> =
+    let mut closed: Vec<(f64, f64)> =
         pairs.filter(|(d, f)| **d > 0.0 || **f != 0.0).map(|(d, f)| (*d, *f)).collect();
+    if closed.first().is_some_and(|(d, _)| *d > 0.0) {
+        closed.insert(0, (0.0, 0.0));
+    }
     let end = closed.iter().position(|(d, _)| *d > interface.data_end_m).unwrap_or(closed.len());
     let known = closed[..end].iter().copied().unzip();
     // They meet in the last point of the first.

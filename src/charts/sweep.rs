@@ -13,6 +13,8 @@ const MOST_VALUES: usize = 60;
 const BINS: usize = 12;
 /// From so many rows on, a range of them is shown.
 const LEAST_ROWS: usize = 5;
+/// Fewest rows of near values that make a group.
+const FEW_ROWS: usize = 10;
 /// The range that is shown: from 5 to 95 % of the rows.
 const RANGE: (f64, f64) = (0.05, 0.95);
 /// Lines that one panel takes, and panels that are drawn at full height.
@@ -163,8 +165,8 @@ fn distinct(column: &ResultColumn) -> Vec<f64> {
     values
 }
 
-/// Rows in groups of equal or near values of a quantity: the middle of each, and its rows.
-fn groups(column: &ResultColumn, is_grid: bool) -> Vec<(f64, Vec<usize>)> {
+/// Rows in groups of equal or near values of a quantity, of near ones at least `least`: the middle of each, and its rows.
+fn groups(column: &ResultColumn, is_grid: bool, least: usize) -> Vec<(f64, Vec<usize>)> {
     let mut rows: Vec<usize> =
         (0..column.values.len()).filter(|&k| column.values[k].is_finite()).collect();
     let of = |k: &usize| column.values[*k];
@@ -172,7 +174,8 @@ fn groups(column: &ResultColumn, is_grid: bool) -> Vec<(f64, Vec<usize>)> {
     if is_grid {
         return rows.chunk_by(|a, b| of(a) == of(b)).map(|g| (of(&g[0]), g.to_vec())).collect();
     }
-    let size = rows.len().div_ceil(BINS).max(1);
+    let count = (rows.len() / least).clamp(1, BINS);
+    let size = rows.len().div_ceil(count).max(1);
     let middle = |group: &[usize]| 0.5 * (of(&group[0]) + of(&group[group.len() - 1]));
     rows.chunks(size).map(|group| (middle(group), group.to_vec())).collect()
 }
@@ -199,8 +202,10 @@ fn over_one(
     is_grid: bool,
     others_vary: bool,
 ) -> Chart {
-    let groups = groups(x, is_grid);
-    let has_range = groups.iter().any(|(_, rows)| rows.len() >= LEAST_ROWS);
+    let groups = groups(x, is_grid, FEW_ROWS);
+    // What other quantities do cannot be told from so few: the rows themselves.
+    let is_grouped = is_grid || others_vary && groups.len() > 2;
+    let has_range = is_grouped && groups.iter().any(|(_, rows)| rows.len() >= LEAST_ROWS);
     let mut panels: Vec<Panel> = Vec::new();
     let mut kinds: Vec<&str> = Vec::new();
     for result in results {
@@ -212,7 +217,7 @@ fn over_one(
             panels.push(Panel::new(named_axis(x), axis(result, false)));
             panels.len() - 1
         });
-        add_line(&mut panels[at], result, x, &groups, (is_grid || others_vary, has_range));
+        add_line(&mut panels[at], result, x, &groups, (is_grouped, has_range));
     }
     let chart = Chart::row(title, panels);
     if chart.panels.len() > MOST_LINES { Chart { height: SMALL, ..chart } } else { chart }
@@ -256,7 +261,7 @@ fn over_two(
     results: &[&ResultColumn],
     is_grid: [bool; 2],
 ) -> Result<Chart, Error> {
-    let (columns, rows) = (groups(x, is_grid[0]), groups(y, is_grid[1]));
+    let (columns, rows) = (groups(x, is_grid[0], 1), groups(y, is_grid[1], 1));
     let edges = |groups: &[(f64, Vec<usize>)]| {
         let middles: Vec<f64> = groups.iter().map(|(middle, _)| *middle).collect();
         let step = |k: usize| middles.get(k + 1).map(|next| 0.5 * (next - middles[k]));

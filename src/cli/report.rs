@@ -96,7 +96,13 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     }
     options.keep_others(&args.output, FileKind::Curve)?;
     let to_stdout = options.on_stdout([&args.output])?;
-    let read = |path: &PathBuf| Ok((path.clone(), Database::read(path)?));
+    let read = |path: &PathBuf| {
+        let database = Database::read(path)?;
+        if database.groups().next().is_none() {
+            return usage(format!("{} has no groups: build a study into it", path.display()));
+        }
+        Ok((path.clone(), database))
+    };
     let databases = databases.into_iter().map(read).collect::<Result<Vec<_>, Failure>>()?;
     let settings = ReportSettings {
         title: args.title.clone(),

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::layout::{self, ATTRIBUTES, BODY_FORCE, Content, FoundCase, FoundGroup, OLDEST, Opened};
 use super::{group, listed};
 use crate::curve::body::body_force_n;
-use crate::curve::{Case, Curve, EnergyAudit, energy, group as siblings, loading};
+use crate::curve::{Case, Curve, EnergyAudit, ForceKind, energy, group as siblings, loading};
 use crate::error::Error;
 use crate::hdf5::{AttrValue, Group};
 use crate::history::time_gaps;
@@ -269,7 +269,11 @@ impl Findings<'_> {
             );
             self.add("energy_impossible", None, None, message);
         } else if (ratio - 1.0).abs() > EnergyAudit::TOLERANCE {
-            let message = format!("W/E is {ratio:.4}, off by more than 5 %");
+            let of_contact = match case.curves.force_kind {
+                ForceKind::Contact if ratio > 1.0 => ": a contact force also stops the crush zone",
+                _ => "",
+            };
+            let message = format!("W/E is {ratio:.4}, off by more than 5 %{of_contact}");
             self.add("energy_mismatch", None, None, message);
         }
         let pairs = [

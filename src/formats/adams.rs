@@ -121,7 +121,7 @@ impl<'a> Spline<'a> {
         let (length, (_, force)) = names.and_then(words).ok_or_else(|| {
             error!(
                 Export,
-                "columns need units that have a name: lengths in {lengths}, forces in {forces}",
+                "columns need units that have a name: lengths in {lengths}, forces in {forces}; choose others with --units, such as mm-t-s",
                 forces = "N, kN",
                 lengths = LENGTH.known_units()
             )

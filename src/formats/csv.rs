@@ -11,7 +11,7 @@ pub(crate) fn write(curve: &ExportCurve, options: &Options) -> Result<Exported, 
         LENGTH.name_of(units.length_m).zip(FORCE.name_of(units.force())).ok_or_else(|| {
             error!(
                 Export,
-                "columns need units that have a name: lengths in {lengths}, forces in {forces}",
+                "columns need units that have a name: lengths in {lengths}, forces in {forces}; choose others with --units, such as mm-t-s",
                 forces = FORCE.known_units(),
                 lengths = LENGTH.known_units()
             )

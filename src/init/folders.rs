@@ -211,6 +211,9 @@ impl LeftOut {
     }
 }
 
+/// Bodies that close more slowly than this share of their first speed at a record's end may go on together.
+const MOVES_ON: f64 = 0.5;
+
 /// Why a run is left out.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "reason", rename_all = "snake_case")]
@@ -231,7 +234,7 @@ pub(crate) enum Reason {
     #[error("it has no histories of nodes (a nodout, or a binout or T01 with one): it has {found}")]
     NoMotion { found: String },
     /// The record has hardly begun.
-    #[error("it terminated early: {file} holds {states} complete {}{damage}", if *.states == 1 { "state" } else { "states" })]
+    #[error("it terminated early{}: {file} holds {states} complete {}{damage}", if *.states == 0 { ", or is laid out in another way" } else { "" }, if *.states == 1 { "state" } else { "states" })]
     FewStates {
         file: String,
         states: usize,
@@ -239,7 +242,7 @@ pub(crate) enum Reason {
         damage: String,
     },
     #[error(
-        "it terminated early: the record ends at {end}, while the bodies still close at {} % of their first speed{damage}", (share * 100.0).round()
+        "it terminated early: the record ends at {end}, while the bodies still close at {} % of their first speed{}{damage}", (share * 100.0).round(), if *.share < MOVES_ON { " (an obstacle that moves on needs --kind pair --minus-node ID)" } else { "" }
     )]
     EndsWhileLoading {
         /// Last time that motion and force share, with its unit if that is known.

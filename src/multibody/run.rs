@@ -259,9 +259,22 @@ impl Grid {
         let step_s = output_interval_s / per_output;
         if !(steps <= MAX_STEPS && outputs <= MAX_OUTPUTS) {
             let interface = chain.interfaces().get(k).map_or("none", |i| i.name.as_str());
+            let is_asked = settings.step_s <= method.step_rule() * shortest_s;
+            let (key, remedy) = match (outputs <= MAX_OUTPUTS, is_asked) {
+                (true, true) => ("run.step", "lengthen the step".into()),
+                (true, false) => (
+                    "run.duration",
+                    format!(
+                        "such short steps are needed by interface {interface}: check its stiffness and the masses beside it, or shorten the duration"
+                    ),
+                ),
+                _ => {
+                    ("run.duration", "shorten the duration or lengthen the output interval".into())
+                }
+            };
             return Err(error!(
-                Simulation at "run.duration",
-                "the run would take {steps:.3e} steps of {step_s:.3e} s for {outputs:.3e} outputs: shorten the duration or lengthen step and output interval; the shortest step is needed by interface {interface}"
+                Simulation at key,
+                "the run would take {steps:.3e} steps of {step_s:.3e} s for {outputs:.3e} outputs: {remedy}"
             ));
         }
         let (bodies, interfaces) = (chain.bodies().len(), chain.interfaces().len());

@@ -227,6 +227,19 @@ impl Spring {
                 Shown::one_stiffness(steepest)
             ));
         }
+        if let (Some(asked), Some(stages)) = (asked, &table.stages) {
+            let points = self.curve.loading.deflection_m().iter().zip(self.curve.loading.force_n());
+            let begins = |&(d, _): &(&f64, &f64)| stages.first().is_some_and(|s| *d < s.stroke.0);
+            let secants = points.skip_while(begins).map(|(d, f)| f / d);
+            let secant = secants.fold(0.0, f64::max);
+            if asked < secant {
+                warnings.push(format!(
+                    "unloading {} is softer than the line from the origin to the stages' forces (up to {}): there it unloads along that line, since less would give energy",
+                    Shown::one_stiffness(asked),
+                    Shown::one_stiffness(secant)
+                ));
+            }
+        }
         let stiffness = asked.or(known).unwrap_or(steepest);
         if stiffness.max(steepest) <= 0.0 || asked.is_none() && table.stages.is_some() {
             let (why, key) = match table.stages {

@@ -24,6 +24,8 @@ use crate::unit::{SpeedKind, UnitSystem};
 const MOST_NAMED: usize = 8;
 /// A nearest training speed further away than this share of the speed causes a warning.
 const FAR_OUTSIDE_SHARE: f64 = 0.25;
+/// 21.6 km/h and 6 m/s are one speed.
+const ROUNDING: f64 = 1e-9;
 
 /// A surrogate fitted to a group, for the declared force and for the body's.
 #[derive(Clone, Debug)]
@@ -186,6 +188,12 @@ impl Model {
         (self.cases[0].speed_m_per_s, self.cases[self.cases.len() - 1].speed_m_per_s)
     }
 
+    /// Whether a speed lies between the training speeds, but for the rounding of units.
+    pub(super) fn contains(&self, speed_m_per_s: f64) -> bool {
+        let (low, high) = self.range_m_per_s();
+        (low * (1.0 - ROUNDING)..=high * (1.0 + ROUNDING)).contains(&speed_m_per_s)
+    }
+
     /// The band of a force at a query's place, or why there is none although speeds were left out.
     pub(super) fn band(
         &self,
@@ -329,7 +337,7 @@ impl Model {
         }
         let speeds = || self.cases.iter().map(|c| c.speed_m_per_s);
         let nearest = self.cases[nearest(speeds(), v)].speed_m_per_s;
-        if !(low..=high).contains(&v) {
+        if !self.contains(v) {
             warnings.push(Warning::out_of_range(v, low, high));
         } else if (nearest / v - 1.0).abs() > FAR_OUTSIDE_SHARE {
             warnings.push(Warning::far_from_training(v, nearest));

@@ -146,6 +146,13 @@ struct Forces {
     body: Option<Envelope>,
 }
 
+impl Forces {
+    /// The force that moves the body.
+    fn moving(&self) -> &Envelope {
+        self.body.as_ref().unwrap_or(&self.declared)
+    }
+}
+
 impl<'a> Prediction<'a> {
     /// The stages that no rule for the maximum crush changes.
     pub(crate) fn new(model: &'a Model, query: &'a Query) -> Result<Self, Error> {
@@ -168,25 +175,27 @@ impl<'a> Prediction<'a> {
     pub(crate) fn curve(&self, rule: MaxCrushRule) -> Result<PredictedCurve, Error> {
         let deflection_m = evenly(chosen(&self.crush, rule)?);
         let motion = &self.motion;
-        let declared = self.corrected(&deflection_m, motion.declared_n(&deflection_m)?)?;
-        let body_n = || deflection_m.iter().map(|&d| motion.body.force_at(d)).collect();
-        let body = if motion.asked.model.has_body_force() {
-            Some(self.corrected(&deflection_m, body_n())?.envelope)
-        } else {
-            None
-        };
+        let declared_n = motion.declared_n(&deflection_m)?;
+        let mut forces =
+            Forces { declared: envelope(deflection_m.clone(), declared_n)?, body: None };
+        if motion.asked.model.has_body_force() {
+            let body_n = deflection_m.iter().map(|&d| motion.body.force_at(d)).collect();
+            forces.body = Some(envelope(deflection_m, body_n)?);
+        }
         let mut warnings = motion.asked.model.warnings(&motion.asked.at());
-        warnings.extend(declared.factor.map(Warning::energy_corrected));
-        Ok(self.report(rule, Forces { declared: declared.envelope, body }, warnings))
+        if motion.query.energy_correct {
+            let factor = self.correction(forces.moving())?;
+            forces.declared = scaled(&forces.declared, factor)?;
+            forces.body = forces.body.map(|body| scaled(&body, factor)).transpose()?;
+            warnings.push(Warning::energy_corrected(factor));
+        }
+        Ok(self.report(rule, forces, warnings))
     }
 
-    /// The force over these deflections, scaled to the impact's energy if that is requested.
-    fn corrected(&self, deflection_m: &[f64], force_n: Vec<f64>) -> Result<Corrected, Error> {
-        let level = envelope(deflection_m.to_vec(), force_n)?;
-        if !self.motion.query.energy_correct {
-            return Ok(Corrected { envelope: level, factor: None });
-        }
-        let factor = self.motion.asked.kinetic_energy_j / level.work();
+    /// The factor that gives the force that moves the body the impact's energy. A contact force also stops the crush zone's
+    /// mass, so its own work may exceed that energy: it is scaled like the body's.
+    fn correction(&self, moving: &Envelope) -> Result<f64, Error> {
+        let factor = self.motion.asked.kinetic_energy_j / moving.work();
         if !(CORRECTION.0..=CORRECTION.1).contains(&factor) {
             return Err(error!(
                 Prediction,
@@ -195,9 +204,7 @@ impl<'a> Prediction<'a> {
                 high = CORRECTION.1
             ));
         }
-        let force_n = level.force_n().iter().map(|f| factor * f).collect();
-        let envelope = envelope(deflection_m.to_vec(), force_n)?;
-        Ok(Corrected { envelope, factor: Some(factor) })
+        Ok(factor)
     }
 
     /// The forces from a maximum crush on.
@@ -259,7 +266,9 @@ impl<'a> Prediction<'a> {
         let over_kinetic = |envelope: &Envelope| envelope.work() / asked.kinetic_energy_j;
         let energy = over_kinetic(&declared);
         let body_energy = body.as_ref().map(over_kinetic);
-        let is_worse = |other: &f64| (other - 1.0).abs() > (energy - 1.0).abs();
+        // With a crush law the contact force stops the crush zone's mass besides, so the body's counts.
+        let is_worse =
+            |other: &f64| model.crush_law.is_some() || (other - 1.0).abs() > (energy - 1.0).abs();
         let unloading = over_speed(model, v, |c| c.unloading_stiffness_n_per_m);
         warnings.extend(asked.warnings(unloading, body_energy.filter(is_worse).unwrap_or(energy)));
         let (crush_m, data_end_m) = (declared.end_m(), model.largest_crush_m());
@@ -305,16 +314,18 @@ impl<'a> Prediction<'a> {
                 ..provenance(asked, rule, *crush, (energy, body_energy))
             },
         };
-        curve.unloading_stiffness_n_per_m = curve.stiffness_where_stopped(&declared);
-        curve.body_unloading_stiffness_n_per_m = body.map(|b| curve.stiffness_where_stopped(&b));
+        curve.unloading_stiffness_n_per_m =
+            curve.stiffness_where_stopped(&declared, model.force_kind);
+        curve.body_unloading_stiffness_n_per_m =
+            body.map(|b| curve.stiffness_where_stopped(&b, ForceKind::Body));
         curve
     }
 }
 
-/// A force over deflection and the factor of its energy correction, if there was one.
-struct Corrected {
-    envelope: Envelope,
-    factor: Option<f64>,
+/// The force times `factor`.
+fn scaled(level: &Envelope, factor: f64) -> Result<Envelope, Error> {
+    let force_n = level.force_n().iter().map(|f| factor * f).collect();
+    envelope(level.deflection_m().to_vec(), force_n)
 }
 
 /// The band of one force and its edges in N; empty where there is none.
@@ -336,7 +347,6 @@ fn provenance(
     let (model, v) = (asked.model, asked.v);
     let speeds = || model.cases.iter().map(|c| c.speed_m_per_s);
     let nearest = model.cases[nearest(speeds(), v)].speed_m_per_s;
-    let (low, high) = model.range_m_per_s();
     let mut parameters = asked.parameters.clone();
     let is_unequal = asked.masses.other_kg.is_some_and(|other| other != asked.masses.body_kg);
     parameters.retain(|name, _| {
@@ -351,7 +361,7 @@ fn provenance(
         training_hash: model.training_hash.clone(),
         study_units: model.study_units,
         training_speeds_m_per_s: speeds().collect(),
-        in_range: (low..=high).contains(&v),
+        in_range: model.contains(v),
         nearest_training_speed_m_per_s: nearest,
         distance_to_nearest_m_per_s: (nearest - v).abs(),
         max_crush_rule: Some(rule),

@@ -13,6 +13,9 @@ use crate::dataset::OTHER_MASS;
 use crate::error::{Error, ErrorCode, error};
 use crate::unit::{SpeedKind, UnitSystem};
 
+/// Least share of a vehicle's mass that its crush zone does not stop: the zone and its equipment are about a tenth.
+const LEAST_FREE: f64 = 0.9;
+
 /// A predicted curve: the master format of exports (JSON).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PredictedCurve {
@@ -312,7 +315,7 @@ impl PredictedCurve {
     }
 
     fn of_contact_force(&self) -> Result<Self, Error> {
-        let stiffness = self.stiffness_where_stopped(&self.envelope()?);
+        let stiffness = self.stiffness_where_stopped(&self.envelope()?, ForceKind::Contact);
         let mut curve = self.clone();
         curve.unloading_stiffness_n_per_m = stiffness;
         if let Some(rebound) = &mut curve.rebound {
@@ -325,7 +328,8 @@ impl PredictedCurve {
     fn of_body_force(&self) -> Result<Self, Error> {
         let envelope = self.driving_envelope()?;
         let mut curve = self.clone();
-        curve.unloading_stiffness_n_per_m = self.stiffness_where_stopped(&envelope);
+        curve.unloading_stiffness_n_per_m =
+            self.stiffness_where_stopped(&envelope, ForceKind::Body);
         if self.body_force_n.is_none() {
             return Ok(curve);
         }
@@ -363,28 +367,36 @@ impl PredictedCurve {
         self.provenance.body_band = None;
     }
 
-    /// Unloading stiffness with which a run leaves one of the curve's envelopes where that has taken up the energy of the impact: the
-    /// energy of the rebound is the same whichever force it comes from.
-    pub(crate) fn stiffness_where_stopped(&self, envelope: &Envelope) -> f64 {
+    /// Unloading stiffness with which a run leaves an envelope of one of the curve's forces where that has taken up the energy of the
+    /// impact. The energy of the rebound is the same whichever force it comes from, but that a contact force below the body's
+    /// drives less mass, up to [`LEAST_FREE`] of it: the rest is stopped in the crush zone.
+    /// In a model of one mass a contact force drives all of it, and `force` is the body's.
+    pub(crate) fn stiffness_where_stopped(&self, envelope: &Envelope, force: ForceKind) -> f64 {
         let kinetic_j = self.provenance.kinetic_energy_j;
         let driving = self.driving_envelope().map(|driving| stopping_force_n(&driving, kinetic_j));
         let share = driving.map_or(1.0, |driving| stopping_force_n(envelope, kinetic_j) / driving);
+        let free = match (force, &self.body_force_n) {
+            (ForceKind::Contact, Some(_)) => share.clamp(LEAST_FREE, 1.0),
+            _ => 1.0,
+        };
         self.rebound
-            .map(|r| r.stiffness_n_per_m * share * share)
+            .map(|r| r.stiffness_n_per_m * share * share / free)
             .filter(|k| *k > 0.0 && k.is_finite())
             .unwrap_or(self.unloading_stiffness_n_per_m)
     }
 
-    /// The curve of one force that drives an interface.
+    /// The curve of one force that drives a body of one mass.
     ///
     /// # Errors
     /// If the curve does not have that force, or its points are not an envelope.
     pub fn driving(&self, force: ForceKind) -> Result<ForceCurve, Error> {
-        self.driving_member(force, None)
+        let curve = self.driving_member(force, None)?;
+        let stiffness = self.stiffness_where_stopped(&curve.loading, ForceKind::Body);
+        Ok(curve.unloading_with(stiffness))
     }
 
-    /// The same with `member` of the half width of this force's band added, from −1 (lower edge)
-    /// to 1.
+    /// The curve of one force that drives an interface, a contact force beside crush zones with masses of their own, with `member` of
+    /// the half width of this force's band added, from −1 (lower edge) to 1.
     pub(crate) fn driving_member(
         &self,
         force: ForceKind,
@@ -407,7 +419,7 @@ impl PredictedCurve {
             beyond.envelope(of_body.unwrap_or(&beyond.force_n))
         });
         // The force law keeps to its bounds by itself; the one constant is for other tools.
-        let unloading = CurveUnloading::Stiffness(self.stiffness_where_stopped(&loading));
+        let unloading = CurveUnloading::Stiffness(self.stiffness_where_stopped(&loading, force));
         Ok(ForceCurve {
             unloading,
             kind: Some(force),

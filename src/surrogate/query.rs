@@ -154,11 +154,10 @@ impl<'a> ResolvedQuery<'a> {
 
     /// The rule for the maximum crush.
     pub(crate) fn rule(&self, query: &Query) -> MaxCrushRule {
-        let (low, high) = self.model.range_m_per_s();
         query.rule.unwrap_or(match self.model.max_crush_rule {
             // Crush over speed is that of the trained mass and speeds; the motion knows both.
             MaxCrushRule::Spline | MaxCrushRule::Monotone
-                if !(self.same_mass && (low..=high).contains(&self.v)) =>
+                if !(self.same_mass && self.model.contains(self.v)) =>
             {
                 MaxCrushRule::Motion
             }
@@ -221,7 +220,8 @@ fn mass_among(parameters: &BTreeMap<String, Parameter>, name: &str) -> Result<Op
 /// The separation speed: `F^¼ (a + b v)` with the mean force `F` before the maximum crush, `a` and `b` by
 /// least squares of the runs' ratios to it. A structure behind one fold returns the same energy whatever
 /// the force of that fold, the fold itself in proportion to it; the runs cannot separate the two, and
-/// the root lies between. The residual of a run fades with the square of the proximity in speed.
+/// the root lies between. The residual of a run fades with the square of the proximity in speed. Beyond the
+/// runs the line goes on from the outermost, neither falling with the speed nor rising faster than it.
 fn rebound_speed(model: &Model, v: f64, last_n: f64) -> Option<f64> {
     let (declared, body) = model.curves();
     let curves = if body.is_empty() { declared } else { body };
@@ -238,8 +238,9 @@ fn rebound_speed(model: &Model, v: f64, last_n: f64) -> Option<f64> {
     let (low, high, share) = neighbours(&speeds, v);
     let beside = (1.0 - share).powi(2) * beside[low].1 + share.powi(2) * beside[high].1;
     let v_held = v.clamp(speeds[0], speeds[speeds.len() - 1]);
-    let held = line(v_held) * beside.exp() * v / v_held;
-    Some(of_force(last_n) * held)
+    let held = line(v_held);
+    let slope = (line(v_held + 1.0) - held).clamp(0.0, held / v_held);
+    Some(of_force(last_n) * beside.exp() * (held + slope * (v - v_held)))
 }
 
 /// `a + b v` with the least squares of its ratios to the points, which are above 0; their mean if it were

@@ -76,9 +76,10 @@ impl PredictedCurve {
             deflection_m,
             force_n,
         };
-        curve.unloading_stiffness_n_per_m = curve.stiffness_where_stopped(&loading);
+        curve.unloading_stiffness_n_per_m =
+            curve.stiffness_where_stopped(&loading, case.curves.force_kind);
         curve.body_unloading_stiffness_n_per_m =
-            body.map(|b| curve.stiffness_where_stopped(&b.loading));
+            body.map(|b| curve.stiffness_where_stopped(&b.loading, ForceKind::Body));
         Ok(curve)
     }
 }

@@ -242,7 +242,7 @@ impl Warning {
         };
         let ratio = asked.effective_kg() / trained.effective_kg();
         let effect = if (1.0 / UNLIKE_MASS..UNLIKE_MASS).contains(&ratio) {
-            "rate effects are those of the training mass"
+            "rate effects and the band are those of the training mass, and the error may be larger"
         } else {
             "so far from it, neither the curve nor its band is reliable: check the unit"
         };

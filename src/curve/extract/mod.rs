@@ -115,7 +115,7 @@ pub(crate) fn curve_of(
     remarks.append(accepted(mass)?);
     let (sampled, closing_speed_m_per_s) = remarks.take(sample(&original, &closing, setup)?);
     remarks.append(consistency::sampling(&original, &sampled));
-    remarks.append(audited(&original, balance));
+    remarks.append(audited(&original, record.force_kind, balance));
     Ok(Extracted {
         speed,
         quality: Quality {
@@ -148,14 +148,29 @@ fn filter(class: u32, record: &mut Record) -> Result<Notes, ExtractError> {
     Ok(remarks)
 }
 
+/// Most by which the work of a contact force may exceed the kinetic energy, as its ratio: crush zones of a tenth of the vehicle
+/// and some more are stopped by it before the body is.
+const MOST_CONTACT_WORK: f64 = 1.15;
+/// Impulse and change of momentum that differ by no more than this share confirm mass and speed.
+const MOMENTUM_AGREES: f64 = 0.02;
+
 /// Notes on energy, impulse and the loading branch of a curve.
-fn audited(curve: &Curve, balance: energy::EnergyBalance) -> Notes {
+fn audited(curve: &Curve, kind: ForceKind, balance: energy::EnergyBalance) -> Notes {
     let mut remarks = Notes::default();
     let is_truncated = loading::loading_end(curve) + 1 == curve.time_s().len();
     if let Some(work) = balance.work.filter(|w| (w - 1.0).abs() > EnergyAudit::TOLERANCE) {
         let of = if is_truncated { " lost up to the last state" } else { "" };
         let share = work * 100.0;
-        remarks.warn(format!("energy: the curve absorbs {share:.1} % of the kinetic energy{of}"));
+        let is_contact = kind == ForceKind::Contact && (1.0..=MOST_CONTACT_WORK).contains(&work);
+        let agrees = |i: f64| (i - 1.0).abs() <= MOMENTUM_AGREES;
+        if is_contact && balance.impulse.is_some_and(agrees) {
+            remarks.note(format!(
+                "energy: the work of the contact force is {share:.1} % of the kinetic energy, and its impulse the change of momentum: it stops the crush zone before the body"
+            ));
+        } else {
+            remarks
+                .warn(format!("energy: the curve absorbs {share:.1} % of the kinetic energy{of}"));
+        }
     }
     if let Some(impulse) = balance.impulse.filter(|i| (i - 1.0).abs() > energy::IMPULSE_TOLERANCE) {
         remarks.warn(format!(
