@@ -46,6 +46,16 @@ def _array(floats):
     return np.frombuffer(floats, dtype=np.float64)
 
 
+def _quantity(name, value, unit):
+    """A number in SI, or text with a unit, which the program reads."""
+    if isinstance(value, str):
+        return value
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} {value!r}: expected one number in {unit}, or text with a unit") from None
+
+
 def _id(text):
     """An id as users write it: a number where it is one."""
     return int(text) if text is not None and re.fullmatch("-?[0-9]+", text) else text
@@ -335,6 +345,8 @@ class Model:
         Raises `crumple.Error` far outside the speeds of the runs (`range`, in m/s), unless `extrapolate`.
         """
         further = list((parameters or {}).items())
+        speed = _quantity("speed", speed, "m/s")
+        mass = None if mass is None else _quantity("mass", mass, "kg")
         document = self._model.predict(speed, extrapolate, mass, max_crush, further, energy_correct)
         return Curve(json.loads(document))
 
