@@ -338,7 +338,7 @@ fn a_mistyped_duration_does_not_run_for_days() {
     let wall = chain(&[(24.0 * TONNES, 10.0)], &[elastic(linear(MEGA))]);
     let settings = RunSettings::new(1e9, 0.75e-3);
     let error = simulate(&wall, &settings).unwrap_err().to_string();
-    says(&error, "shorten the duration or lengthen step");
+    says(&error, "shorten the duration or lengthen the output interval");
     let masses = vec![(24.0 * TONNES, 10.0); 200_000];
     let laws: Vec<_> = masses.iter().map(|_| elastic(linear(MEGA))).collect();
     let error = simulate(&chain(&masses, &laws), &RunSettings::new(0.4, 0.75e-3)).unwrap_err();
