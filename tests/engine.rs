@@ -355,6 +355,35 @@ fn what_dampers_take_is_in_the_ledger() {
     assert!(order > 1.7, "order {order}: {long:e}, {short:e} m/s");
 }
 
+/// Where a damper stops the swing of a light body the steps are up to three times as long, and nowhere else: a body by
+/// itself would lose more than the ledger may.
+#[test]
+fn damped_contacts_of_light_bodies_take_longer_steps() {
+    let (light_kg, plates_n_per_m) = (40.0_f64, 5e9);
+    let plates = |ratio: f64| {
+        let damping = Damping::constant(ratio * 2.0 * (light_kg * plates_n_per_m).sqrt()).unwrap();
+        Interface::new("plates", linear(plates_n_per_m), 0.0).with_damping(damping)
+    };
+    let light = || Body::new("end", light_kg, 10.0);
+    let alone = |ratio: f64| Chain::new(vec![light()], vec![plates(ratio)]).unwrap();
+    let crush = || Interface::new("crush", linear(20.0 * MEGA), 0.0);
+    let before_car = |ratio: f64| {
+        let car = Body::new("car", 20.0 * TONNES, 10.0);
+        Chain::new(vec![car, light()], vec![crush(), plates(ratio)]).unwrap()
+    };
+    let usual_s = 0.03 * (light_kg / plates_n_per_m).sqrt();
+    for (chain, is_longer) in [
+        (alone(0.25), false),
+        (alone(0.19), false),
+        (before_car(0.25), true),
+        (before_car(0.19), false),
+    ] {
+        let run = run(&chain, &settings());
+        assert_eq!(run.step_s > 2.0 * usual_s, is_longer, "{} s", run.step_s);
+        assert!(run.step_s <= usual_s * if is_longer { 3.0 } else { 1.0 }, "{} s", run.step_s);
+    }
+}
+
 /// Dampers of couplings set in and let go where their slack or gap ends.
 #[test]
 fn dampers_of_couplings_are_of_the_second_order() {

@@ -24,7 +24,7 @@ pub(crate) fn read_text(path: &Path) -> Result<String, Error> {
 /// Parses TOML text; `path` is for messages.
 pub(crate) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, Error> {
     toml::from_str(text).map_err(|error| {
-        let message = error.message().trim().replace('\n', "; ");
+        let message = in_words(error.message().trim().replace('\n', "; "));
         // What the file lacks as a whole is shown at its first line.
         let place = match error.span().filter(|span| span.len() < text.len()) {
             Some(span) => Place::new(path, text, span),
@@ -33,6 +33,27 @@ pub(crate) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, E
         let message = format!("{message}{}", guess_of(&message));
         error!(Toml, "{message}").placed(|_| place)
     })
+}
+
+/// The message of a value of another type in the words of TOML: the parser names types of the program.
+fn in_words(message: String) -> String {
+    let Some((found, expected)) =
+        message.strip_prefix("invalid type: ").and_then(|both| both.split_once(", expected "))
+    else {
+        return message;
+    };
+    let expected = match expected {
+        "a sequence" => "a list",
+        "a map" => "a table",
+        other if other.starts_with("struct ") => "a table",
+        other => other,
+    };
+    let found = match found {
+        "map" => "a table".into(),
+        "sequence" => "a list".into(),
+        other => other.replace('`', ""),
+    };
+    format!("expected {expected}, found {found}")
 }
 
 /// The guess for a key or word of which the parser says that it is unknown, and what it expected:
