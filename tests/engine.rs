@@ -372,7 +372,12 @@ fn damped_contacts_of_light_bodies_take_longer_steps() {
         Chain::new(vec![car, light()], vec![crush(), plates(ratio)]).unwrap()
     };
     let usual_s = 0.03 * (light_kg / plates_n_per_m).sqrt();
+    let into_car = |car_kg: f64| {
+        let car = Body::new("car", car_kg, 0.0);
+        Chain::new(vec![light(), car], vec![plates(0.25)]).unwrap()
+    };
     for (chain, is_longer) in [
+        (into_car(20.0 * TONNES), false),
         (alone(0.25), false),
         (alone(0.19), false),
         (before_car(0.25), true),

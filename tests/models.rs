@@ -1369,6 +1369,7 @@ fn the_recorded_force_gives_the_recorded_motion_back() {
 #[test]
 fn what_drives_a_train_is_the_prediction() {
     use crumple::surrogate::predict_driving;
+    let mut stiffer = 0;
     for group in ["lead-car-wall", "vehicle-pair"] {
         let set = TrainingSet::new(group, databases().cases(group)).unwrap();
         let model = Model::fit(&set, ModelKind::rate()).unwrap();
@@ -1378,7 +1379,9 @@ fn what_drives_a_train_is_the_prediction() {
                 let query = Query { mass_kg: mass, rule, ..Query::at(v) };
                 let curve = predict(&model, &query).unwrap();
                 for force in [ForceKind::Body, ForceKind::Contact] {
-                    let (driving, warnings) = predict_driving(&model, &query, force, None).unwrap();
+                    let (driving, warnings) =
+                        predict_driving(&model, &query, force, None, true).unwrap();
+                    let whole = predict_driving(&model, &query, force, None, false).unwrap().0;
                     let reported = curve.driving(force).unwrap();
                     assert_eq!(driving.loading, reported.loading);
                     let beyond = |c: &ForceCurve| c.beyond.clone().unwrap();
@@ -1398,11 +1401,14 @@ fn what_drives_a_train_is_the_prediction() {
                     // One mass leaves a contact force with the energy of the mass that a crush zone stops besides.
                     let per_own = stiffness(&reported) / own;
                     assert!((other - 1e-12..=1.0 + 1e-12).contains(&per_own), "{per_own}");
+                    stiffer += usize::from(per_own < 0.99);
+                    assert_eq!(stiffness(&whole), stiffness(&reported));
                     assert!(!warnings.is_empty() || mass.is_none());
                 }
             }
         }
     }
+    assert!(stiffer > 0, "no contact force that drives less than all of the mass");
 }
 
 /// A crush gives the speed that gives this crush, with the speeds of the model's own crush error; what no speed between the

@@ -247,6 +247,7 @@ fn sweeps_are_drawn_from_csv_and_hdf5() {
     for (samples, over, has_range) in [
         (20, "speed_m_per_s[A]", false),
         (50, "speed_m_per_s[A]", true),
+        (111, "speed_m_per_s[A]", true),
         (21_000, "force_factor[nose]", true),
     ] {
         let plan = format!(

@@ -121,6 +121,11 @@ class Component(_Mapping):
     def __getstate__(self):
         return {**self.__dict__, "_items": {entity: self[entity] for entity in self}}
 
+    def __setstate__(self, state):
+        self.__dict__.update(state)
+        for values in self._items.values():
+            values.flags.writeable = False
+
     @property
     def ids(self):
         return list(self._items)
@@ -338,7 +343,8 @@ class Model:
 
         `mass` (kg, or "30t") is that of the body if it is not the runs'; `max_crush` the rule for the largest deflection: "spline",
         "monotone", "energy" or "motion" (default: the one that was best when speeds were left out); `parameters` a dict of
-        the model's further parameters; `energy_correct` scales the force so that the curve takes up the impact's energy.
+        the model's further parameters; `energy_correct` scales the forces so that the one that moves
+        the body takes up the impact's energy.
 
         What the program would warn of is in `Curve.warnings`.
 

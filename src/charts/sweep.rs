@@ -175,9 +175,10 @@ fn groups(column: &ResultColumn, is_grid: bool, least: usize) -> Vec<(f64, Vec<u
         return rows.chunk_by(|a, b| of(a) == of(b)).map(|g| (of(&g[0]), g.to_vec())).collect();
     }
     let count = (rows.len() / least).clamp(1, BINS);
-    let size = rows.len().div_ceil(count).max(1);
     let middle = |group: &[usize]| 0.5 * (of(&group[0]) + of(&group[group.len() - 1]));
-    rows.chunks(size).map(|group| (middle(group), group.to_vec())).collect()
+    let cut = |i: usize| i * rows.len() / count;
+    let groups = (0..count).map(|i| &rows[cut(i)..cut(i + 1)]).filter(|group| !group.is_empty());
+    groups.map(|group| (middle(group), group.to_vec())).collect()
 }
 
 /// By linear interpolation between order statistics; NaN without values.

@@ -42,7 +42,7 @@ pub(super) struct Args {
     /// Value of a further parameter of the training cases, as NAME=VALUE; may be repeated
     #[arg(long, value_parser = arguments::parameter, value_name = "NAME=VALUE")]
     parameter: Vec<(String, Parameter)>,
-    /// Scale the force so that the curve absorbs the impact's kinetic energy (by 0.8 to 1.25)
+    /// Scale the forces so that the one that moves the body absorbs the impact's kinetic energy (by 0.8 to 1.25)
     #[arg(long)]
     energy_correct: bool,
     /// Allow speeds outside the training speeds by more than a third of their range

@@ -250,7 +250,7 @@ impl Grid {
         }
         let (shortest_s, k) = chain.shortest_time_s();
         let longest = step_s.min(method.step_rule() * shortest_s);
-        // Verlet is stable up to 30 times as long steps, and closing speeds need no energies to 1e-4.
+        // Verlet is stable up to 10 times as long steps, and closing speeds need no energies to 1e-4.
         let is_coarse = record == Record::Closing && method == Method::Verlet;
         let longest = if is_coarse { CLOSING_STEPS * longest } else { longest };
         let per_output = (output_interval_s / longest * (1.0 - 1e-12)).ceil().max(1.0);
@@ -259,9 +259,14 @@ impl Grid {
         let step_s = output_interval_s / per_output;
         if !(steps <= MAX_STEPS && outputs <= MAX_OUTPUTS) {
             let interface = chain.interfaces().get(k).map_or("none", |i| i.name.as_str());
-            let is_asked = settings.step_s <= method.step_rule() * shortest_s;
+            let is_asked = settings.step_s <= method.step_rule() * shortest_s
+                && settings.step_s < method.default_step_s();
+            let is_usual = longest >= method.default_step_s();
             let (key, remedy) = match (outputs <= MAX_OUTPUTS, is_asked) {
                 (true, true) => ("run.step", "lengthen the step".into()),
+                (true, false) if is_usual => {
+                    ("run.duration", "shorten the duration, or set a longer step".into())
+                }
                 (true, false) => (
                     "run.duration",
                     format!(

@@ -71,7 +71,7 @@ pub(super) fn spring(
     }
     let (mut curve, mut warnings) = match source {
         CurveSource::Model(model) => of_model(model, table, slot, speed_m_per_s, force)?,
-        CurveSource::Predicted(curve) => of_predicted(curve, table, force)?,
+        CurveSource::Predicted(curve) => of_predicted(curve, table, slot, force)?,
         CurveSource::Curve(curve, changes) => {
             let unknown = curve.kind.is_none().then(|| UNKNOWN_FORCE.into());
             let warnings = changes.iter().cloned().chain(unknown).collect();
@@ -131,7 +131,7 @@ fn of_model(
     };
     let force = force.unwrap_or(model.force_kind);
     let (curve, warnings) =
-        predict_driving(model, &query, force, table.band).map_err(predict_error)?;
+        predict_driving(model, &query, force, table.band, slot.split).map_err(predict_error)?;
     Ok((curve, texts(&warnings)))
 }
 
@@ -139,10 +139,11 @@ fn of_model(
 fn of_predicted(
     curve: &PredictedCurve,
     table: &Table,
+    slot: &Connection<'_>,
     force: Option<ForceKind>,
 ) -> Result<(ForceCurve, Vec<String>), Error> {
     let force = force.unwrap_or(curve.provenance.force_kind);
-    let driving = curve.driving_member(force, table.band).map_err(predict_error)?;
+    let driving = curve.driving_member(force, table.band, slot.split).map_err(predict_error)?;
     Ok((driving, texts(&curve.warnings)))
 }
 
@@ -234,7 +235,7 @@ impl Spring {
             let secant = secants.fold(0.0, f64::max);
             if asked < secant {
                 warnings.push(format!(
-                    "unloading {} is softer than the line from the origin to the stages' forces (up to {}): there it unloads along that line, since less would give energy",
+                    "unloading {} is softer than the line from the origin to the stages' forces ({} from the end of the first on, more before): there it unloads along that line, since less would give energy",
                     Shown::one_stiffness(asked),
                     Shown::one_stiffness(secant)
                 ));

@@ -43,7 +43,8 @@ pub fn predict(model: &Model, query: &Query) -> Result<PredictedCurve, Error> {
 }
 
 /// The curve of one force that drives an interface, with what lies beyond its maximum crush;
-/// `member` of its band's half width added, from −1 (lower edge) to 1.
+/// `member` of its band's half width added, from −1 (lower edge) to 1. With `is_split` a contact force
+/// drives vehicles whose crush zones have masses of their own, else all of their mass.
 ///
 /// For the body's own force the declared one is not examined: many interfaces of a train or a
 /// sweep ask for the former alone.
@@ -55,6 +56,7 @@ pub fn predict_driving(
     query: &Query,
     force: ForceKind,
     member: Option<f64>,
+    is_split: bool,
 ) -> Result<(ForceCurve, Vec<Warning>), Error> {
     let motion = Motion::new(model, query)?;
     let needs_declared = motion.rule() == MaxCrushRule::Energy
@@ -66,7 +68,7 @@ pub fn predict_driving(
     }
     let prediction = Prediction::of(motion)?;
     let curve = prediction.curve(prediction.rule())?;
-    Ok((curve.driving_member(force, member)?, curve.warnings))
+    Ok((curve.driving_member(force, member, is_split)?, curve.warnings))
 }
 
 /// The motion that the body force gives, beyond any maximum crush.
@@ -266,9 +268,10 @@ impl<'a> Prediction<'a> {
         let over_kinetic = |envelope: &Envelope| envelope.work() / asked.kinetic_energy_j;
         let energy = over_kinetic(&declared);
         let body_energy = body.as_ref().map(over_kinetic);
-        // With a crush law the contact force stops the crush zone's mass besides, so the body's counts.
-        let is_worse =
-            |other: &f64| model.crush_law.is_some() || (other - 1.0).abs() > (energy - 1.0).abs();
+        // With a crush law the contact force stops the crush zone's mass besides, so the body's counts; so it does where it was
+        // corrected.
+        let is_moving = model.crush_law.is_some() || self.motion.query.energy_correct;
+        let is_worse = |other: &f64| is_moving || (other - 1.0).abs() > (energy - 1.0).abs();
         let unloading = over_speed(model, v, |c| c.unloading_stiffness_n_per_m);
         warnings.extend(asked.warnings(unloading, body_energy.filter(is_worse).unwrap_or(energy)));
         let (crush_m, data_end_m) = (declared.end_m(), model.largest_crush_m());

@@ -120,8 +120,7 @@ pub struct ForestQuantiles {
 /// How the bodies part after the maximum crush.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Rebound {
-    /// In m/s; interpolated as a power of the impact speed, since the share that comes back
-    /// falls with it.
+    /// In m/s; a line over the impact speed, relative to the force before the maximum crush.
     pub speed_m_per_s: f64,
     /// Unloading stiffness from the maximum crush that gives this speed: `F²/(m v²)` with the
     /// force and mass of the body.
@@ -369,16 +368,21 @@ impl PredictedCurve {
 
     /// Unloading stiffness with which a run leaves an envelope of one of the curve's forces where that has taken up the energy of the
     /// impact. The energy of the rebound is the same whichever force it comes from, but that a contact force below the body's
-    /// drives less mass, up to [`LEAST_FREE`] of it: the rest is stopped in the crush zone.
+    /// drives less mass, down to [`LEAST_FREE`] of it: the rest is stopped in the crush zone.
     /// In a model of one mass a contact force drives all of it, and `force` is the body's.
     pub(crate) fn stiffness_where_stopped(&self, envelope: &Envelope, force: ForceKind) -> f64 {
-        let kinetic_j = self.provenance.kinetic_energy_j;
-        let driving = self.driving_envelope().map(|driving| stopping_force_n(&driving, kinetic_j));
-        let share = driving.map_or(1.0, |driving| stopping_force_n(envelope, kinetic_j) / driving);
+        let top_n = |of: &Envelope| stopping_force_n(of, self.provenance.kinetic_energy_j);
+        let driving_n = self.driving_envelope().map(|driving| top_n(&driving));
+        let share =
+            |of: &Envelope| driving_n.as_ref().map_or(1.0, |driving_n| top_n(of) / driving_n);
         let free = match (force, &self.body_force_n) {
-            (ForceKind::Contact, Some(_)) => share.clamp(LEAST_FREE, 1.0),
+            // Of the curve itself: the edge of a band drives the same mass.
+            (ForceKind::Contact, Some(_)) => {
+                self.envelope().map_or(1.0, |own| share(&own).clamp(LEAST_FREE, 1.0))
+            }
             _ => 1.0,
         };
+        let share = share(envelope);
         self.rebound
             .map(|r| r.stiffness_n_per_m * share * share / free)
             .filter(|k| *k > 0.0 && k.is_finite())
@@ -390,17 +394,16 @@ impl PredictedCurve {
     /// # Errors
     /// If the curve does not have that force, or its points are not an envelope.
     pub fn driving(&self, force: ForceKind) -> Result<ForceCurve, Error> {
-        let curve = self.driving_member(force, None)?;
-        let stiffness = self.stiffness_where_stopped(&curve.loading, ForceKind::Body);
-        Ok(curve.unloading_with(stiffness))
+        self.driving_member(force, None, false)
     }
 
-    /// The curve of one force that drives an interface, a contact force beside crush zones with masses of their own, with `member` of
-    /// the half width of this force's band added, from −1 (lower edge) to 1.
+    /// The curve of one force that drives an interface, of vehicles with crush zones of their own mass if `is_split`, with `member`
+    /// of the half width of this force's band added, from −1 (lower edge) to 1.
     pub(crate) fn driving_member(
         &self,
         force: ForceKind,
         member: Option<f64>,
+        is_split: bool,
     ) -> Result<ForceCurve, Error> {
         let mut loading = match (force, self.provenance.force_kind) {
             (ForceKind::Contact, ForceKind::Body) => {
@@ -419,7 +422,8 @@ impl PredictedCurve {
             beyond.envelope(of_body.unwrap_or(&beyond.force_n))
         });
         // The force law keeps to its bounds by itself; the one constant is for other tools.
-        let unloading = CurveUnloading::Stiffness(self.stiffness_where_stopped(&loading, force));
+        let drives = if is_split { force } else { ForceKind::Body };
+        let unloading = CurveUnloading::Stiffness(self.stiffness_where_stopped(&loading, drives));
         Ok(ForceCurve {
             unloading,
             kind: Some(force),

@@ -32,7 +32,7 @@ pub struct Query {
     pub rule: Option<MaxCrushRule>,
     /// Values of the model's further parameters.
     pub parameters: BTreeMap<String, Parameter>,
-    /// Scale the force so that the curve absorbs the impact's energy.
+    /// Scale the forces so that the one that moves the body absorbs the impact's energy.
     pub energy_correct: bool,
     /// Allow speeds outside the training speeds by more than a third of their range.
     pub extrapolate: bool,
@@ -221,7 +221,7 @@ fn mass_among(parameters: &BTreeMap<String, Parameter>, name: &str) -> Result<Op
 /// least squares of the runs' ratios to it. A structure behind one fold returns the same energy whatever
 /// the force of that fold, the fold itself in proportion to it; the runs cannot separate the two, and
 /// the root lies between. The residual of a run fades with the square of the proximity in speed. Beyond the
-/// runs the line goes on from the outermost, neither falling with the speed nor rising faster than it.
+/// runs the line goes on from the outermost, neither falling with the speed nor rising faster than in proportion.
 fn rebound_speed(model: &Model, v: f64, last_n: f64) -> Option<f64> {
     let (declared, body) = model.curves();
     let curves = if body.is_empty() { declared } else { body };

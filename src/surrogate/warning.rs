@@ -182,7 +182,7 @@ impl Warning {
         Self {
             code: WarningCode::EnergyCorrected,
             message: format!(
-                "the force was multiplied by {factor:.4}, so that the curve absorbs the impact's kinetic energy"
+                "the forces were multiplied by {factor:.4}, so that the one that moves the body absorbs the impact's kinetic energy"
             ),
         }
     }

@@ -151,7 +151,7 @@ fn filter(class: u32, record: &mut Record) -> Result<Notes, ExtractError> {
 /// Most by which the work of a contact force may exceed the kinetic energy, as its ratio: crush zones of a tenth of the vehicle
 /// and some more are stopped by it before the body is.
 const MOST_CONTACT_WORK: f64 = 1.15;
-/// Impulse and change of momentum that differ by no more than this share confirm mass and speed.
+/// Impulse and change of momentum that differ by no more than this share confirm the mass.
 const MOMENTUM_AGREES: f64 = 0.02;
 
 /// Notes on energy, impulse and the loading branch of a curve.
@@ -161,7 +161,9 @@ fn audited(curve: &Curve, kind: ForceKind, balance: energy::EnergyBalance) -> No
     if let Some(work) = balance.work.filter(|w| (w - 1.0).abs() > EnergyAudit::TOLERANCE) {
         let of = if is_truncated { " lost up to the last state" } else { "" };
         let share = work * 100.0;
-        let is_contact = kind == ForceKind::Contact && (1.0..=MOST_CONTACT_WORK).contains(&work);
+        let is_contact = kind == ForceKind::Contact
+            && !is_truncated
+            && (1.0..=MOST_CONTACT_WORK).contains(&work);
         let agrees = |i: f64| (i - 1.0).abs() <= MOMENTUM_AGREES;
         if is_contact && balance.impulse.is_some_and(agrees) {
             remarks.note(format!(
