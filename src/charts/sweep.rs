@@ -204,7 +204,7 @@ fn over_one(
     others_vary: bool,
 ) -> Chart {
     let groups = groups(x, is_grid, FEW_ROWS);
-    // What other quantities do cannot be told from so few: the rows themselves.
+    // So few rows do not show what the other quantities do: each is drawn as a point.
     let is_grouped = is_grid || others_vary && groups.len() > 2;
     let has_range = is_grouped && groups.iter().any(|(_, rows)| rows.len() >= LEAST_ROWS);
     let mut panels: Vec<Panel> = Vec::new();
