@@ -255,7 +255,7 @@ fn sweeps_are_drawn_from_csv_and_hdf5() {
         );
         fs::write(folder.join("plan.toml"), plan).unwrap();
         let scenario = fs::read_to_string(folder.join("scenario.toml")).unwrap();
-        let own = scenario.split("[sweep]").next().unwrap().replace("300ms", "30ms");
+        let own = scenario.split("[sweep]").next().unwrap().replace("300ms", "5ms");
         fs::write(folder.join("own.toml"), own).unwrap();
         for (file, picture) in [("same.csv", "a.svg"), ("same.h5", "b.svg")] {
             crumple_ok(folder, &format!("sweep own.toml --plan plan.toml -o {file} --restart -q"));

@@ -38,16 +38,18 @@ pub(super) fn print_data<T, E: Error + 'static>(
 
 pub(super) fn print_json(document: &impl Serialize) -> Result<(), Failure> {
     // JSON escapes the others itself; they stand within strings only.
-    let escaped = |code: u8| format!("\\u{code:04x}");
-    print_with(escaped, |out| {
-        serde_json::to_writer_pretty(&mut *out, document).map_err(io::Error::from)?;
-        writeln!(out)
-    })
+    print_with(
+        |code| format!("\\u{code:04x}"),
+        |out| {
+            serde_json::to_writer_pretty(&mut *out, document).map_err(io::Error::from)?;
+            writeln!(out)
+        },
+    )
 }
 
 /// Writes to standard output through a buffer and flushes it.
 fn print_with<T, E: Error + 'static>(
-    instead: impl Fn(u8) -> String,
+    instead: Instead,
     write: impl FnOnce(&mut dyn Write) -> Result<T, E>,
 ) -> Result<T, Failure> {
     let out = NamedStdout(io::stdout().lock());
@@ -108,12 +110,14 @@ pub(super) fn plain(text: &str) -> Cow<'_, str> {
 /// Replacement of a control character.
 const REPLACED: &str = "\u{fffd}";
 
+/// Replacement of a control character of a code.
+type Instead = fn(u8) -> String;
+
 /// Passes bytes on without control characters but line ends and tabs: those of ASCII, and
 /// those from U+0080 to U+009F, which UTF-8 writes as `0xc2` and a byte.
-struct ControlFilter<W, F> {
+struct ControlFilter<W> {
     out: W,
-    /// Replacement of a control character of that code.
-    instead: F,
+    instead: Instead,
     /// Whether a `0xc2` waits for the byte after it.
     pending_lead: bool,
 }
@@ -125,7 +129,7 @@ fn is_control(byte: u8) -> bool {
     byte.is_ascii_control() && byte != b'\n' && byte != b'\t'
 }
 
-impl<W: Write, F: Fn(u8) -> String> Write for ControlFilter<W, F> {
+impl<W: Write> Write for ControlFilter<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if !self.pending_lead && !bytes.iter().any(|&byte| byte == LEAD || is_control(byte)) {
             self.out.write_all(bytes)?;
@@ -411,7 +415,7 @@ impl Drop for Bar {
 mod tests {
     use super::*;
 
-    fn passed(chunks: &[&[u8]], instead: impl Fn(u8) -> String) -> String {
+    fn passed(chunks: &[&[u8]], instead: Instead) -> String {
         let mut out = Vec::new();
         let mut plain = ControlFilter { out: &mut out, instead, pending_lead: false };
         chunks.iter().for_each(|chunk| plain.write_all(chunk).unwrap());

@@ -21,30 +21,27 @@ pub(crate) struct Format {
     /// Whether a line below the header of a text file, or the first bytes of a binary one, show the kind.
     signature: fn(&[u8]) -> bool,
     reader: Reader,
-    blocks: OpenBlocks,
 }
 
 /// Reads a family of files; one result per section.
 type ReadSections = fn(&[Box<dyn Source>], &Selection) -> io::Result<Vec<SolverFile>>;
-type ReadText = fn(&'static Format, &dyn Source, &Selection) -> io::Result<SolverFile>;
-type OpenBlocks =
-    fn(&'static Format, Vec<Box<dyn Source>>, &Selection) -> io::Result<Option<Blocks>>;
+type OpenBlocks = fn(Vec<Box<dyn Source>>, &Selection) -> io::Result<Option<Blocks>>;
 
 enum Reader {
-    /// Lines of text.
-    Text(ReadText),
+    /// Lines of text, read by this.
+    Text(fn() -> Box<dyn Body>),
     /// Bytes, recognised by the first of them; over one or several files; sections inside.
-    Binary(ReadSections),
+    Binary(ReadSections, OpenBlocks),
 }
 
 impl Format {
-    pub(super) const fn text<B: Body>(
+    pub(super) const fn text(
         name: &'static str,
         entity: &'static str,
+        body: fn() -> Box<dyn Body>,
         signature: fn(&[u8]) -> bool,
     ) -> Self {
-        let (reader, blocks) = (Reader::Text(ascii::read::<B>), blocks::open::<B> as OpenBlocks);
-        Self { name, entity, signature, reader, blocks }
+        Self { name, entity, signature, reader: Reader::Text(body) }
     }
 
     pub(super) const fn binary(
@@ -53,7 +50,7 @@ impl Format {
         read: ReadSections,
         blocks: OpenBlocks,
     ) -> Self {
-        Self { name, entity: "entity", signature, reader: Reader::Binary(read), blocks }
+        Self { name, entity: "entity", signature, reader: Reader::Binary(read, blocks) }
     }
 
     pub(super) fn is_signature(&self, line: &[u8]) -> bool {
@@ -65,7 +62,7 @@ impl Format {
     }
 
     pub(super) fn is_binary(&self) -> bool {
-        matches!(self.reader, Reader::Binary(_))
+        matches!(self.reader, Reader::Binary(..))
     }
 
     /// The states of a file one by one, if they are laid out evenly.
@@ -74,7 +71,10 @@ impl Format {
         parts: Vec<Box<dyn Source>>,
         selection: &Selection,
     ) -> io::Result<Option<Blocks>> {
-        (self.blocks)(self, parts, selection)
+        match self.reader {
+            Reader::Text(body) => blocks::open(self, &*body(), parts, selection),
+            Reader::Binary(_, open) => open(parts, selection),
+        }
     }
 
     /// One result per section; a text file is one section.
@@ -84,9 +84,11 @@ impl Format {
         selection: &Selection,
     ) -> io::Result<Vec<SolverFile>> {
         let mut sections = match (&self.reader, parts) {
-            (Reader::Text(read), [first, ..]) => vec![read(self, &**first, selection)?],
+            (Reader::Text(body), [first, ..]) => {
+                vec![ascii::read(self, &*body(), &**first, selection)?]
+            }
             (Reader::Text(_), []) => Vec::new(),
-            (Reader::Binary(read), parts) => read(parts, selection)?,
+            (Reader::Binary(read, _), parts) => read(parts, selection)?,
         };
         for section in &mut sections {
             section.problems.extend(problem::of_time(&section.time));

@@ -1,6 +1,6 @@
 //! `abstat`: state of airbags and control volumes, and of the materials they are made of.
 
-use super::ascii::Body;
+use super::ascii::{Body, boxed};
 use super::label_values::{Label, fields};
 use super::line::{Line, integer, real};
 use crate::history::EntityId;
@@ -37,7 +37,7 @@ const AREAS: [Label; 3] = [
 const AREA_WIDTH: usize = 12;
 const MAX_MATERIALS: usize = 1_000;
 
-pub(crate) const FORMAT: Format = Format::text::<Abstat>("abstat", "airbag", |line| {
+pub(crate) const FORMAT: Format = Format::text("abstat", "airbag", boxed::<Abstat>, |line| {
     let text = line.trim_ascii_start();
     text.starts_with(COLUMN_LINE) || (text.starts_with(MATERIAL) && text.len() > 60)
 });
@@ -53,7 +53,9 @@ struct Abstat {
 }
 
 impl Body for Abstat {
-    const EXPECTED: &'static str = "an airbag's or a material's row";
+    fn expected(&self) -> &'static str {
+        "an airbag's or a material's row"
+    }
 
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_start();

@@ -29,25 +29,30 @@ use crate::solver::{Format, NoDataReason, Selection, SolverFile, WithoutData};
 pub(crate) type Tables = &'static [(&'static str, &'static [&'static str])];
 
 /// What one kind of file adds to the frame: the meaning of its lines.
-pub(crate) trait Body: Clone + Default {
+pub(crate) trait Body: CloneBody {
     /// Tables of every file of the kind, known by their order.
-    const TABLES: Tables = &[];
+    fn tables(&self) -> Tables {
+        &[]
+    }
 
-    const EMPTY_STATES: bool = false;
+    fn has_empty_states(&self) -> bool {
+        false
+    }
 
     /// Whether a state begins only where its time, or its cycle, is another one.
-    const BY_TIME: bool = false;
+    fn is_by_time(&self) -> bool {
+        false
+    }
 
     /// Whether lines between the first and the last row need not be read where none of them is wanted.
-    const MAY_SKIP: bool = false;
-
-    /// The reader of a format.
-    fn of(_: &'static Format) -> Self {
-        Self::default()
+    fn may_skip(&self) -> bool {
+        false
     }
 
     /// What a line holds, for the message about one that holds something else.
-    const EXPECTED: &'static str = "";
+    fn expected(&self) -> &'static str {
+        ""
+    }
 
     /// Whether a line that is not the format's signature can only be below the header.
     fn is_signature(&self, _line: &[u8]) -> bool {
@@ -72,6 +77,22 @@ pub(crate) trait Body: Clone + Default {
 
     /// The state above, which was read by its layout, has this cycle.
     fn continue_cycle(&mut self, _cycle: &[u8]) {}
+}
+
+/// A copy of a body, of which the frame does not know the type: it is compiled once, not once per kind of file.
+pub(crate) trait CloneBody {
+    fn boxed(&self) -> Box<dyn Body>;
+}
+
+impl<B: Body + Clone + 'static> CloneBody for B {
+    fn boxed(&self) -> Box<dyn Body> {
+        Box::new(self.clone())
+    }
+}
+
+/// The body of a kind of file before its first line.
+pub(crate) fn boxed<B: Body + Default + 'static>() -> Box<dyn Body> {
+    Box::<B>::default()
 }
 
 /// Header, legend and states of a file, while it is read.
@@ -99,17 +120,18 @@ const MAX_SKIPPED: usize = 3;
 ///
 /// The first complete state determines which entities a state has. If more states disagree with it
 /// than agree, it is the damaged one: the file is read again without it.
-pub(crate) fn read<B: Body>(
+pub(crate) fn read(
     format: &'static Format,
+    body: &dyn Body,
     source: &dyn Source,
     selection: &Selection,
 ) -> io::Result<SolverFile> {
-    let (mut best, mut is_disputed) = read_from_state::<B>(0, format, source, selection)?;
+    let (mut best, mut is_disputed) = read_from_state(0, format, body, source, selection)?;
     for skipped in 1..=MAX_SKIPPED {
         if !is_disputed {
             break;
         }
-        let (next, disputed) = read_from_state::<B>(skipped, format, source, selection)?;
+        let (next, disputed) = read_from_state(skipped, format, body, source, selection)?;
         if next.time.len() > best.time.len() {
             (best, is_disputed) = (next, disputed);
         }
@@ -119,31 +141,33 @@ pub(crate) fn read<B: Body>(
 
 /// The file after the first `skipped` complete states, and whether more states disagree with the first
 /// complete one than agree.
-fn read_from_state<B: Body>(
+fn read_from_state(
     skipped: usize,
     format: &'static Format,
+    body: &dyn Body,
     source: &dyn Source,
     selection: &Selection,
 ) -> io::Result<(SolverFile, bool)> {
-    let mut frame = AsciiReader::new::<B>(format, source, selection);
+    let mut frame = AsciiReader::new(format, body, source, selection);
     frame.states.skip = skipped;
-    let (mut body, mut leaps) = (B::of(format), Leaps::default());
-    while frame.step(&mut body)? {
+    let (mut body, mut leaps) = (body.boxed(), Leaps::default());
+    while frame.step(&mut *body)? {
         leaps.leap(&mut frame, &mut body)?;
     }
     let is_disputed = frame.states.is_disputed();
-    Ok((frame.finish(&mut body), is_disputed))
+    Ok((frame.finish(&mut *body), is_disputed))
 }
 
 impl<'a> AsciiReader<'a> {
-    pub(crate) fn new<B: Body>(
+    pub(crate) fn new(
         format: &'static Format,
+        body: &dyn Body,
         source: &'a dyn Source,
         selection: &'a Selection,
     ) -> Self {
         let mut states = StateReader::new(selection);
-        states.allow_empty_states = B::EMPTY_STATES;
-        for (name, components) in B::TABLES {
+        states.allow_empty_states = body.has_empty_states();
+        for (name, components) in body.tables() {
             states.table(name, *components);
         }
         Self {
@@ -159,7 +183,7 @@ impl<'a> AsciiReader<'a> {
         }
     }
 
-    pub(crate) fn step<B: Body>(&mut self, body: &mut B) -> io::Result<bool> {
+    pub(crate) fn step(&mut self, body: &mut dyn Body) -> io::Result<bool> {
         let Some(line) = self.lines.next_line()? else { return Ok(false) };
         let states = &mut self.states;
         let in_header = line.number <= 2 || self.in_legend;
@@ -213,7 +237,7 @@ impl<'a> AsciiReader<'a> {
                 self.is_title_again = true;
                 body.blank(states);
             } else if body.line(&line, states).is_none() {
-                states.unexpected(&line, None, B::EXPECTED, 40);
+                states.unexpected(&line, None, body.expected(), 40);
             }
         } else {
             states.entity = None;
@@ -222,7 +246,7 @@ impl<'a> AsciiReader<'a> {
         Ok(true)
     }
 
-    pub(crate) fn finish(mut self, body: &mut impl Body) -> SolverFile {
+    pub(crate) fn finish(mut self, body: &mut dyn Body) -> SolverFile {
         if self.lines.place().line < 2 {
             let message = "the file ends before its header (title and version line) is complete";
             self.states.problems.add(ProblemCode::NoVersionLine, None, message.into());

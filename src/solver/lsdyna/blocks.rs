@@ -32,21 +32,22 @@ struct Text {
 
 /// `None` if the file is damaged, has too few states to show their layout, or too few
 /// values to be worth it: then the line reader gives what there is.
-pub(crate) fn open<B: Body>(
+pub(crate) fn open(
     format: &'static Format,
+    body: &dyn Body,
     mut parts: Vec<Box<dyn Source>>,
     selection: &Selection,
 ) -> io::Result<Option<Blocks>> {
     let Some(source) = parts.pop() else { return Ok(None) };
     let size = source.size()?;
-    let mut frame = AsciiReader::new::<B>(format, &*source, selection);
-    let (mut body, mut leaps) = (B::of(format), Leaps::<B>::default());
+    let mut frame = AsciiReader::new(format, body, &*source, selection);
+    let (mut body, mut leaps) = (body.boxed(), Leaps::default());
     let (mut layout, start) = loop {
-        if frame.states.kept() > MAX_LEAD || !frame.step(&mut body)? {
+        if frame.states.kept() > MAX_LEAD || !frame.step(&mut *body)? {
             return Ok(None);
         }
         let Some((Some(above), at)) = leaps.between(&frame.states) else { continue };
-        let learnt = frame.learn(&body, above, at, |states, part| states.channel(part))?;
+        let learnt = frame.learn(&*body, above, at)?;
         let Some(layout) = learnt.map(|learnt| learnt.layout) else { continue };
         let (mut window, mut values) = (Window::new(&*source), vec![0.0; frame.states.channels()]);
         let plan = layout.all(false);
@@ -58,7 +59,7 @@ pub(crate) fn open<B: Body>(
     let labels = frame.states.labels();
     let mut cycles = frame.states.cycles().to_vec();
     let digits = frame.states.time_digits;
-    let mut file = frame.finish(&mut body);
+    let mut file = frame.finish(&mut *body);
     let count = layout.count(size, start);
     let width = file.histories.len();
     if !file.problems.is_empty() || width.saturating_mul(count) < MIN_VALUES {
@@ -93,7 +94,7 @@ pub(crate) fn open<B: Body>(
     file.problems = problem::of_time(&time);
     file.time = time.into();
     file.histories.clear();
-    let plan = if B::MAY_SKIP { layout.some() } else { layout.all(false) };
+    let plan = if body.may_skip() { layout.some() } else { layout.all(false) };
     let time = file.time.clone();
     let states = Box::new(Text { source, layout, plan, size, lead: values, start, time });
     Ok(Some(Blocks { states, file, columns, order }))

@@ -2,7 +2,7 @@
 //!
 //! Seen only with states that list no curve.
 
-use super::ascii::{self, Body};
+use super::ascii::{self, Body, boxed};
 use super::line::{Line, integer, is_whole_real};
 use crate::history::EntityId;
 use crate::solver::Format;
@@ -13,15 +13,23 @@ const STATE: &[u8] = b" curve data for time step";
 const COLUMN_LINE: &[u8] = b" curve id";
 
 pub(crate) const FORMAT: Format =
-    Format::text::<Curvout>("curvout", "curve", |line| line.starts_with(STATE));
+    Format::text("curvout", "curve", boxed::<Curvout>, |line| line.starts_with(STATE));
 
 #[derive(Clone, Default)]
 struct Curvout;
 
 impl Body for Curvout {
-    const TABLES: ascii::Tables = &[("curves", &["ordinate"])];
-    const EMPTY_STATES: bool = true;
-    const EXPECTED: &'static str = "a curve's id and value";
+    fn tables(&self) -> ascii::Tables {
+        &[("curves", &["ordinate"])]
+    }
+
+    fn has_empty_states(&self) -> bool {
+        true
+    }
+
+    fn expected(&self) -> &'static str {
+        "a curve's id and value"
+    }
 
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();

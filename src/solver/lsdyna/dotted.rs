@@ -21,20 +21,30 @@ const MAX_TABLES: usize = 100;
 const ELEMENTS: &[&str] = &["spring/damper number"];
 const JOINTS: &[&str] = &["joint number", "joint ID", "joint stiffness id number"];
 
-pub(crate) const DEFORC: Format = Format::text::<Dotted>("deforc", "element", |line| {
-    label(line).is_some_and(|label| ELEMENTS.contains(&label))
-});
+pub(crate) const DEFORC: Format = Format::text(
+    "deforc",
+    "element",
+    || of(ELEMENTS),
+    |line| label(line).is_some_and(|label| ELEMENTS.contains(&label)),
+);
 
-pub(crate) const JNTFORC: Format = Format::text::<Dotted>("jntforc", "joint", |line| {
-    label(line).is_some_and(|label| JOINTS.contains(&label))
-});
+pub(crate) const JNTFORC: Format = Format::text(
+    "jntforc",
+    "joint",
+    || of(JOINTS),
+    |line| label(line).is_some_and(|label| JOINTS.contains(&label)),
+);
 
 /// Reader of either file; each label is a table of one column.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 struct Dotted {
     /// Labels that begin an entity.
     entities: &'static [&'static str],
     tables: KeyedTables<String>,
+}
+
+fn of(entities: &'static [&'static str]) -> Box<dyn Body> {
+    Box::new(Dotted { entities, tables: KeyedTables::default() })
 }
 
 impl Dotted {
@@ -68,11 +78,6 @@ impl Dotted {
 }
 
 impl Body for Dotted {
-    fn of(format: &'static Format) -> Self {
-        let entities = if format.name == DEFORC.name { ELEMENTS } else { JOINTS };
-        Self { entities, tables: KeyedTables::default() }
-    }
-
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         if self.value(line, states).is_none() {
             const END: usize = LABEL + VALUE_WIDTH;

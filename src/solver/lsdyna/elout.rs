@@ -10,7 +10,7 @@
 //! Rows may come and go, because elements erode; missing values are NaN. Their number is limited, so that damage
 //! that looks like erosion cannot fill the memory.
 
-use super::ascii::Body;
+use super::ascii::{Body, boxed};
 use super::line::{Line, integer};
 use crate::history::EntityId;
 use crate::solver::Format;
@@ -49,12 +49,13 @@ fn heading(line: &[u8]) -> Option<Quantity> {
     HEADINGS.iter().find(|(heading, _)| line.starts_with(heading)).map(|(_, quantity)| *quantity)
 }
 
-pub(crate) const FORMAT: Format = Format::text::<Elout>("elout", "element", |line| {
+pub(crate) const FORMAT: Format = Format::text("elout", "element", boxed::<Elout>, |line| {
     heading(line).is_some_and(|quantity| !quantity.is_nodal())
 });
 
-pub(crate) const DETAILS: Format =
-    Format::text::<Elout>("eloutdet", "node", |line| heading(line).is_some_and(Quantity::is_nodal));
+pub(crate) const DETAILS: Format = Format::text("eloutdet", "node", boxed::<Elout>, |line| {
+    heading(line).is_some_and(Quantity::is_nodal)
+});
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Quantity {
@@ -98,9 +99,17 @@ struct Elout {
 }
 
 impl Body for Elout {
-    const EMPTY_STATES: bool = true;
-    const BY_TIME: bool = true;
-    const EXPECTED: &'static str = "an element or its values";
+    fn has_empty_states(&self) -> bool {
+        true
+    }
+
+    fn is_by_time(&self) -> bool {
+        true
+    }
+
+    fn expected(&self) -> &'static str {
+        "an element or its values"
+    }
 
     fn is_signature(&self, line: &[u8]) -> bool {
         heading(line).is_some()

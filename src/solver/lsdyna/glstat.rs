@@ -3,7 +3,7 @@
 //! A state is label → value, and labels may be absent. Truncation removes them from the end, so a last state that ends
 //! early is incomplete. Unexpected text between the labels is counted.
 
-use super::ascii::Body;
+use super::ascii::{Body, boxed};
 use super::dotted::split;
 use super::line::{Line, integer, is_whole_real, real, shown};
 use crate::solver::Format;
@@ -23,7 +23,7 @@ const NAMES: [(&str, &str); 3] = [
 ];
 
 pub(crate) const FORMAT: Format =
-    Format::text::<Glstat>("glstat", "entity", |line| line.starts_with(STATE));
+    Format::text("glstat", "entity", boxed::<Glstat>, |line| line.starts_with(STATE));
 
 #[derive(Clone, Default)]
 struct Glstat {

@@ -16,7 +16,7 @@ use super::layout::{DENSE_READ, Found, Layout, MAX_STATE, Plan};
 use crate::solver::problem::Place;
 use crate::solver::source::{Source, Window, fill_at};
 use crate::solver::states::StateReader;
-use crate::solver::states::repeat::{Part, Repeated, Shape};
+use crate::solver::states::repeat::{Repeated, Shape};
 
 /// Values and bytes of the states that are read before they are handed on.
 const BATCH_VALUES: usize = 1 << 20;
@@ -25,8 +25,9 @@ const BATCH_BYTES: usize = 1 << 24;
 const MAX_PAUSE: usize = 1 << 10;
 
 /// What is known of the states of a file.
-pub(crate) struct Leaps<B> {
-    learnt: Option<Learnt<B>>,
+#[derive(Default)]
+pub(crate) struct Leaps {
+    learnt: Option<Learnt>,
     /// Where the pending state begins, and how many states were kept before it.
     begun: Option<Place>,
     kept: usize,
@@ -36,20 +37,14 @@ pub(crate) struct Leaps<B> {
 }
 
 /// A layout, and what the line reader is like after a state of it.
-pub(crate) struct Learnt<B> {
+pub(crate) struct Learnt {
     pub layout: Layout,
     pub shape: Shape,
     pub widths: Widths,
-    pub body: B,
+    pub body: Box<dyn Body>,
 }
 
-impl<B> Default for Leaps<B> {
-    fn default() -> Self {
-        Self { learnt: None, begun: None, kept: 0, wait: 0, pause: 0 }
-    }
-}
-
-impl<B: Body> Leaps<B> {
+impl Leaps {
     /// Where the state above and a new one begin, if the last line began one after a complete one.
     pub(crate) fn between(&mut self, states: &StateReader<'_>) -> Option<(Option<Place>, Place)> {
         let begun = states.begun();
@@ -62,19 +57,23 @@ impl<B: Body> Leaps<B> {
     }
 
     /// Offered after every line: goes on after the states that are read at once.
-    pub(crate) fn leap(&mut self, frame: &mut AsciiReader<'_>, body: &mut B) -> io::Result<()> {
+    pub(crate) fn leap(
+        &mut self,
+        frame: &mut AsciiReader<'_>,
+        body: &mut Box<dyn Body>,
+    ) -> io::Result<()> {
         let Some((above, at)) = self.between(&frame.states) else { return Ok(()) };
         self.wait = self.wait.saturating_sub(1);
         for known in [true, false] {
             if !known {
                 let Some(above) = above.filter(|_| self.wait == 0) else { break };
-                self.learnt = frame.learn(body, above, at, |states, part| states.channel(part))?;
+                self.learnt = frame.learn(&**body, above, at)?;
                 self.pause = (2 * self.pause + 1).min(MAX_PAUSE);
                 self.wait = self.pause;
             }
             let Some(learnt) = &self.learnt else { continue };
             if let Some(end) = learnt.leap(frame.source, at, &mut frame.states)? {
-                body.clone_from(&learnt.body);
+                *body = learnt.body.boxed();
                 if let Some(cycle) = learnt.layout.cycle() {
                     let mut text = vec![0; cycle.len()];
                     let last = end.byte - learnt.layout.period();
@@ -92,14 +91,13 @@ impl<B: Body> Leaps<B> {
 }
 
 impl AsciiReader<'_> {
-    /// The layout of the state between two places, which was kept. `out`: the index of the value that a part is.
-    pub(crate) fn learn<B: Body>(
+    /// The layout of the state between two places, which was kept.
+    pub(crate) fn learn(
         &self,
-        body: &B,
+        body: &dyn Body,
         from: Place,
         to: Place,
-        out: impl Fn(&StateReader<'_>, Part) -> Option<usize>,
-    ) -> io::Result<Option<Learnt<B>>> {
+    ) -> io::Result<Option<Learnt>> {
         let length = to.byte.saturating_sub(from.byte);
         if length == 0 || length > MAX_STATE {
             return Ok(None);
@@ -108,20 +106,20 @@ impl AsciiReader<'_> {
         if fill_at(self.source, from.byte, &mut bytes)? < bytes.len() {
             return Ok(None);
         }
-        let mut body = body.clone();
-        let mut again = AsciiReader::new::<B>(self.format, self.source, self.states.selection);
+        let mut body = body.boxed();
+        let mut again = AsciiReader::new(self.format, &*body, self.source, self.states.selection);
         again.states = self.states.learner();
         again.lines.go_to(from);
-        while again.lines.place().byte < to.byte && again.step(&mut body)? {}
+        while again.lines.place().byte < to.byte && again.step(&mut *body)? {}
         let Some(shape) = self.states.learnt(&again.states) else { return Ok(None) };
         let trace = again.states.trace.take().unwrap_or_default();
-        let layout = Layout::new(bytes, from.byte, &trace.zones, |part| out(&again.states, part));
+        let layout = Layout::new(bytes, from.byte, &trace.zones, |part| again.states.channel(part));
         let widths = again.states.take_widths();
         Ok(layout.map(|layout| Learnt { layout, shape, widths, body }))
     }
 }
 
-impl<B: Body> Learnt<B> {
+impl Learnt {
     /// Reads the states from `start` on as long as they repeat the layout, of which the last one stays pending; the place
     /// after them, or `None` if there is none.
     fn leap(
@@ -136,7 +134,7 @@ impl<B: Body> Learnt<B> {
         let layout = &self.layout;
         let size = source.size()?;
         let audit = states.selection.audit;
-        let plan = if B::MAY_SKIP && !audit { layout.some() } else { layout.all(audit) };
+        let plan = if self.body.may_skip() && !audit { layout.some() } else { layout.all(audit) };
         let width = states.channels();
         let period = layout.period() as usize;
         let largest = (BATCH_VALUES / width.max(1)).min(BATCH_BYTES / period).max(2);
@@ -151,7 +149,7 @@ impl<B: Body> Learnt<B> {
             let mut repeated: Vec<Repeated> = Vec::with_capacity(found.len());
             for (k, found) in (0..).zip(found) {
                 // Where a line's time alone begins a state, an equal one does not.
-                if B::BY_TIME && above == Some(found) {
+                if self.body.is_by_time() && above == Some(found) {
                     break;
                 }
                 above = Some(found);

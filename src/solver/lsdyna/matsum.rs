@@ -1,6 +1,6 @@
 //! `matsum`: energies, momenta and velocities of parts, labelled, several lines per part.
 
-use super::ascii::Body;
+use super::ascii::{Body, boxed};
 use super::label_values::{Label, fields};
 use super::line::{Line, integer, shown};
 use crate::history::EntityId;
@@ -46,7 +46,7 @@ const LINES: [(&str, &[Label]); 4] = [
 ];
 
 pub(crate) const FORMAT: Format =
-    Format::text::<Matsum>("matsum", "part", |line| line.starts_with(PART));
+    Format::text("matsum", "part", boxed::<Matsum>, |line| line.starts_with(PART));
 
 #[derive(Clone, Default)]
 struct Matsum {

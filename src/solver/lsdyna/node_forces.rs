@@ -75,10 +75,10 @@ static GROUPS: Layout = Layout {
 };
 
 pub(crate) const BNDOUT: Format =
-    Format::text::<NodeForces>("bndout", "node", |line| line.starts_with(PRESCRIBED.state));
+    Format::text("bndout", "node", || of(&PRESCRIBED), |line| line.starts_with(PRESCRIBED.state));
 
 pub(crate) const NODFOR: Format =
-    Format::text::<NodeForces>("nodfor", "node", |line| line.starts_with(GROUPS.state));
+    Format::text("nodfor", "node", || of(&GROUPS), |line| line.starts_with(GROUPS.state));
 
 /// Reader of either file. Components of all blocks but the first of the file have the
 /// block's name in front, because the same node may be in several.
@@ -92,10 +92,8 @@ struct NodeForces {
     begins: bool,
 }
 
-impl Default for NodeForces {
-    fn default() -> Self {
-        Self { layout: &PRESCRIBED, blocks: Vec::new(), current: None, begins: false }
-    }
+fn of(layout: &'static Layout) -> Box<dyn Body> {
+    Box::new(NodeForces { layout, blocks: Vec::new(), current: None, begins: false })
 }
 
 impl NodeForces {
@@ -186,12 +184,12 @@ impl NodeForces {
 }
 
 impl Body for NodeForces {
-    const EXPECTED: &'static str = "a node's forces, a sum or a heading";
-    const BY_TIME: bool = true;
+    fn expected(&self) -> &'static str {
+        "a node's forces, a sum or a heading"
+    }
 
-    fn of(format: &'static Format) -> Self {
-        let layout = if format.name == NODFOR.name { &GROUPS } else { &PRESCRIBED };
-        Self { layout, ..Self::default() }
+    fn is_by_time(&self) -> bool {
+        true
     }
 
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {

@@ -5,7 +5,7 @@
 //! which block it is. Ends of fields are counted from the right, because l2a pushes rows with wide ids to the right. `nodout`
 //! writes the cycle of a state, so states of one time are only repeated if the cycle does not increase.
 
-use super::ascii::{self, Body};
+use super::ascii::{self, Body, boxed};
 use super::line::{Line, integer, real, shown};
 use crate::history::EntityId;
 use crate::solver::Format;
@@ -52,7 +52,7 @@ const FIELD_WIDTH: usize = 12;
 const TIME: usize = 13;
 
 pub(crate) const FORMAT: Format =
-    Format::text::<Nodout>("nodout", "node", |line| line.starts_with(STATE));
+    Format::text("nodout", "node", boxed::<Nodout>, |line| line.starts_with(STATE));
 
 /// Tables of both blocks.
 const TABLES: [TableId; 2] = [TableId(0), TableId(1)];
@@ -67,10 +67,17 @@ struct Nodout {
 }
 
 impl Body for Nodout {
-    const BY_TIME: bool = true;
-    const MAY_SKIP: bool = true;
-    const TABLES: ascii::Tables =
-        &[("translational rows", &TRANSLATIONS), ("rotational rows", &ROTATIONS)];
+    fn is_by_time(&self) -> bool {
+        true
+    }
+
+    fn may_skip(&self) -> bool {
+        true
+    }
+
+    fn tables(&self) -> ascii::Tables {
+        &[("translational rows", &TRANSLATIONS), ("rotational rows", &ROTATIONS)]
+    }
 
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         if line.text.starts_with(STATE) {
@@ -193,7 +200,7 @@ fn row(table: TableId, line: &Line<'_>, states: &mut StateReader<'_>) {
     let text = line.text.trim_ascii_end();
     let id_end = id_end(text);
     let first = id_end.max(ID_WIDTH - 1) + 1;
-    let fields = Nodout::TABLES[table.0].1.len();
+    let fields = [TRANSLATIONS.len(), ROTATIONS.len()][table.0];
     let width = first + fields * FIELD_WIDTH;
     let Some(id) = integer(&text[..id_end]).filter(|_| text.len() == width) else {
         let message = format!(

@@ -2,7 +2,7 @@
 //!
 //! Never tested with real data; read as the source of LSTC's converter `l2a` writes it.
 
-use super::ascii::Body;
+use super::ascii::{Body, boxed};
 use super::label_values::numbers;
 use super::line::{Line, integer};
 use crate::history::EntityId;
@@ -45,7 +45,7 @@ const LINES: [(&[u8], &[&str], &[&str]); 7] = [
 ];
 
 pub(crate) const FORMAT: Format =
-    Format::text::<Rbdout>("rbdout", "rigid body", |line| line.starts_with(STATE));
+    Format::text("rbdout", "rigid body", boxed::<Rbdout>, |line| line.starts_with(STATE));
 
 #[derive(Clone, Default)]
 struct Rbdout {
@@ -55,7 +55,9 @@ struct Rbdout {
 }
 
 impl Body for Rbdout {
-    const EXPECTED: &'static str = "a rigid body's motion";
+    fn expected(&self) -> &'static str {
+        "a rigid body's motion"
+    }
 
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let text = line.text.trim_ascii_end();

@@ -1,6 +1,6 @@
 //! `rcforc`: resultant forces of contact interfaces, one line per side and state.
 
-use super::ascii::Body;
+use super::ascii::{Body, boxed};
 use super::line::{Line, integer, is_whole_real, real, shown};
 use crate::history::{EntityId, Side};
 use crate::solver::Format;
@@ -32,7 +32,7 @@ const COLUMNS: [Column; 9] = [
 const ALWAYS: usize = 4;
 const MOMENTS: std::ops::Range<usize> = 4..7;
 
-pub(crate) const FORMAT: Format = Format::text::<Rcforc>("rcforc", "interface", |line| {
+pub(crate) const FORMAT: Format = Format::text("rcforc", "interface", boxed::<Rcforc>, |line| {
     undefined_interface(line).is_some() || (side(line).is_some() && time_at(line).is_some())
 });
 

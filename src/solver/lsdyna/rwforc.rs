@@ -1,6 +1,6 @@
 //! `rwforc`: forces on rigid walls, one line per wall and state.
 
-use super::ascii::{self, Body};
+use super::ascii::{self, Body, boxed};
 use super::line::{Line, integer, real};
 use crate::history::EntityId;
 use crate::solver::Format;
@@ -13,7 +13,7 @@ const TIME_END: usize = 12;
 const WALL_END: usize = 20;
 const VALUE_WIDTH: usize = 15;
 
-pub(crate) const FORMAT: Format = Format::text::<Rwforc>("rwforc", "rigid wall", |line| {
+pub(crate) const FORMAT: Format = Format::text("rwforc", "rigid wall", boxed::<Rwforc>, |line| {
     is_column_line(line) || is_node_set_heading(line)
 });
 
@@ -26,7 +26,9 @@ struct Rwforc {
 }
 
 impl Body for Rwforc {
-    const TABLES: ascii::Tables = &[("walls", &COMPONENTS)];
+    fn tables(&self) -> ascii::Tables {
+        &[("walls", &COMPONENTS)]
+    }
 
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         let begins = |heading: &[u8]| line.text.trim_ascii().starts_with(heading);

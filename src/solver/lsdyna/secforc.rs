@@ -3,7 +3,7 @@
 //! Tested with data only as LSTC's converter `l2a` writes it; of the solver's own files only
 //! ones that end after the header.
 
-use super::ascii::{self, Body};
+use super::ascii::{self, Body, boxed};
 use super::line::{Line, integer, real};
 use crate::history::EntityId;
 use crate::solver::Format;
@@ -16,7 +16,7 @@ const TIME_END: usize = 27;
 const FIELDS: [(usize, usize); 4] = [(28, 42), (43, 54), (55, 66), (67, 78)];
 const WIDTH: usize = FIELDS[3].1;
 
-pub(crate) const FORMAT: Format = Format::text::<Secforc>("secforc", "section", |line| {
+pub(crate) const FORMAT: Format = Format::text("secforc", "section", boxed::<Secforc>, |line| {
     line.trim_ascii_start().starts_with(b"line#1  section#")
 });
 
@@ -28,11 +28,13 @@ struct Secforc {
 
 impl Body for Secforc {
     /// One for each line of a section.
-    const TABLES: ascii::Tables = &[
-        ("sections' forces", &["x_force", "y_force", "z_force", "total_force"]),
-        ("sections' moments", &["x_moment", "y_moment", "z_moment", "total_moment"]),
-        ("sections' centroids", &["x_centroid", "y_centroid", "z_centroid", "area"]),
-    ];
+    fn tables(&self) -> ascii::Tables {
+        &[
+            ("sections' forces", &["x_force", "y_force", "z_force", "total_force"]),
+            ("sections' moments", &["x_moment", "y_moment", "z_moment", "total_moment"]),
+            ("sections' centroids", &["x_centroid", "y_centroid", "z_centroid", "area"]),
+        ]
+    }
 
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         if line.text.trim_ascii_start().starts_with(b"line#") && line.is_heading() {

@@ -1,6 +1,6 @@
 //! `sleout`: energies of contact interfaces, one row each, and their sums.
 
-use super::ascii::{self, Body};
+use super::ascii::{self, Body, boxed};
 use super::label_values::numbers;
 use super::line::{Line, integer};
 use crate::history::EntityId;
@@ -26,7 +26,7 @@ const SUMS: [(&[u8], &str); 6] = [
 const SUM_WIDTH: usize = 14;
 
 pub(crate) const FORMAT: Format =
-    Format::text::<Sleout>("sleout", "interface", |line| line.starts_with(STATE));
+    Format::text("sleout", "interface", boxed::<Sleout>, |line| line.starts_with(STATE));
 
 #[derive(Clone, Default)]
 struct Sleout {
@@ -35,8 +35,13 @@ struct Sleout {
 }
 
 impl Body for Sleout {
-    const TABLES: ascii::Tables = &[("interfaces", &["slave", "master", "friction_energy"])];
-    const EXPECTED: &'static str = "an interface's energies or a sum";
+    fn tables(&self) -> ascii::Tables {
+        &[("interfaces", &["slave", "master", "friction_energy"])]
+    }
+
+    fn expected(&self) -> &'static str {
+        "an interface's energies or a sum"
+    }
 
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         if let Some(rest) = line.text.strip_prefix(STATE) {

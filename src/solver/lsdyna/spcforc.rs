@@ -2,7 +2,7 @@
 //!
 //! A node in several sets of constraints has a row for each. The components of the second are `x_force_2` and so on.
 
-use super::ascii::Body;
+use super::ascii::{Body, boxed};
 use super::label_values::numbers;
 use super::line::{Line, integer};
 use crate::history::EntityId;
@@ -23,7 +23,7 @@ const SET_ID: &[u8] = b"setid=";
 /// Sets of constraints that a node may be in.
 const MAX_SETS: usize = 20;
 
-pub(crate) const FORMAT: Format = Format::text::<Spcforc>("spcforc", "node", |line| {
+pub(crate) const FORMAT: Format = Format::text("spcforc", "node", boxed::<Spcforc>, |line| {
     line.trim_ascii() == HEADING || line.starts_with(STATE)
 });
 
@@ -40,7 +40,9 @@ struct Spcforc {
 }
 
 impl Body for Spcforc {
-    const EXPECTED: &'static str = "a node's forces or moments, or the resultant";
+    fn expected(&self) -> &'static str {
+        "a node's forces or moments, or the resultant"
+    }
 
     fn line(&mut self, line: &Line<'_>, states: &mut StateReader<'_>) -> Option<()> {
         if let Some(rest) = line.text.strip_prefix(STATE) {

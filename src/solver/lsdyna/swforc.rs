@@ -1,6 +1,6 @@
 //! `swforc`: forces of spot welds and other connections, one row each.
 
-use super::ascii::Body;
+use super::ascii::{Body, boxed};
 use super::label_values::{is_number, numbers};
 use super::line::{Line, integer, real};
 use crate::history::EntityId;
@@ -24,7 +24,7 @@ const FAILURE_TIME_WIDTH: usize = 12;
 const MAX_KINDS: usize = 20;
 
 pub(crate) const FORMAT: Format =
-    Format::text::<Swforc>("swforc", "weld", |line| line.starts_with(COLUMN_LINE));
+    Format::text("swforc", "weld", boxed::<Swforc>, |line| line.starts_with(COLUMN_LINE));
 
 #[derive(Clone, Default)]
 struct Swforc {

@@ -48,7 +48,7 @@ const GLOBAL_COMPONENTS: [&str; 22] = [
     "inlet_energy",
     "outlet_energy",
 ];
-pub(crate) const FORMAT: Format = Format::binary("t01", recognises, read, |_, _, _| Ok(None));
+pub(crate) const FORMAT: Format = Format::binary("t01", recognises, read, |_, _| Ok(None));
 
 /// Whether a file begins like a T01: a record of a code and a title of 80 characters.
 fn recognises(head: &[u8]) -> bool {

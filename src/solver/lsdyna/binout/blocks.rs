@@ -15,12 +15,11 @@ use crate::history::History;
 use crate::solver::blocks::{Blocks, MIN_VALUES, ReadState, States, columns};
 use crate::solver::source::Source;
 use crate::solver::zeros::{Zeros, may_be_suspect, zeros_of_state};
-use crate::solver::{Format, Selection, problem};
+use crate::solver::{Selection, problem};
 
 /// Opens the only section that is selected. `None` if anything in it needs a look at the whole, or if it has too
 /// few values to be worth it.
 pub(super) fn open(
-    _: &'static Format,
     parts: Vec<Box<dyn Source>>,
     selection: &Selection,
 ) -> io::Result<Option<Blocks>> {
