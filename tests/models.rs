@@ -195,7 +195,7 @@ fn the_band_knows_where_it_is() {
     assert!((ends.span_m_per_s - 3.0).abs() < 1e-12);
     let at = |v: f64| curve(&model, v).provenance.band.unwrap();
     for (v, gap) in [(8.0, 3.0), (12.9, 3.0), (13.0, 4.0), (15.0, 4.0), (17.5, 3.0), (20.0, 3.0)] {
-        let expected = inner.pointwise_share * (gap * 3.0 / 20.0_f64).powf(0.65);
+        let expected = inner.pointwise_share * (gap * 3.0 / 20.0_f64).powf(0.5);
         assert!((at(v).pointwise_share / expected - 1.0).abs() < 1e-12, "{v}: {:?}", at(v));
         assert_eq!(at(v).span_m_per_s, gap);
     }
@@ -325,7 +325,7 @@ fn half_width_by_hand(cases: &[Case], rule: MaxCrushRule, force: ForceKind) -> f
         let of = residuals(i);
         of.iter().map(|r| r * r).sum::<f64>() / of.len() as f64
     };
-    let over_gap = |i: usize| mean_square(i) / (gap(i) / mean_gap).powf(1.3);
+    let over_gap = |i: usize| mean_square(i) * mean_gap / gap(i);
     let stretches = inner.clone().map(|i| stretches(&residuals(i))).sum();
     student_t(stretches) * (inner.clone().map(over_gap).sum::<f64>() / inner.len() as f64).sqrt()
 }
@@ -350,7 +350,7 @@ fn the_body_force_has_a_band_of_its_own() {
     // A query's gap is narrower; the edges are those of the share, around each force.
     let found = curve(&model, 12.0);
     let at = found.provenance.body_band.unwrap();
-    let expected = inner.pointwise_share * (3.0 / inner.span_m_per_s).powf(0.65);
+    let expected = inner.pointwise_share * (3.0 / inner.span_m_per_s).powf(0.5);
     assert!((at.pointwise_share / expected - 1.0).abs() < 1e-12, "{at:?}");
     let (f, low, high) = (
         found.body_force_n.as_ref().unwrap(),

@@ -1,6 +1,8 @@
 //! The choice of a model, judged by smaller groups: every subset of the speeds chooses, and predicts the inner speeds that it
 //! lacks.
 
+use std::collections::BTreeMap;
+
 use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -41,6 +43,9 @@ pub(crate) struct OverSubsets {
     pub mean_regret: f64,
     /// The same for the subset where it is largest.
     pub worst_regret: f64,
+    /// Share of FE's points, of both forces, inside the band of the model that the subset gives; mean over the curves whose
+    /// interval is narrower than those that the band was made from, as a prediction's is.
+    pub coverage: Option<f64>,
 }
 
 /// What one model does at the speeds that a subset lacks.
@@ -48,6 +53,8 @@ struct Trial {
     model: String,
     means: Means,
     regret: f64,
+    /// Share of the points of each force and run that are inside the band.
+    inside: Vec<f64>,
 }
 
 /// Each model, and the choice first, over all subsets of 4 and 5 speeds that lack a speed inside their range; empty
@@ -95,11 +102,18 @@ fn subset(set: &TrainingSet, speeds: &[f64], candidates: &[ModelKind]) -> Option
     let (chosen, _) = tables.chosen(Purpose::Vehicle)?;
     let mut rows: Vec<LeftOut> = Vec::new();
     let mut means = Vec::new();
+    let mut inside: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for of in &tables.means {
         let kind = fitting.iter().find(|kind| kind.name() == of.model)?;
         let judged = lacking.iter().map(|case| case.trial(*kind).judged(of.max_crush_rule));
         // The models are compared over the same subsets.
         let judged = judged.collect::<Result<Vec<_>, _>>().ok()?;
+        for (kind, residuals) in judged.iter().flat_map(|score| &score.residuals) {
+            let [band, _] = tables.bands(&of.model, *kind, None);
+            let band = band.filter(|band| residuals.span_m_per_s < band.span_m_per_s);
+            let share = band.and_then(|band| residuals.inside_of(band));
+            inside.entry(of.model.clone()).or_default().extend(share);
+        }
         let own: Vec<LeftOut> = judged.into_iter().map(|score| score.row).collect();
         means.extend(mean(&of.model, of.max_crush_rule, &own));
         rows.extend(own);
@@ -110,7 +124,8 @@ fn subset(set: &TrainingSet, speeds: &[f64], candidates: &[ModelKind]) -> Option
     let trial = |name: &str, model: &str| {
         let (_, sum) = sums.iter().find(|(m, _)| *m == model)?;
         let means = means.iter().find(|m| m.model == model)?.clone();
-        Some(Trial { model: name.into(), means, regret: sum / best - 1.0 })
+        let inside = inside.get(model).cloned().unwrap_or_default();
+        Some(Trial { model: name.into(), means, regret: sum / best - 1.0, inside })
     };
     let auto = std::iter::once(("auto", &*chosen));
     let each = sums.iter().map(|(model, _)| (*model, *model));
@@ -121,6 +136,7 @@ fn subset(set: &TrainingSet, speeds: &[f64], candidates: &[ModelKind]) -> Option
 fn over(name: &str, trials: &[Trial]) -> Option<OverSubsets> {
     let own: Vec<&Trial> = trials.iter().filter(|trial| trial.model == name).collect();
     let mean = |of: fn(&Trial) -> f64| own.iter().map(|t| of(t)).sum::<f64>() / own.len() as f64;
+    let inside: Vec<f64> = own.iter().flat_map(|t| t.inside.iter().copied()).collect();
     (!own.is_empty()).then(|| OverSubsets {
         model: name.into(),
         subsets: own.len(),
@@ -130,5 +146,6 @@ fn over(name: &str, trials: &[Trial]) -> Option<OverSubsets> {
         acceleration_l1: mean(|t| t.means.acceleration_l1),
         mean_regret: mean(|t| t.regret),
         worst_regret: own.iter().map(|t| t.regret).fold(0.0, f64::max),
+        coverage: (!inside.is_empty()).then(|| inside.iter().sum::<f64>() / inside.len() as f64),
     })
 }

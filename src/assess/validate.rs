@@ -345,7 +345,7 @@ impl Tables {
     }
 
     /// The bands of one force of a model: between training speeds, and outside of them.
-    fn bands(
+    pub(super) fn bands(
         &self,
         model: &str,
         force: ForceKind,

@@ -337,7 +337,8 @@ fn print_subsets(out: &mut dyn Write, group: &str, of: &[OverSubsets]) -> io::Re
         .column("velocity", |m| percent(m.velocity_l1))
         .column("acceleration", |m| percent(m.acceleration_l1))
         .column("regret", |m| format!("{:.0} %", m.mean_regret * 100.0))
-        .column("at most", |m| format!("{:.0} %", m.worst_regret * 100.0));
+        .column("at most", |m| format!("{:.0} %", m.worst_regret * 100.0))
+        .column("band holds", |m| m.coverage.map_or("-".into(), percent));
     output::table(out, table)
 }
 

@@ -31,9 +31,16 @@ OVERLAPS = """() => [...document.querySelectorAll('.picture svg')].flatMap((svg)
 })"""
 
 
+def new_page(context):
+    """A page that a busy machine may take its time for."""
+    page = context.new_page()
+    page.set_default_timeout(180_000)
+    return page
+
+
 def looked_at(browser, scheme):
     context = browser.new_context(color_scheme=scheme, viewport={"width": 1000, "height": 900})
-    page = context.new_page()
+    page = new_page(context)
     messages, requests = [], []
     page.on("console", lambda message: messages.append(message.text))
     page.on("pageerror", lambda error: messages.append(str(error)))
@@ -128,7 +135,7 @@ def of_sizes(browser):
         for scheme in ("light", "dark"):
             # The page's own policy lets no other script in.
             context = browser.new_context(color_scheme=scheme, viewport={"width": width, "height": 900}, bypass_csp=True)
-            page = context.new_page()
+            page = new_page(context)
             page.goto(f"file://{PAGE}")
             page.evaluate(axe)
             found = page.evaluate("axe.run({resultTypes: ['violations']})")["violations"]
@@ -143,7 +150,7 @@ def of_sizes(browser):
 
 
 def without_script(browser):
-    page = browser.new_context(java_script_enabled=False).new_page()
+    page = new_page(browser.new_context(java_script_enabled=False))
     page.goto(f"file://{PAGE}")
     return {
         "pictures": page.locator("figure .picture svg").count(),
