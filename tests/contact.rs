@@ -248,6 +248,23 @@ fn a_run_that_ends_while_loading_is_held_against_what_it_stopped() {
     assert!(!said.contains("energy:") && !said.contains("short:"), "{said}");
 }
 
+/// A record of fewer states than the recipe's: a warning while the force acts, a note when the contact is over.
+#[test]
+fn a_short_record_is_warned_of_while_the_contact_lasts() {
+    for (states, warns) in [(165, true), (300, false)] {
+        let mut run = Run::read(72);
+        for of in [&mut run.displacement, &mut run.velocity, &mut run.acceleration, &mut run.force]
+        {
+            of.time = of.time[..states].into();
+            of.values.truncate(states);
+        }
+        let quality = run.extract().quality;
+        let is_said = |all: &[String]| all.iter().any(|w| w.starts_with("short: the record holds"));
+        let said = (is_said(&quality.warnings), is_said(&quality.notes));
+        assert_eq!(said, (warns, !warns), "{states} states");
+    }
+}
+
 #[test]
 fn a_wrong_state_does_not_turn_the_force() {
     let mut run = Run::read(36).after_flight(40);

@@ -257,21 +257,21 @@ class Case:
     """One FE run of a database. Arrays have shape (states,), from contact to the end of the record: after the largest
     deflection they go back along the unloading.
 
-    `time` in s, `deflection` in m, `force` in N (which one says `force_kind`), `closing_speed` in m/s; `speed` in m/s is
-    measured against what `speed_kind` says, masses are in kg.
+    `time` in s, `deflection` in m, `force` in N (which one says `force_kind`), `body_force` in N, which slows the body,
+    `closing_speed` in m/s; `speed` in m/s is measured against what `speed_kind` says, masses are in kg.
     """
 
     def __init__(self, name, speed, masses, force_kind, curves, tags, warnings):
         self.name, (self.speed, self.speed_kind) = name, speed
         (self.mass, self.other_mass), self.force_kind = masses, force_kind
-        self.time, self.deflection, self.force, self.closing_speed = map(_array, curves)
+        self.time, self.deflection, self.force, self.body_force, self.closing_speed = map(_array, curves)
         self.tags, self.warnings = tags, warnings
 
     def to_pandas(self):
-        """A DataFrame over time: deflection, force, closing_speed, in SI."""
+        """A DataFrame over time: deflection, force, body_force, closing_speed, in SI."""
         import pandas as pd
 
-        columns = {"deflection": self.deflection, "force": self.force, "closing_speed": self.closing_speed}
+        columns = {name: getattr(self, name) for name in ("deflection", "force", "body_force", "closing_speed")}
         return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
 
     def __repr__(self):

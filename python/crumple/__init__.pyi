@@ -97,6 +97,7 @@ class Case:
     time: _Array
     deflection: _Array
     force: _Array
+    body_force: _Array
     closing_speed: _Array
     tags: list[str]
     warnings: list[str]

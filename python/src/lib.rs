@@ -164,14 +164,14 @@ fn read(
     Ok(sections.into_iter().map(section).collect())
 }
 
-/// Name, speed in m/s and its kind, masses in kg, force's kind; times, deflections, forces and closing speeds; tags,
+/// Name, speed in m/s and its kind, masses in kg, force's kind; times, deflections, forces, body forces and closing speeds; tags,
 /// warnings.
 type DatabaseCase = (
     String,
     (f64, &'static str),
     (f64, Option<f64>),
     &'static str,
-    [Floats; 4],
+    [Floats; 5],
     Vec<String>,
     Vec<String>,
 );
@@ -187,6 +187,7 @@ fn case(case: &Case) -> DatabaseCase {
             floats(curves.sampled.time_s().to_vec()),
             floats(curves.sampled.deflection_m().to_vec()),
             floats(curves.sampled.force_n().to_vec()),
+            floats(case.body_force_n()),
             floats(curves.closing_speed_m_per_s.clone()),
         ],
         case.provenance.tags.clone(),

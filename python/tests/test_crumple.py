@@ -128,6 +128,9 @@ def test_databases_models_and_curves(tmp_path):
     assert math.isclose(case.speed, 10.0) and case.speed_kind == "wall" and case.mass == 24000.0
     work = np.trapezoid(case.force[: case.deflection.argmax()], case.deflection[: case.deflection.argmax()])
     assert 0.95 < work / (0.5 * case.mass * case.speed**2) < 1.06
+    end = case.deflection.argmax()
+    body_work = np.trapezoid(case.body_force[: end + 1], case.deflection[: end + 1])
+    assert abs(body_work / (0.5 * case.mass * (case.closing_speed[0] ** 2 - case.closing_speed[end] ** 2)) - 1) < 0.01
     assert set(database["lead-car-wall"].to_pandas()["case"]) == set(database["lead-car-wall"])
     model = crumple.Model(DEMO / "lead.model")
     curve = model.predict(50 / 3.6)
@@ -142,7 +145,7 @@ def test_databases_models_and_curves(tmp_path):
     assert curve.body_band[0].shape == curve.body_force.shape and (curve.body_band[0] <= curve.body_force + 1e-6).all()
     frame = curve.to_pandas()
     assert np.array_equal(frame.index, curve.deflection) and np.array_equal(frame["body_force_high"], curve.body_band[1])
-    assert list(case.to_pandas()) == ["deflection", "force", "closing_speed"] and len(case.to_pandas()) == len(case.time)
+    assert list(case.to_pandas()) == ["deflection", "force", "body_force", "closing_speed"] and len(case.to_pandas()) == len(case.time)
     # Speeds with units, and what else the command takes.
     assert np.array_equal(model.predict("50km/h").force, curve.force)
     heavier = model.predict("50km/h", mass="26t")

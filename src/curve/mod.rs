@@ -317,6 +317,11 @@ pub struct Case {
 }
 
 impl Case {
+    /// The force that slows the body, at the sampled times, in N: its effective mass times its deceleration, filtered.
+    pub fn body_force_n(&self) -> Vec<f64> {
+        body::body_force_n(self)
+    }
+
     /// The loading branch at the solver's rate, with its share of dropped samples.
     pub fn loading(&self) -> Result<loading::Loading, Error> {
         loading::loading_branch(&self.curves.original)

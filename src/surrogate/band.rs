@@ -634,7 +634,7 @@ mod tests {
         let wide = band.over(8.0).unwrap();
         near(wide.interpolation_share(), t2 * 0.04 * 2.0_f64.powf(POWER_OF_GAP));
         assert_eq!(wide.scatter, band.scatter);
-        near(band.over(1e-9).unwrap().pointwise_share, t3 * 0.03);
+        near(band.over(1e-18).unwrap().pointwise_share, t3 * 0.03);
         // Residuals below the scatter leave nothing to interpolation, and no scatter changes nothing.
         let small = [curve(4.0, &[0.01; 2]), curve(4.0, &[0.01; 2])];
         let band = Band::of(Inner, &small, Some(scatter)).unwrap();

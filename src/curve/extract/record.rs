@@ -15,8 +15,10 @@ use crate::unit::UnitSystem;
 const SAME_TIME: f64 = 1e-5;
 /// Share of the impulse before the common times that deserves a warning.
 const LEFT_OUT: f64 = 0.001;
-/// Share of the recipe's states that a record may lack without a warning.
+/// Share of the recipe's states that a record may lack without a warning, and at the end of which the contact is over.
 const SHORT: f64 = 0.02;
+/// Share of the largest force that is none.
+const NO_FORCE: f64 = 0.01;
 
 /// Motion and force at the same times, the force positive in compression: of a run, or of a file with times.
 pub(crate) struct Record {
@@ -358,11 +360,17 @@ pub(super) fn sample(
             times.len(),
             sampling.states
         );
-        // A record that was cut on purpose is as short as was requested, and one that begins with
-        // some states of flight ends as much earlier.
+        // A record that was cut on purpose is as short as was requested, one that begins with
+        // some states of flight ends as much earlier, and after the contact nothing is missing.
         let missing = sampling.states - times.len();
+        let force = original.force_n();
+        let peak = force.iter().fold(0.0_f64, |peak, f| peak.max(f.abs()));
+        let end = &force[force.len() - (SHORT * force.len() as f64).ceil() as usize..];
+        let is_over = end.iter().all(|f| f.abs() <= NO_FORCE * peak);
         match setup.stated.truncate_s {
-            None if missing as f64 > SHORT * sampling.states as f64 => remarks.warn(short),
+            None if missing as f64 > SHORT * sampling.states as f64 && !is_over => {
+                remarks.warn(short)
+            }
             _ => remarks.note(short),
         }
     }
