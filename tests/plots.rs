@@ -266,6 +266,12 @@ fn sweeps_are_drawn_from_csv_and_hdf5() {
         }
         let [a, b] = ["a.svg", "b.svg"].map(|name| fs::read_to_string(folder.join(name)).unwrap());
         assert!(a == b && a.contains("peak force"));
+        let rows = fs::read_to_string(folder.join("same.csv")).unwrap();
+        let mut rows = rows.lines().filter(|line| !line.starts_with('#'));
+        let name = |column: &str| column.starts_with("peak_force");
+        let column = rows.next().unwrap().split(',').position(name).unwrap();
+        let forces: BTreeSet<&str> = rows.map(|row| row.split(',').nth(column).unwrap()).collect();
+        assert!(forces.len() > samples / 2, "{} different forces", forces.len());
         assert_eq!(a.contains("median") && a.contains("5 to 95 % of the runs"), has_range);
     }
     // By its content, whatever its name; an item or a status that is none is found, and so are values without bytes.

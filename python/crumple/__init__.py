@@ -257,8 +257,9 @@ class Case:
     """One FE run of a database. Arrays have shape (states,), from contact to the end of the record: after the largest
     deflection they go back along the unloading.
 
-    `time` in s, `deflection` in m, `force` in N (which one says `force_kind`), `body_force` in N, which slows the body,
-    `closing_speed` in m/s; `speed` in m/s is measured against what `speed_kind` says, masses are in kg.
+    `time` in s, `deflection` in m, `force` in N (which one says `force_kind`), `closing_speed` in m/s; `speed` in m/s is
+    measured against what `speed_kind` says, masses are in kg. `body_force` in N is the force that slows the body: its mass
+    times its deceleration, filtered and scaled to the energy that it loses; of a table without times, `force`.
     """
 
     def __init__(self, name, speed, masses, force_kind, curves, tags, warnings):
@@ -297,11 +298,11 @@ class Group(_Mapping):
         return case
 
     def to_pandas(self):
-        """A DataFrame of all samples: case, speed, time, deflection, force."""
+        """A DataFrame of all samples: case, speed, time, deflection, force, body_force."""
         import pandas as pd
 
         def frame(case):
-            columns = {"time": case.time, "deflection": case.deflection, "force": case.force}
+            columns = {name: getattr(case, name) for name in ("time", "deflection", "force", "body_force")}
             return pd.DataFrame({"case": case.name, "speed": case.speed, **columns})
 
         return pd.concat([frame(case) for case in self.values()], ignore_index=True)

@@ -131,7 +131,9 @@ def test_databases_models_and_curves(tmp_path):
     end = case.deflection.argmax()
     body_work = np.trapezoid(case.body_force[: end + 1], case.deflection[: end + 1])
     assert abs(body_work / (0.5 * case.mass * (case.closing_speed[0] ** 2 - case.closing_speed[end] ** 2)) - 1) < 0.01
-    assert set(database["lead-car-wall"].to_pandas()["case"]) == set(database["lead-car-wall"])
+    frame = database["lead-car-wall"].to_pandas()
+    assert set(frame["case"]) == set(database["lead-car-wall"])
+    assert np.array_equal(frame[frame["case"] == "36kmh"]["body_force"], case.body_force)
     model = crumple.Model(DEMO / "lead.model")
     curve = model.predict(50 / 3.6)
     # What the command gives.

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::choose::{Purpose, scores};
 use super::left_out::LeftOutCase;
+use super::scatter::scatter;
 use super::validate::{
     MOST_SPEEDS as MOST_LEFT_OUT, Tables, fittable, left_out_cases, mean, trials,
 };
@@ -16,7 +17,7 @@ use crate::curve::Case;
 use crate::dataset::{TrainingSet, is_same_speed};
 use crate::error::Error;
 use crate::surrogate::ModelKind;
-use crate::surrogate::leave_one_out::{LeftOut, Means};
+use crate::surrogate::leave_one_out::{LeftOut, Means, Scatter};
 
 /// Numbers of speeds that a subset keeps.
 const SIZES: [u32; 2] = [4, 5];
@@ -44,7 +45,7 @@ pub(crate) struct OverSubsets {
     /// The same for the subset where it is largest.
     pub worst_regret: f64,
     /// Share of FE's points, of both forces, inside the band of the model that the subset gives; mean over the curves whose
-    /// interval is narrower than those that the band was made from, as a prediction's is.
+    /// interval is narrower than the mean of those left out, as a prediction's is.
     pub coverage: Option<f64>,
 }
 
@@ -75,9 +76,10 @@ pub(crate) fn subsets(
     }
     let of_size = |bits: &u32| SIZES.contains(&bits.count_ones());
     let all: Vec<u32> = (0..1_u32 << speeds.len()).filter(of_size).collect();
+    let scatter = scatter(&set, cases);
     let of = |&bits: &u32| {
         let kept = speeds.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, v)| *v);
-        subset(&set, &kept.collect::<Vec<_>>(), candidates)
+        subset(&set, &kept.collect::<Vec<_>>(), candidates, scatter.as_ref())
     };
     let trials: Vec<Trial> = all.par_iter().filter_map(of).flatten().collect();
     let names = candidates.iter().map(ModelKind::name);
@@ -85,7 +87,12 @@ pub(crate) fn subsets(
 }
 
 /// The choice and every model by one subset; `None` if it lacks no speed inside its range, or one of the models cannot predict that.
-fn subset(set: &TrainingSet, speeds: &[f64], candidates: &[ModelKind]) -> Option<Vec<Trial>> {
+fn subset(
+    set: &TrainingSet,
+    speeds: &[f64],
+    candidates: &[ModelKind],
+    scatter: Option<&Scatter>,
+) -> Option<Vec<Trial>> {
     let has = |v: f64| speeds.iter().any(|kept| is_same_speed(*kept, v));
     let kept = set.with(|case| has(case.speed_m_per_s));
     let lacking = set.cases.iter().filter(|case| !has(case.speed_m_per_s));
@@ -109,7 +116,8 @@ fn subset(set: &TrainingSet, speeds: &[f64], candidates: &[ModelKind]) -> Option
         // The models are compared over the same subsets.
         let judged = judged.collect::<Result<Vec<_>, _>>().ok()?;
         for (kind, residuals) in judged.iter().flat_map(|score| &score.residuals) {
-            let [band, _] = tables.bands(&of.model, *kind, None);
+            let scatter = scatter.and_then(|s| s.of_force(*kind, set.force_kind));
+            let [band, _] = tables.bands(&of.model, *kind, scatter);
             let band = band.filter(|band| residuals.span_m_per_s < band.span_m_per_s);
             let share = band.and_then(|band| residuals.inside_of(band));
             inside.entry(of.model.clone()).or_default().extend(share);

@@ -317,7 +317,8 @@ pub struct Case {
 }
 
 impl Case {
-    /// The force that slows the body, at the sampled times, in N: its effective mass times its deceleration, filtered.
+    /// The force that slows the body, at the sampled times, in N: its effective mass times its deceleration, filtered and
+    /// scaled to the energy that it loses; of a table without times, its own force.
     pub fn body_force_n(&self) -> Vec<f64> {
         body::body_force_n(self)
     }

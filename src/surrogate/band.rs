@@ -32,9 +32,9 @@ pub(crate) const LEVEL: f64 = 0.9;
 /// Half width, as a share of the curve's end, over which the force's level is averaged.
 const WINDOW: f64 = 0.05;
 /// Between training speeds errors grow with this power of the gap, as the spread of a random walk does: a smooth change
-/// alone would give 1 and more, folds that are each run's own 0. With it, in subsets of lead-car-wall, vehicle-pair and
-/// staged-lead-wall, the bands of every model hold 86 to 93 % of FE's points over gaps narrower than those left out
-/// (`validate --subsets`).
+/// alone would give 1 or more; folds peculiar to each run, 0. With it, in subsets of lead-car-wall, vehicle-pair and
+/// staged-lead-wall, the bands of every model hold 86 to 93 % of FE's points over gaps narrower than the mean of those
+/// left out (`crumple validate curves.h5 --group lead-car-wall --subsets`, and the other two).
 pub(crate) const POWER_OF_GAP: f64 = 0.5;
 /// Bands wider than this are damage, not measurement.
 const WIDEST: f64 = 1e6;

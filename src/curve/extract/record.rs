@@ -15,9 +15,10 @@ use crate::unit::UnitSystem;
 const SAME_TIME: f64 = 1e-5;
 /// Share of the impulse before the common times that deserves a warning.
 const LEFT_OUT: f64 = 0.001;
-/// Share of the recipe's states that a record may lack without a warning, and at the end of which the contact is over.
+/// Share of the recipe's states that a record may lack without a warning; also the share of the record, at its end, that
+/// must be without force for the contact to be over.
 const SHORT: f64 = 0.02;
-/// Share of the largest force that is none.
+/// A force below this share of the largest counts as none.
 const NO_FORCE: f64 = 0.01;
 
 /// Motion and force at the same times, the force positive in compression: of a run, or of a file with times.
@@ -361,12 +362,14 @@ pub(super) fn sample(
             sampling.states
         );
         // A record that was cut on purpose is as short as was requested, one that begins with
-        // some states of flight ends as much earlier, and after the contact nothing is missing.
+        // some states of flight ends as much earlier, and once the bodies part without force nothing
+        // is missing. (A body force rings on: it is warned of.)
         let missing = sampling.states - times.len();
         let force = original.force_n();
         let peak = force.iter().fold(0.0_f64, |peak, f| peak.max(f.abs()));
         let end = &force[force.len() - (SHORT * force.len() as f64).ceil() as usize..];
-        let is_over = end.iter().all(|f| f.abs() <= NO_FORCE * peak);
+        let is_over = closing.last().is_some_and(|v| *v < 0.0)
+            && end.iter().all(|f| f.abs() < NO_FORCE * peak);
         match setup.stated.truncate_s {
             None if missing as f64 > SHORT * sampling.states as f64 && !is_over => {
                 remarks.warn(short)
