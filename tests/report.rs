@@ -205,7 +205,7 @@ fn designs_and_trains_stand_side_by_side() {
         .next()
         .unwrap();
     assert!(side_by_side.contains("slower.toml") && !side_by_side.contains(">scenario.toml<"));
-    // Files of one name are told apart.
+    // Files of the same name are distinguished.
     fs::create_dir(folder.join("b")).unwrap();
     let same = fs::read_to_string(folder.join("scenario.toml")).unwrap();
     let same = same.replace("lead.model", "../lead.model").replace("54km/h", "50km/h");

@@ -17,7 +17,7 @@ pub(crate) struct Against {
     pub chosen_before: String,
     /// Half width of the band between the speeds, in shares of the local force level: before and now.
     pub band_share: Pair,
-    /// The distance of training speeds, in m/s, that each half width is for: it grows with it.
+    /// The distance of training speeds, in m/s, that each half width is for: it grows with the distance.
     pub band_span_m_per_s: Pair,
     /// How many inner speeds were left out before and now, and in both: the means are over these.
     pub inner_speeds: [usize; 3],

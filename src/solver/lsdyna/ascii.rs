@@ -79,13 +79,13 @@ pub(crate) trait Body: CloneBody {
     fn continue_cycle(&mut self, _cycle: &[u8]) {}
 }
 
-/// A copy of a body, of which the frame does not know the type: it is compiled once, not once per kind of file.
+/// Copies a body whose type the frame does not know: the frame is compiled once, not once per kind of file.
 pub(crate) trait CloneBody {
-    fn boxed(&self) -> Box<dyn Body>;
+    fn copied(&self) -> Box<dyn Body>;
 }
 
 impl<B: Body + Clone + 'static> CloneBody for B {
-    fn boxed(&self) -> Box<dyn Body> {
+    fn copied(&self) -> Box<dyn Body> {
         Box::new(self.clone())
     }
 }
@@ -150,7 +150,7 @@ fn read_from_state(
 ) -> io::Result<(SolverFile, bool)> {
     let mut frame = AsciiReader::new(format, body, source, selection);
     frame.states.skip = skipped;
-    let (mut body, mut leaps) = (body.boxed(), Leaps::default());
+    let (mut body, mut leaps) = (body.copied(), Leaps::default());
     while frame.step(&mut *body)? {
         leaps.leap(&mut frame, &mut body)?;
     }

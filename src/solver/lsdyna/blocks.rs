@@ -41,7 +41,7 @@ pub(crate) fn open(
     let Some(source) = parts.pop() else { return Ok(None) };
     let size = source.size()?;
     let mut frame = AsciiReader::new(format, body, &*source, selection);
-    let (mut body, mut leaps) = (body.boxed(), Leaps::default());
+    let (mut body, mut leaps) = (body.copied(), Leaps::default());
     let (mut layout, start) = loop {
         if frame.states.kept() > MAX_LEAD || !frame.step(&mut *body)? {
             return Ok(None);

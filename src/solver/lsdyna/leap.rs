@@ -73,7 +73,7 @@ impl Leaps {
             }
             let Some(learnt) = &self.learnt else { continue };
             if let Some(end) = learnt.leap(frame.source, at, &mut frame.states)? {
-                *body = learnt.body.boxed();
+                *body = learnt.body.copied();
                 if let Some(cycle) = learnt.layout.cycle() {
                     let mut text = vec![0; cycle.len()];
                     let last = end.byte - learnt.layout.period();
@@ -106,7 +106,7 @@ impl AsciiReader<'_> {
         if fill_at(self.source, from.byte, &mut bytes)? < bytes.len() {
             return Ok(None);
         }
-        let mut body = body.boxed();
+        let mut body = body.copied();
         let mut again = AsciiReader::new(self.format, &*body, self.source, self.states.selection);
         again.states = self.states.learner();
         again.lines.go_to(from);
