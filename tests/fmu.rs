@@ -149,13 +149,28 @@ fn binaries_lie_where_each_version_looks_for_them() {
     }
 }
 
-/// A C compiler for any platform that gives the same bytes on each: zig's clang.
-fn zig() -> Command {
+/// A C compiler for LINUX or WINDOWS that gives the same bytes on any platform: zig's clang.
+fn zig(target: &str) -> Command {
     let mut command = crate::common::python_of("CRUMPLE_PYTHON_FMU");
     // The same sums as Rust's, which never contracts a·b + c.
     command.args(["-m", "ziglang", "cc", "-std=c99", "-Wall", "-Wextra", "-ffp-contract=off"]);
+    command.args(["-target", target]);
+    if target == WINDOWS {
+        // Without a C runtime of its own, which zig would have to compile first, and that takes minutes. With it go
+        // the paths to the headers.
+        let mut package = crate::common::python_of("CRUMPLE_PYTHON_FMU");
+        package.args(["-c", "import ziglang; print(ziglang.__path__[0], end='')"]);
+        let package = String::from_utf8(package.output().unwrap().stdout).unwrap();
+        command.arg("-nostdlib").arg("-isystem");
+        command.arg(Path::new(&package).join("lib/libc/include/any-windows-any"));
+        command.args(["-lkernel32", "-lapi-ms-win-crt-heap-l1-1-0"]);
+    }
     command
 }
+
+/// glibc of 2012, and the C library of Windows 10.
+const LINUX: &str = "x86_64-linux-gnu.2.17";
+const WINDOWS: &str = "x86_64-windows-gnu";
 
 /// The committed libraries are the bytes that their sources give. To write them after a change of the sources:
 /// `CRUMPLE_WRITE_LIBRARIES=1 tests/run --test all the_libraries`, then build again.
@@ -172,14 +187,13 @@ fn the_libraries_are_compiled_from_the_sources() {
         .collect();
     sources.sort();
     let linux: &[&str] = &["-fPIC", "-fvisibility=hidden", "-Wl,--build-id=none"];
-    // glibc of 2012, and the C library of Windows 10.
     for (name, target, flags) in
-        [("linux64.so", "x86_64-linux-gnu.2.17", linux), ("win64.dll", "x86_64-windows-gnu", &[])]
+        [("linux64.so", LINUX, linux), ("win64.dll", WINDOWS, &["../lib/entry.c"])]
     {
-        let mut command = zig();
+        let mut command = zig(target);
         command.args(["-O2", "-fno-builtin", "-fno-sanitize=undefined"]);
         command.args(["-fno-stack-protector", "-ffile-prefix-map=.=crumple", "-shared", "-s"]);
-        command.args(["-target", target]).args(flags).arg("-o").arg(folder.path().join(name));
+        command.args(flags).arg("-o").arg(folder.path().join(name));
         let output = command.args(&sources).current_dir(component.join("c")).output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         let compiled = std::fs::read(folder.path().join(name)).unwrap();
@@ -471,11 +485,13 @@ fn the_windows_library_gives_the_same_bits() {
     let xml = std::fs::read_to_string(here.join("modelDescription.xml")).unwrap();
     let guid = xml.split("guid=\"").nth(1).unwrap().split('"').next().unwrap();
     let source = root().join("tests/fmu_steps.c");
-    for (program, target) in
-        [("steps", "x86_64-linux-gnu.2.17"), ("steps.exe", "x86_64-windows-gnu")]
-    {
-        let mut command = zig();
-        command.args(["-O1", "-target", target]).arg(&source).arg("-o").arg(here.join(program));
+    let programs = [("steps", "./spring_1.so", LINUX), ("steps.exe", "spring_1.dll", WINDOWS)];
+    for (program, library, target) in programs {
+        let mut command = zig(target);
+        command.arg(format!("-DLIBRARY=\"{library}\"")).arg(format!("-DIDENTIFIER=\"{guid}\""));
+        command.args(["-O1", "-fno-sanitize=undefined"]).arg(&source);
+        command.args((target == WINDOWS).then_some("-Wl,-e,mainCRTStartup"));
+        command.arg("-o").arg(here.join(program));
         let output = command.output().unwrap();
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
     }
@@ -485,8 +501,8 @@ fn the_windows_library_gives_the_same_bits() {
         assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
         String::from_utf8(output.stdout).unwrap().replace('\r', "")
     };
-    let ours = printed(Command::new(here.join("steps")).args(["./spring_1.so", guid]));
-    let theirs = printed(Command::new(wine).args(["steps.exe", "spring_1.dll", guid]));
+    let ours = printed(&mut Command::new(here.join("steps")));
+    let theirs = printed(Command::new(wine).arg("steps.exe"));
     assert!(ours.lines().count() > 1000, "{ours}");
     let differs = ours.lines().zip(theirs.lines()).position(|(a, b)| a != b);
     assert_eq!((differs, ours.len()), (None, theirs.len()), "the first line that differs");

@@ -27,6 +27,7 @@ mod legacy_files;
 mod mdf;
 mod messages;
 mod models;
+mod mutations;
 mod new_user;
 mod nsdm;
 mod openradioss;
