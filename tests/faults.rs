@@ -358,9 +358,12 @@ fn sweeps_survive_every_fault() {
     let demo = demo_folder();
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    for name in ["scenario.toml", "lead.model"] {
-        fs::copy(demo.path().join(name), here.join(name)).unwrap();
-    }
+    fs::copy(demo.path().join("lead.model"), here.join("lead.model")).unwrap();
+    let scenario = fs::read_to_string(demo.path().join("scenario.toml")).unwrap();
+    // What is written matters here, not how the runs end.
+    let short = scenario.replace("300ms", "3ms");
+    assert_ne!(short, scenario);
+    fs::write(here.join("scenario.toml"), short).unwrap();
     hold(here, "sweep scenario.toml -q -o a.csv");
     hold(here, "sweep scenario.toml -q -o a.h5");
     for shard in ["1/2", "2/2"] {

@@ -257,8 +257,9 @@ fn sweeps_are_drawn_from_csv_and_hdf5() {
         let scenario = fs::read_to_string(folder.join("scenario.toml")).unwrap();
         let own = scenario.split("[sweep]").next().unwrap().replace("300ms", "5ms");
         fs::write(folder.join("own.toml"), own).unwrap();
+        crumple_ok(folder, "sweep own.toml --plan plan.toml -o same.csv --restart -q");
+        crumple_ok(folder, "sweep merge same.csv -o same.h5 -q");
         for (file, picture) in [("same.csv", "a.svg"), ("same.h5", "b.svg")] {
-            crumple_ok(folder, &format!("sweep own.toml --plan plan.toml -o {file} --restart -q"));
             crumple_ok(
                 folder,
                 &format!("plot {file} --over {over} --result peak_force -o {picture}"),

@@ -75,6 +75,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     })?;
     drop(bar);
     let mut outcome = Outcome::Clean;
+    let mut warnings = Vec::new();
     for run in &report.runs {
         if let (_, Some(error)) = outcome_of(run) {
             output::eprint_line(&format!("error: run {}: {error}", run.name));
@@ -83,10 +84,10 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             }
             outcome = Outcome::Partly;
         }
-        let warnings = report.case(run).into_iter().flat_map(|case| &case.quality.warnings);
-        let warnings = warnings.map(|warning| format!("{}: {warning}", run.name));
-        outcome = outcome.max(options.warn_all(warnings));
+        let own = report.case(run).into_iter().flat_map(|case| &case.quality.warnings);
+        warnings.extend(own.map(|warning| format!("{}: {warning}", run.name)));
     }
+    outcome = outcome.max(options.warn_all(warnings));
     // What is unusual in a run compared with its group.
     let of_group = siblings::remarks(report.database.cases(&report.group));
     let of_group: Vec<String> =

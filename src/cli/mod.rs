@@ -24,6 +24,7 @@ mod sweep;
 mod train;
 mod validate;
 
+use std::collections::BTreeMap;
 use std::error::Error;
 use std::ffi::OsString;
 use std::fmt::Display;
@@ -35,6 +36,7 @@ use std::sync::OnceLock;
 use crate::error::ErrorCode;
 use crate::failure::{self, DONE, DONE_WITH_WARNINGS, ErrorDocument, FAILED, USAGE};
 use crate::file::{self, is_same};
+use crate::plural::counted;
 use crate::{database, os, solver};
 use arguments::FileKind;
 use clap::{FromArgMatches, Parser, Subcommand};
@@ -105,6 +107,26 @@ pub(crate) enum Outcome {
     Warned,
     /// Part of the work could not be done; what could be done was.
     Partly,
+}
+
+/// Warnings that a command prints without --verbose.
+const SHOWN_WARNINGS: usize = 20;
+
+/// Where many cases have warnings, the first of them, and how many more there are of which kind.
+fn shown_of(mut warnings: Vec<String>) -> Vec<String> {
+    let further = warnings.split_off(warnings.len().min(SHOWN_WARNINGS));
+    let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
+    for warning in &further {
+        // "case: kind: what is wrong".
+        let kind = warning.split(": ").nth(1).filter(|kind| !kind.contains(' '));
+        *kinds.entry(kind.unwrap_or("other")).or_default() += 1;
+    }
+    if !further.is_empty() {
+        let kinds: Vec<String> = kinds.iter().map(|(kind, n)| format!("{n} × {kind}")).collect();
+        let count = counted(further.len(), "further warning");
+        warnings.push(format!("{count}, {}: --verbose", kinds.join(", ")));
+    }
+    warnings
 }
 
 impl Outcome {
@@ -228,14 +250,14 @@ impl GlobalOptions {
         }
     }
 
-    /// Warnings on standard error, and the outcome of what has them.
+    /// Warnings on standard error, and the outcome of what has them; a document's reader gets them all.
     fn warn_all<W: Display>(self, warnings: impl IntoIterator<Item = W>) -> Outcome {
-        let mut outcome = Outcome::Clean;
-        for warning in warnings {
-            self.warn(&warning.to_string());
-            outcome = Outcome::Warned;
+        let mut warnings: Vec<String> = warnings.into_iter().map(|w| w.to_string()).collect();
+        if !self.verbose && !self.json {
+            warnings = shown_of(warnings);
         }
-        outcome
+        warnings.iter().for_each(|warning| self.warn(warning));
+        Outcome::warned_if(!warnings.is_empty())
     }
 
     /// Warnings about a file.
@@ -360,5 +382,23 @@ fn print_error(error: &(dyn Error + 'static)) {
     output::eprint_excerpt(failure::place(error));
     for cause in failure::causes(error) {
         output::eprint_line(&format!("  because: {cause}"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_warnings_are_counted_by_kind() {
+        let of = |n: usize| -> Vec<String> {
+            let kind = |k: usize| ["contact: late", "sampling: coarse", "ends early"][k % 3];
+            (0..n).map(|k| format!("g/r{k}: {}", kind(k))).collect()
+        };
+        assert_eq!(shown_of(of(20)), of(20));
+        let shown = shown_of(of(1_020));
+        assert_eq!(shown[..20], of(20));
+        let last = "1000 further warnings, 333 × contact, 334 × other, 333 × sampling: --verbose";
+        assert_eq!(shown[20..], [last]);
     }
 }
