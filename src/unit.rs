@@ -144,6 +144,14 @@ pub fn mass_kg(text: &str) -> Result<f64, Error> {
     MASS.parse_positive(text)
 }
 
+/// A length in m, of a text with its unit such as "620mm".
+///
+/// # Errors
+/// If it is not a number with a unit of length, or not above 0.
+pub fn length_m(text: &str) -> Result<f64, Error> {
+    LENGTH.parse_positive(text)
+}
+
 /// A speed as people in the field read it: `36 km/h`, at most two decimals.
 pub fn km_per_h(m_per_s: f64) -> String {
     let rounded = (m_per_s / M_PER_S_PER_KM_PER_H * 100.0).round() / 100.0;

@@ -38,6 +38,70 @@ fn read(folder: &Path, name: &str) -> Database {
     Database::read(&folder.join(name)).unwrap()
 }
 
+/// A tag or note of one case of a large file changes this case alone, and reads no other.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn one_case_of_a_large_file_h5py_reads_as_before() {
+    let folder = two_groups();
+    let here = folder.path();
+    let mut large = read(here, "curves.h5");
+    let one = large.cases(WALL)[3].clone();
+    let copies = 40_000_000 / fs::metadata(here.join("curves.h5")).unwrap().len() * 11;
+    for k in 0..copies {
+        let mut copy = one.clone();
+        copy.id.name = format!("r{k:04}");
+        large.put(copy).unwrap();
+    }
+    large.write(&here.join("large.h5")).unwrap();
+    edited(&here.join("large.h5"), |file| {
+        file.root().group(WALL).unwrap().set_attr("theirs", AttrValue::I64(7)).unwrap();
+    });
+    let before = read(here, "large.h5");
+    let checked = ok(here, "db check large.h5");
+    let bytes = fs::read(here.join("large.h5")).unwrap();
+    assert!(bytes.len() > 32 << 20, "{} bytes", bytes.len());
+    for (line, expected) in [
+        ("db tag large.h5 --case r9999 --add x", "there is no case \"r9999\""),
+        ("db tag large.h5 --case 36kmh --add x", "several groups have a case \"36kmh\""),
+        ("db note large.h5 --case lead-car-wall/r0007 --remove x", "none of the 1 chosen cases"),
+    ] {
+        fails(here, line, expected);
+    }
+    assert!(fs::read(here.join("large.h5")).unwrap() == bytes);
+    // Were it read, the file would be refused.
+    let mut damaged = bytes;
+    let force = one.curves.original.force_n()[9].to_le_bytes();
+    let all: Vec<usize> = memchr::memmem::find_iter(&damaged, &force).collect();
+    damaged[*all.last().unwrap()] ^= 1;
+    fs::write(here.join("large.h5"), &damaged).unwrap();
+    assert!(Database::read(&here.join("large.h5")).is_err());
+    ok(here, "db tag large.h5 --case lead-car-wall/r0007 --add seen,odd");
+    ok(here, "db tag large.h5 --group lead-car-wall --case r0007 --remove odd");
+    ok(here, "db note large.h5 --case lead-car-wall/r0007 --add Grüße");
+    fails(
+        here,
+        "db tag large.h5 --case lead-car-wall/r0005 --case lead-car-wall/r0006 --add x",
+        "",
+    );
+    let mut after = fs::read(here.join("large.h5")).unwrap();
+    // Three changes.
+    assert!(after.len() < damaged.len() + 3 * (40 << 10), "{}", after.len() - damaged.len());
+    after[*all.last().unwrap()] ^= 1;
+    fs::write(here.join("large.h5"), after).unwrap();
+    let mut expected = before;
+    let mut case = expected.cases(WALL).iter().find(|c| c.id.name == "r0007").unwrap().clone();
+    case.provenance.tags = vec!["seen".into()];
+    case.provenance.user_notes = vec!["Grüße".into()];
+    expected.put(case).unwrap();
+    assert!(expected == read(here, "large.h5"));
+    assert_eq!(ok(here, "db check large.h5"), checked);
+    let read_by_h5py = "import h5py, sys; file = h5py.File('large.h5'); group = file['lead-car-wall']; case = group['r0007']; print(group.attrs['theirs'], case.attrs['tags'], case.attrs['user_notes'], case['force_N'].size)";
+    let printed = python().current_dir(here).args(["-c", read_by_h5py]).output().unwrap();
+    let printed = String::from_utf8(printed.stdout).unwrap();
+    says(&printed, "seen");
+    says(&printed, "Grüße");
+}
+
 /// `GROUP/CASE` of all cases, in order.
 fn names(folder: &Path, name: &str) -> Vec<String> {
     read(folder, name).all().map(|case| format!("{}/{}", case.id.group, case.id.name)).collect()

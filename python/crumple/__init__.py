@@ -339,8 +339,13 @@ class Model:
         self._model = _crumple.TrainedModel(os.fspath(path))
         self.group, self.name, self.range = self._model.facts()
 
-    def predict(self, speed, extrapolate=False, *, mass=None, max_crush=None, parameters=None, energy_correct=False):
+    def predict(
+        self, speed=None, extrapolate=False, *, crush=None, mass=None, max_crush=None, parameters=None, energy_correct=False
+    ):
         """The curve at a speed: a number in m/s, or text with a unit, "50km/h".
+
+        `crush` (m, or "620mm") in its place: the speed between the runs that gives this crush is found; `document["found_by_crush"]`
+        then has it with the speeds of a crush that is as much smaller and larger as the model's is off on average.
 
         `mass` (kg, or "30t") is that of the body if it is not the runs'; `max_crush` the rule for the largest deflection: "spline",
         "monotone", "energy" or "motion" (default: the one that was best when speeds were left out); `parameters` a dict of
@@ -352,9 +357,12 @@ class Model:
         Raises `crumple.Error` far outside the speeds of the runs (`range`, in m/s), unless `extrapolate`.
         """
         further = list((parameters or {}).items())
-        speed = _quantity("speed", speed, "m/s")
+        if (speed is None) == (crush is None) or (extrapolate and crush is not None):
+            raise TypeError("give a speed, with or without extrapolate, or a crush")
+        speed = None if speed is None else _quantity("speed", speed, "m/s")
+        crush = None if crush is None else _quantity("crush", crush, "m")
         mass = None if mass is None else _quantity("mass", mass, "kg")
-        document = self._model.predict(speed, extrapolate, mass, max_crush, further, energy_correct)
+        document = self._model.predict(speed, crush, extrapolate, mass, max_crush, further, energy_correct)
         return Curve(json.loads(document))
 
     def __reduce__(self):

@@ -135,9 +135,10 @@ class Model:
     def __init__(self, path: _Path) -> None: ...
     def predict(
         self,
-        speed: float | str,
+        speed: float | str | None = None,
         extrapolate: bool = False,
         *,
+        crush: float | str | None = None,
         mass: float | str | None = None,
         max_crush: str | None = None,
         parameters: Mapping[str, float | str] | None = None,

@@ -27,7 +27,8 @@ class TrainedModel:
     def facts(self) -> tuple[str, str, tuple[float, float]]: ...
     def predict(
         self,
-        speed: float | str,
+        speed: float | str | None,
+        crush: float | str | None,
         extrapolate: bool,
         mass: float | str | None,
         max_crush: str | None,

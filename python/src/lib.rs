@@ -16,8 +16,8 @@ use crumple::forest::{
     FeaturesPerSplit, ForestError, ForestParams, RegressionForest, Thresholds, Ties,
 };
 use crumple::solver::{self, Selection, SolverFile, WantedId};
-use crumple::surrogate::{MaxCrushRule, Model, Query, predict};
-use crumple::unit::{mass_kg, speed_m_per_s};
+use crumple::surrogate::{MaxCrushRule, Model, Query, predict, speed_of_crush};
+use crumple::unit::{length_m, mass_kg, speed_m_per_s};
 use linfa::prelude::*;
 use ndarray::{Array1, Array2};
 use pyo3::exceptions::{PyBufferError, PyRuntimeError, PyValueError};
@@ -257,14 +257,15 @@ impl TrainedModel {
         (self.0.group.clone(), self.0.kind.name(), self.0.range_m_per_s())
     }
 
-    /// The curve at a speed, as the document of `predict --json`. Speed and mass are numbers in m/s and kg, or texts with
-    /// units.
-    #[pyo3(signature = (speed, extrapolate, mass, max_crush, parameters, energy_correct))]
+    /// The curve at a speed, or at that which gives a crush, as the document of `predict --json`. Speed, crush and mass are
+    /// numbers in m/s, m and kg, or texts with units.
+    #[pyo3(signature = (speed, crush, extrapolate, mass, max_crush, parameters, energy_correct))]
     #[allow(clippy::too_many_arguments)]
     fn predict(
         &self,
         py: Python<'_>,
-        speed: Quantity,
+        speed: Option<Quantity>,
+        crush: Option<Quantity>,
         extrapolate: bool,
         mass: Option<Quantity>,
         max_crush: Option<String>,
@@ -278,16 +279,29 @@ impl TrainedModel {
             let unknown = || format!("max_crush {name:?}: expected one of {known}");
             named.ok_or_else(|| PyValueError::new_err(unknown()))
         });
+        let crush = crush.map(|crush| crush.in_si(py, "crush", length_m)).transpose()?;
+        let speed = speed.map(|speed| speed.in_si(py, "speed", speed_m_per_s)).transpose()?;
         let query = Query {
             mass_kg: mass.map(|mass| mass.in_si(py, "mass", mass_kg)).transpose()?,
             rule: rule.transpose()?,
             parameters: parameters.collect(),
             energy_correct,
             extrapolate,
-            ..Query::at(speed.in_si(py, "speed", speed_m_per_s)?)
+            ..Query::at(speed.unwrap_or_else(|| self.0.range_m_per_s().0))
         };
-        let curve = py.detach(|| predict(&self.0, &query)).map_err(|error| failed(py, &error))?;
-        serde_json::to_string(&curve).map_err(|error| PyValueError::new_err(error.to_string()))
+        let predicted = || {
+            let found =
+                crush.map(|crush_m| speed_of_crush(&self.0, &query, crush_m)).transpose()?;
+            let speed_m_per_s = found.map_or(query.speed_m_per_s, |found| found.speed_m_per_s);
+            Ok((predict(&self.0, &Query { speed_m_per_s, ..query.clone() })?, found))
+        };
+        let (curve, found) = py.detach(predicted).map_err(|error| failed(py, &error))?;
+        let not_written = |error: serde_json::Error| PyValueError::new_err(error.to_string());
+        let mut document = serde_json::to_value(&curve).map_err(not_written)?;
+        if let Some(found) = found {
+            document["found_by_crush"] = serde_json::to_value(found).map_err(not_written)?;
+        }
+        Ok(document.to_string())
     }
 }
 

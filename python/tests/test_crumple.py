@@ -157,6 +157,18 @@ def test_databases_models_and_curves(tmp_path):
     for wrong, what in [({"speed": "50"}, "unit"), ({"speed": "50km/h", "mass": "3m"}, "unit"), ({"speed": 14.0, "max_crush": "no"}, "expected one of spline")]:
         with pytest.raises((crumple.Error, ValueError), match=what):
             model.predict(**wrong)
+    # The speed of a crush, as by the command.
+    crushed = model.predict(crush="620mm", mass="26t")
+    document = crumple.run("predict", DEMO / "lead.model", "--crush", "620mm", "--mass", "26t")
+    assert crushed.document["found_by_crush"] == document["found_by_crush"] and crushed.speed == document["speed_m_per_s"]
+    assert abs(crushed.max_deflection - 0.62) < 1e-9 and crushed.speed == model.predict(crush=0.62, mass=26e3).speed
+    for wrong in [{}, {"speed": 10.0, "crush": 0.5}, {"crush": 0.5, "extrapolate": True}, {"crush": [1, 2]}]:
+        with pytest.raises(TypeError, match="give a speed|expected one number in m,"):
+            model.predict(**wrong)
+    with pytest.raises(crumple.Error, match="no speed between those of the runs gives a crush of 90 m"):
+        model.predict(crush=90)
+    with pytest.raises(crumple.Error, match="has no unit"):
+        model.predict(crush="620")
     with pytest.raises(crumple.Error, match="angle"):
         model.predict(14.0, parameters={"angle_deg": 10.0})
     # The model that was read answers, whatever becomes of its file.

@@ -11,7 +11,7 @@ use super::layout::{
     self, BODY_FORCE, CASE_ATTRIBUTES, Content, FoundGroup, ORIGINAL, Opened, PLOT, ROOT, VERSION,
 };
 use super::{CasePath, Database};
-use crate::curve::Case;
+use crate::curve::{Case, CaseId};
 use crate::error::{Error, error};
 use crate::file::write_by_path;
 use crate::hdf5::{self, AttrValue, Dataset, File, FileAccessProperties, FileLocking, Group};
@@ -60,6 +60,40 @@ pub(super) fn write_keeping(
             Ok(())
         } else {
             Err(would_drop(listed(&before)))
+        }
+    })
+}
+
+/// Writes a case, whose tags or notes alone have changed, into a copy of the file at `path`, which takes its place. The
+/// other cases are copied, not read.
+pub(crate) fn replace_labels(path: &Path, case: &Case) -> Result<(), Error> {
+    if layout::open(path)?.version != VERSION {
+        let mut database = Database::read(path)?;
+        database.put(case.clone())?;
+        return database.write(path);
+    }
+    let CaseId { group, name, .. } = &case.id;
+    let failed = |why: String| {
+        let path = path.display();
+        error!(Database, "{path}: {group}/{name} cannot be changed: {why}; the file is unchanged")
+    };
+    write_by_path(path, |draft| {
+        fs::copy(path, draft).map_err(|source| Error::io(path, source))?;
+        let edit = || -> Result<(), EditError> {
+            let file = open(draft)?;
+            let found = file.root().group(group)?.group(name)?;
+            replace_attributes(&found, layout::with_hashes(&Database::default(), case)?)?;
+            drop(found);
+            Ok(file.close()?)
+        };
+        edit().map_err(|error| match error {
+            EditError::Hdf5(error) => failed(error.to_string()),
+            EditError::Content(error) => error,
+        })?;
+        if Database::read_case(draft, Some(group), name)? == *case {
+            Ok(())
+        } else {
+            Err(failed("it does not read back as it was written".into()))
         }
     })
 }

@@ -27,6 +27,8 @@ mod edit;
 mod group;
 mod layout;
 
+pub(crate) use edit::replace_labels;
+
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 use std::{fmt, io};

@@ -43,7 +43,7 @@ pub use predict::{predict, predict_driving};
 pub use predicted::PredictedCurve;
 pub use predicted::Provenance;
 pub use query::Query;
-pub(crate) use speed_of_crush::{SpeedOfCrush, speed_of_crush};
+pub use speed_of_crush::{SpeedOfCrush, speed_of_crush};
 pub use warning::{Warning, WarningCode};
 pub(crate) mod predicted;
 mod query;

@@ -8,15 +8,18 @@ use crate::unit::km_per_h;
 
 /// A speed that was found by its crush.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(crate) struct SpeedOfCrush {
-    pub(crate) crush_m: f64,
-    pub(crate) speed_m_per_s: f64,
+pub struct SpeedOfCrush {
+    /// The crush that was asked for.
+    pub crush_m: f64,
+    /// The speed that gives it.
+    pub speed_m_per_s: f64,
     /// Speeds of a crush as much smaller and larger as the model's is off on average at left-out speeds; null beyond the
     /// model's speeds, and if no speed was left out.
-    pub(crate) low_m_per_s: Option<f64>,
-    pub(crate) high_m_per_s: Option<f64>,
+    pub low_m_per_s: Option<f64>,
+    /// See `low_m_per_s`.
+    pub high_m_per_s: Option<f64>,
     /// That mean error of the rule in use, relative; null too if that rule has no answer at some of these speeds.
-    pub(crate) crush_error: Option<f64>,
+    pub crush_error: Option<f64>,
 }
 
 /// Intervals that are looked into; crushes of real structures rise with the speed, so the first that holds it counts.
@@ -29,11 +32,7 @@ const HALVINGS: usize = 40;
 ///
 /// # Errors
 /// If no speed between the runs gives that crush; as [`predict`].
-pub(crate) fn speed_of_crush(
-    model: &Model,
-    query: &Query,
-    crush_m: f64,
-) -> Result<SpeedOfCrush, Error> {
+pub fn speed_of_crush(model: &Model, query: &Query, crush_m: f64) -> Result<SpeedOfCrush, Error> {
     let (low, high) = model.range_m_per_s();
     let crush_at = |speed_m_per_s: f64| -> Result<f64, Error> {
         let query = Query { speed_m_per_s, ..query.clone() };

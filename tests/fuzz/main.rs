@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 
 use libfuzzer_sys::fuzz_target;
 
-static CHOSEN: OnceLock<Box<dyn Fn(&[u8]) + Send + Sync>> = OnceLock::new();
+static CHOSEN: OnceLock<targets::Target> = OnceLock::new();
 
 fn choose() {
     let name = std::env::var("CRUMPLE_FUZZ_TARGET").expect("CRUMPLE_FUZZ_TARGET names a target");

@@ -10,6 +10,10 @@ use crumple::solver::{Selection, parse_deck, read_from};
 use crumple::surrogate::{Model, Query, predict};
 use crumple::{scenario, study, sweep};
 
+/// What a target does with any bytes.
+pub type Target = Box<dyn Fn(&[u8]) + Send + Sync>;
+type Plain = fn(&[u8]);
+
 /// Formats of solver files, which are one target each.
 const FORMATS: &[&str] = &[
     "nodout", "rcforc", "rwforc", "secforc", "glstat", "matsum", "spcforc", "bndout", "sleout",
@@ -18,7 +22,7 @@ const FORMATS: &[&str] = &[
 ];
 
 /// The other targets: any bytes give a result, or an error that says where.
-const OTHERS: &[(&str, fn(&[u8]))] = &[
+const OTHERS: &[(&str, Plain)] = &[
     ("deck", deck),
     ("study", parsed_study),
     ("model", model),
@@ -35,7 +39,7 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 }
 
 /// The target of that name.
-pub fn target(name: &str) -> Option<Box<dyn Fn(&[u8]) + Send + Sync>> {
+pub fn target(name: &str) -> Option<Target> {
     let format = FORMATS.iter().find(|format| **format == name);
     let other = OTHERS.iter().find(|(other, _)| *other == name);
     match (format, other) {
