@@ -38,56 +38,59 @@ fn read(folder: &Path, name: &str) -> Database {
     Database::read(&folder.join(name)).unwrap()
 }
 
-/// A tag or note of one case of a large file changes this case alone, and reads no other.
+/// A tag or note of one case of a large file changes this case alone, and reads no other; what others have put in stays.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]
 fn one_case_of_a_large_file_h5py_reads_as_before() {
     let folder = two_groups();
     let here = folder.path();
-    let mut large = read(here, "curves.h5");
-    let one = large.cases(WALL)[3].clone();
+    let large = here.join("large.h5");
+    let mut database = read(here, "curves.h5");
+    let one = database.cases(WALL)[3].clone();
     let copies = 40_000_000 / fs::metadata(here.join("curves.h5")).unwrap().len() * 11;
     for k in 0..copies {
         let mut copy = one.clone();
         copy.id.name = format!("r{k:04}");
-        large.put(copy).unwrap();
+        database.put(copy).unwrap();
     }
-    large.write(&here.join("large.h5")).unwrap();
-    edited(&here.join("large.h5"), |file| {
-        file.root().group(WALL).unwrap().set_attr("theirs", AttrValue::I64(7)).unwrap();
-    });
+    database.write(&large).unwrap();
+    let run = |line: &str| {
+        let output = python().current_dir(here).args(["-c", line]).output().unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        String::from_utf8(output.stdout).unwrap()
+    };
+    run("import h5py
+with h5py.File('large.h5', 'a', libver='latest') as f:
+    f.attrs['theirs'] = 'root'
+    f['lead-car-wall'].attrs['theirs'] = 7
+    f['lead-car-wall/r0007/theirs'] = [1.0, 2.0]
+    f['theirs/of_all'] = [3.0]");
     let before = read(here, "large.h5");
     let checked = ok(here, "db check large.h5");
-    let bytes = fs::read(here.join("large.h5")).unwrap();
-    assert!(bytes.len() > 32 << 20, "{} bytes", bytes.len());
+    let mut damaged = fs::read(&large).unwrap();
+    assert!(damaged.len() > 32 << 20, "{} bytes", damaged.len());
+    // A case whose values are others than were written: were it read, the file would be refused.
+    let force = one.curves.original.force_n()[9].to_le_bytes();
+    let at = memchr::memmem::rfind(&damaged, &force).unwrap();
+    damaged[at] ^= 1;
+    fs::write(&large, &damaged).unwrap();
+    let refused = "do not match their fingerprint";
     for (line, expected) in [
-        ("db tag large.h5 --case r9999 --add x", "there is no case \"r9999\""),
-        ("db tag large.h5 --case 36kmh --add x", "several groups have a case \"36kmh\""),
-        ("db note large.h5 --case lead-car-wall/r0007 --remove x", "none of the 1 chosen cases"),
+        ("db tag large.h5 --case lead-car-wall/r0005 --case lead-car-wall/r0006 --add x", refused),
+        (&format!("db tag large.h5 --case r{:04} --add x", copies - 1), refused),
+        ("db note large.h5 --case r0007 --remove x", "none of the 1 chosen cases has the note"),
     ] {
         fails(here, line, expected);
     }
-    assert!(fs::read(here.join("large.h5")).unwrap() == bytes);
-    // Were it read, the file would be refused.
-    let mut damaged = bytes;
-    let force = one.curves.original.force_n()[9].to_le_bytes();
-    let all: Vec<usize> = memchr::memmem::find_iter(&damaged, &force).collect();
-    damaged[*all.last().unwrap()] ^= 1;
-    fs::write(here.join("large.h5"), &damaged).unwrap();
-    assert!(Database::read(&here.join("large.h5")).is_err());
-    ok(here, "db tag large.h5 --case lead-car-wall/r0007 --add seen,odd");
+    assert!(fs::read(&large).unwrap() == damaged);
+    ok(here, "db tag large.h5 --case r0007 --add seen,odd");
     ok(here, "db tag large.h5 --group lead-car-wall --case r0007 --remove odd");
     ok(here, "db note large.h5 --case lead-car-wall/r0007 --add Grüße");
-    fails(
-        here,
-        "db tag large.h5 --case lead-car-wall/r0005 --case lead-car-wall/r0006 --add x",
-        "",
-    );
-    let mut after = fs::read(here.join("large.h5")).unwrap();
+    let mut after = fs::read(&large).unwrap();
     // Three changes.
     assert!(after.len() < damaged.len() + 3 * (40 << 10), "{}", after.len() - damaged.len());
-    after[*all.last().unwrap()] ^= 1;
-    fs::write(here.join("large.h5"), after).unwrap();
+    after[at] ^= 1;
+    fs::write(&large, after).unwrap();
     let mut expected = before;
     let mut case = expected.cases(WALL).iter().find(|c| c.id.name == "r0007").unwrap().clone();
     case.provenance.tags = vec!["seen".into()];
@@ -95,11 +98,62 @@ fn one_case_of_a_large_file_h5py_reads_as_before() {
     expected.put(case).unwrap();
     assert!(expected == read(here, "large.h5"));
     assert_eq!(ok(here, "db check large.h5"), checked);
-    let read_by_h5py = "import h5py, sys; file = h5py.File('large.h5'); group = file['lead-car-wall']; case = group['r0007']; print(group.attrs['theirs'], case.attrs['tags'], case.attrs['user_notes'], case['force_N'].size)";
-    let printed = python().current_dir(here).args(["-c", read_by_h5py]).output().unwrap();
-    let printed = String::from_utf8(printed.stdout).unwrap();
+    fails(here, "db tag large.h5 --case r9999 --add x", "there is no case \"r9999\"");
+    fails(here, "db tag large.h5 --case 36kmh --add x", "several groups have a case \"36kmh\"");
+    let printed = run("import h5py
+f = h5py.File('large.h5'); group = f['lead-car-wall']; case = group['r0007']
+print(f.attrs['theirs'], group.attrs['theirs'], *case['theirs'], *f['theirs/of_all'])
+print(case.attrs['tags'], case.attrs['user_notes'])");
+    says(&printed, "root 7 1.0 2.0 3.0\n");
     says(&printed, "seen");
     says(&printed, "Grüße");
+    // A file that h5py has written anew is changed too, in one way or the other.
+    run("import h5py
+with h5py.File('large.h5') as a, h5py.File('copied.h5', 'w', libver='latest') as b:
+    for name in a: a.copy(name, b)
+    for name in a.attrs: b.attrs[name] = a.attrs[name]");
+    ok(here, "db tag copied.h5 --case r0007 --add copied");
+    let copied = read(here, "copied.h5");
+    let tagged = copied.all().filter(|case| case.provenance.tags.contains(&"copied".into()));
+    assert_eq!(tagged.map(|case| &*case.id.name).collect::<Vec<_>>(), ["r0007"]);
+}
+
+/// The first warnings of many cases, and how many more there are; all of them where they are asked for.
+#[test]
+fn warnings_of_many_cases_are_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "vehicle-pair");
+    let mut database = read(here, "curves.h5");
+    let warned = database.all().find(|case| case.quality.warnings.len() == 1).unwrap().clone();
+    let known = database.all().map(|case| case.quality.warnings.len()).sum::<usize>();
+    let lines = |line: &str| -> Vec<String> {
+        let output = crumple_in(here, line);
+        let lines = String::from_utf8(output.stderr).unwrap();
+        lines.lines().filter(|line| line.starts_with("warning: ")).map(String::from).collect()
+    };
+    let mut fill = |all: usize| {
+        for k in known..all {
+            let mut copy = warned.clone();
+            copy.id.name = format!("r{k}");
+            database.put(copy).unwrap();
+        }
+        database.write(&here.join("curves.h5")).unwrap();
+    };
+    fill(21);
+    // One more would take as much room.
+    assert_eq!(lines("db ls curves.h5").len(), 21);
+    fill(30);
+    let all = lines("db ls curves.h5 --verbose");
+    assert!(all.len() >= 30);
+    let shown = lines("db ls curves.h5");
+    assert_eq!(shown[..20], all[..20]);
+    let further = all.len() - 20;
+    assert_eq!(
+        shown[20..],
+        [format!("warning: {further} further warnings: --verbose prints them")]
+    );
+    assert_eq!(lines("db ls curves.h5 --json"), all);
 }
 
 /// `GROUP/CASE` of all cases, in order.

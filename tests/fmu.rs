@@ -156,8 +156,8 @@ fn zig(target: &str) -> Command {
     command.args(["-m", "ziglang", "cc", "-std=c99", "-Wall", "-Wextra", "-ffp-contract=off"]);
     command.args(["-target", target]);
     if target == WINDOWS {
-        // Without a C runtime of its own, which zig would have to compile first, and that takes minutes. With it go
-        // the paths to the headers.
+        // Without a C runtime of its own, which zig would have to compile first, and that takes minutes. That also drops
+        // zig's paths to the headers, which are given here.
         let mut package = crate::common::python_of("CRUMPLE_PYTHON_FMU");
         package.args(["-c", "import ziglang; print(ziglang.__path__[0], end='')"]);
         let package = String::from_utf8(package.output().unwrap().stdout).unwrap();

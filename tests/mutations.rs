@@ -2,13 +2,16 @@
 
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::process::Command;
+use std::sync::mpsc::{RecvTimeoutError, channel};
+use std::time::Duration;
 
-use crate::common::*;
+use crate::common::{is_thorough, root};
 
 #[path = "fuzz/targets.rs"]
 mod targets;
 
-/// Flips a bit, zeroes, repeats or drops a range, or sets a byte, one to four times.
+/// Flips a bit, sets a byte, zeroes, repeats or drops a range, or cuts, one to four times.
 fn mutated(seed: &[u8], random: &mut impl FnMut(usize) -> usize) -> Vec<u8> {
     let mut bytes = seed.to_vec();
     for _ in 0..=random(4) {
@@ -28,13 +31,34 @@ fn mutated(seed: &[u8], random: &mut impl FnMut(usize) -> usize) -> Vec<u8> {
     bytes
 }
 
+fn keep(name: &str, bytes: &[u8]) -> String {
+    let kept = root().join("target").join(format!("{name}-finding"));
+    fs::write(&kept, bytes).unwrap();
+    kept.display().to_string()
+}
+
 #[test]
-#[ignore = "needs the Python clients (tests/run installs them)"]
 fn mutated_seeds_give_results_or_errors() {
     let folder = tempfile::tempdir().unwrap();
     let script = root().join("tests/fuzz/make_corpus.py");
-    assert!(python().arg(script).arg(folder.path()).status().unwrap().success());
+    assert!(Command::new("python3").arg(script).arg(folder.path()).status().unwrap().success());
     let mutations = if is_thorough() { 50_000 } else { 1_000 };
+    // An input that takes longer ends the tests: nothing else can.
+    let (began, watched) = channel::<Option<(&str, Vec<u8>)>>();
+    let watch = std::thread::spawn(move || {
+        let mut current = None;
+        loop {
+            match (watched.recv_timeout(Duration::from_secs(20)), &current) {
+                (Ok(next), _) => current = next,
+                (Err(RecvTimeoutError::Timeout), Some((name, bytes))) => {
+                    eprintln!("{name}: an input takes longer than 20 s: {}", keep(name, bytes));
+                    std::process::exit(1);
+                }
+                (Err(RecvTimeoutError::Timeout), None) => {}
+                (Err(RecvTimeoutError::Disconnected), _) => break,
+            }
+        }
+    });
     let mut state = 7u64;
     let mut random = |n: usize| {
         state =
@@ -53,12 +77,14 @@ fn mutated_seeds_give_results_or_errors() {
             let valid = fs::read(&seed).unwrap();
             for number in 0..mutations {
                 let bytes = if number == 0 { valid.clone() } else { mutated(&valid, &mut random) };
+                began.send(Some((name, bytes.clone()))).unwrap();
                 if catch_unwind(AssertUnwindSafe(|| target(&bytes))).is_err() {
-                    let kept = root().join("target").join(format!("{name}-finding"));
-                    fs::write(&kept, &bytes).unwrap();
-                    panic!("{name}: mutation {number} of its {seed:?}, kept as {kept:?}");
+                    panic!("{name}: mutation {number} of its {seed:?}: {}", keep(name, &bytes));
                 }
             }
         }
     }
+    drop(began);
+    watch.join().unwrap();
+    fs::remove_dir_all(targets::folder()).unwrap();
 }

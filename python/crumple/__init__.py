@@ -344,8 +344,9 @@ class Model:
     ):
         """The curve at a speed: a number in m/s, or text with a unit, "50km/h".
 
-        `crush` (m, or "620mm") in its place: the speed between the runs that gives this crush is found; `document["found_by_crush"]`
-        then has it with the speeds of a crush that is as much smaller and larger as the model's is off on average.
+        `crush` (m, or "620mm") replaces the speed, and cannot be combined with `extrapolate`: the speed between the runs that gives
+        this maximum crush is used. `document["found_by_crush"]` holds that speed, and the speeds for a crush smaller and larger
+        by the model's mean error.
 
         `mass` (kg, or "30t") is that of the body if it is not the runs'; `max_crush` the rule for the largest deflection: "spline",
         "monotone", "energy" or "motion" (default: the one that was best when speeds were left out); `parameters` a dict of

@@ -16,7 +16,9 @@ use crumple::forest::{
     FeaturesPerSplit, ForestError, ForestParams, RegressionForest, Thresholds, Ties,
 };
 use crumple::solver::{self, Selection, SolverFile, WantedId};
-use crumple::surrogate::{MaxCrushRule, Model, Query, predict, speed_of_crush};
+use crumple::surrogate::{
+    MaxCrushRule, Model, PredictedCurve, Query, SpeedOfCrush, predict, speed_of_crush,
+};
 use crumple::unit::{length_m, mass_kg, speed_m_per_s};
 use linfa::prelude::*;
 use ndarray::{Array1, Array2};
@@ -24,6 +26,7 @@ use pyo3::exceptions::{PyBufferError, PyRuntimeError, PyValueError};
 use pyo3::ffi;
 use pyo3::prelude::*;
 use pyo3::types::PyModule;
+use serde::Serialize;
 
 /// Numbers that NumPy shows without a copy.
 #[pyclass(frozen, module = "crumple._crumple")]
@@ -240,6 +243,15 @@ impl Quantity {
     }
 }
 
+/// The document of `predict --json`.
+#[derive(Serialize)]
+struct Predicted {
+    #[serde(flatten)]
+    curve: PredictedCurve,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    found_by_crush: Option<SpeedOfCrush>,
+}
+
 /// A trained model.
 #[pyclass(frozen, module = "crumple._crumple")]
 struct TrainedModel(Model);
@@ -295,13 +307,9 @@ impl TrainedModel {
             let speed_m_per_s = found.map_or(query.speed_m_per_s, |found| found.speed_m_per_s);
             Ok((predict(&self.0, &Query { speed_m_per_s, ..query.clone() })?, found))
         };
-        let (curve, found) = py.detach(predicted).map_err(|error| failed(py, &error))?;
-        let not_written = |error: serde_json::Error| PyValueError::new_err(error.to_string());
-        let mut document = serde_json::to_value(&curve).map_err(not_written)?;
-        if let Some(found) = found {
-            document["found_by_crush"] = serde_json::to_value(found).map_err(not_written)?;
-        }
-        Ok(document.to_string())
+        let (curve, found_by_crush) = py.detach(predicted).map_err(|error| failed(py, &error))?;
+        let document = Predicted { curve, found_by_crush };
+        serde_json::to_string(&document).map_err(|error| PyValueError::new_err(error.to_string()))
     }
 }
 

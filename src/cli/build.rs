@@ -87,12 +87,11 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         let own = report.case(run).into_iter().flat_map(|case| &case.quality.warnings);
         warnings.extend(own.map(|warning| format!("{}: {warning}", run.name)));
     }
-    outcome = outcome.max(options.warn_all(warnings));
     // What is unusual in a run compared with its group.
     let of_group = siblings::remarks(report.database.cases(&report.group));
     let of_group: Vec<String> =
         of_group.into_iter().map(|(case, _, words)| format!("{case}: {words}")).collect();
-    outcome = outcome.max(options.warn_all(&of_group));
+    outcome = outcome.max(options.warn_all(warnings.iter().chain(&of_group)));
     let database = output.display().to_string();
     let runs = report.runs.iter().map(|run| {
         let (word, error) = outcome_of(run);

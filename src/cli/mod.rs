@@ -24,7 +24,6 @@ mod sweep;
 mod train;
 mod validate;
 
-use std::collections::BTreeMap;
 use std::error::Error;
 use std::ffi::OsString;
 use std::fmt::Display;
@@ -36,7 +35,6 @@ use std::sync::OnceLock;
 use crate::error::ErrorCode;
 use crate::failure::{self, DONE, DONE_WITH_WARNINGS, ErrorDocument, FAILED, USAGE};
 use crate::file::{self, is_same};
-use crate::plural::counted;
 use crate::{database, os, solver};
 use arguments::FileKind;
 use clap::{FromArgMatches, Parser, Subcommand};
@@ -63,7 +61,7 @@ pub(crate) struct GlobalOptions {
     /// Print errors only, and what --json or -o - writes to standard output
     #[arg(short, long, global = true, help_heading = GLOBAL)]
     pub quiet: bool,
-    /// Print every table and line of a result
+    /// Print every table and line of a result, and every warning
     #[arg(short, long, global = true, help_heading = GLOBAL, conflicts_with = "quiet")]
     pub verbose: bool,
     /// Exit with code 3 if there was damage or a warning
@@ -109,22 +107,14 @@ pub(crate) enum Outcome {
     Partly,
 }
 
-/// Warnings that a command prints without --verbose.
+/// Warnings that are printed at once without --verbose, and one in place of "1 further".
 const SHOWN_WARNINGS: usize = 20;
 
-/// Where many cases have warnings, the first of them, and how many more there are of which kind.
+/// Where many cases have warnings, the first of them, and how many more there are.
 fn shown_of(mut warnings: Vec<String>) -> Vec<String> {
-    let further = warnings.split_off(warnings.len().min(SHOWN_WARNINGS));
-    let mut kinds: BTreeMap<&str, usize> = BTreeMap::new();
-    for warning in &further {
-        // "case: kind: what is wrong".
-        let kind = warning.split(": ").nth(1).filter(|kind| !kind.contains(' '));
-        *kinds.entry(kind.unwrap_or("other")).or_default() += 1;
-    }
-    if !further.is_empty() {
-        let kinds: Vec<String> = kinds.iter().map(|(kind, n)| format!("{n} × {kind}")).collect();
-        let count = counted(further.len(), "further warning");
-        warnings.push(format!("{count}, {}: --verbose", kinds.join(", ")));
+    if warnings.len() > SHOWN_WARNINGS + 1 {
+        let further = warnings.split_off(SHOWN_WARNINGS).len();
+        warnings.push(format!("{further} further warnings: --verbose prints them"));
     }
     warnings
 }
@@ -382,23 +372,5 @@ fn print_error(error: &(dyn Error + 'static)) {
     output::eprint_excerpt(failure::place(error));
     for cause in failure::causes(error) {
         output::eprint_line(&format!("  because: {cause}"));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn many_warnings_are_counted_by_kind() {
-        let of = |n: usize| -> Vec<String> {
-            let kind = |k: usize| ["contact: late", "sampling: coarse", "ends early"][k % 3];
-            (0..n).map(|k| format!("g/r{k}: {}", kind(k))).collect()
-        };
-        assert_eq!(shown_of(of(20)), of(20));
-        let shown = shown_of(of(1_020));
-        assert_eq!(shown[..20], of(20));
-        let last = "1000 further warnings, 333 × contact, 334 × other, 333 × sampling: --verbose";
-        assert_eq!(shown[20..], [last]);
     }
 }

@@ -101,29 +101,26 @@ pub(super) fn merge_labels(case: &mut Case, tags: Vec<String>, notes: Vec<String
     }
 }
 
-/// From this size on one case is changed without reading the others. Smaller files are written anew, which leaves no gaps
-/// where texts were.
+/// From this size on one case is changed without the others. Smaller files are written anew, which leaves no gaps where texts
+/// were.
 const LARGE_BYTES: u64 = 32 << 20;
 
 /// The case, if the selection names one and no more, and the file is large.
-fn one_of_a_large_file(path: &Path, selection: &Selection) -> Option<Case> {
-    let Selection { groups, cases, speed: None, tags } = selection else { return None };
-    let ([name], [] | [_], []) = (&cases[..], &groups[..], &tags[..]) else { return None };
-    if accepts_changed() || std::fs::metadata(path).ok()?.len() < LARGE_BYTES {
-        return None;
+fn one_of_a_large_file(path: &Path, selection: &Selection) -> Result<Option<Case>, Error> {
+    let Selection { groups, cases, speed: None, tags } = selection else { return Ok(None) };
+    let ([name], [] | [_], []) = (&cases[..], &groups[..], &tags[..]) else { return Ok(None) };
+    // What is not a file is found, and said, where all cases are read.
+    if accepts_changed() || !std::fs::metadata(path).is_ok_and(|meta| meta.len() >= LARGE_BYTES) {
+        return Ok(None);
     }
-    let (group, name) = match name.split_once('/') {
+    let (own, name) = match name.split_once('/') {
         Some((group, name)) => (Some(group), name),
         None => (None, name.as_str()),
     };
-    let asked = groups.first().map(String::as_str);
-    let group = if group.is_none_or(|group| asked.is_none_or(|asked| asked == group)) {
-        group.or(asked)
-    } else {
-        return None;
-    };
-    // Whatever is wrong is found once more, and said, where all cases are read.
-    Database::read_case(path, group, name).ok()
+    match (own, groups.first().map(String::as_str)) {
+        (Some(own), Some(asked)) if own != asked => Ok(None),
+        (own, asked) => Database::read_case_alone(path, own.or(asked), name),
+    }
 }
 
 /// Changes tags and notes of the chosen cases of the database at `path`; returns these as they are
@@ -135,14 +132,13 @@ pub(crate) fn label(
 ) -> Result<Vec<Case>, Error> {
     labels.check()?;
     let _lock = WriterLock::take(path)?;
-    if let Some(mut case) = one_of_a_large_file(path, selection) {
+    if let Some(mut case) = one_of_a_large_file(path, selection)? {
         labels.check_removed(path, &[&case])?;
         let before = case.provenance.clone();
         labels.apply(&mut case);
-        if before != case.provenance {
-            database::replace_labels(path, &case)?;
+        if before == case.provenance || database::replace_labels(path, &case)? {
+            return Ok(vec![case]);
         }
-        return Ok(vec![case]);
     }
     let mut database = Database::read(path)?;
     let chosen = selection.find(path, &database)?;

@@ -1,8 +1,8 @@
 //! Curating databases: cases are chosen, removed, renamed, copied, joined, tagged, compared and
 //! written as tables.
 //!
-//! Every function that changes a database locks it, reads it, changes it in memory and puts the new
-//! file in the old one's place: a killed program leaves the one or the other, and a second writer
+//! Every function that changes a database locks it, reads it, changes it in memory (one case of a large file: in a copy of the
+//! file) and puts the new file in the old one's place: a killed program leaves the one or the other, and a second writer
 //! gets an error.
 
 mod croissant;

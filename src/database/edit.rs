@@ -1,6 +1,6 @@
-//! Rewriting a database file that contains objects of other programs: a copy of the file is
-//! edited, read back to check that none of them is missing, and renamed into place. So
-//! their links, types and attributes stay as they were encoded.
+//! Rewriting a database file that contains objects of other programs, and one case of a large file: a copy of the file is
+//! edited, read back to check that nothing is missing, and renamed into place. So
+//! links, types and attributes stay as they were encoded.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::Path;
@@ -64,38 +64,56 @@ pub(super) fn write_keeping(
     })
 }
 
-/// Writes a case, whose tags or notes alone have changed, into a copy of the file at `path`, which takes its place. The
-/// other cases are copied, not read.
-pub(crate) fn replace_labels(path: &Path, case: &Case) -> Result<(), Error> {
-    if layout::open(path)?.version != VERSION {
-        let mut database = Database::read(path)?;
-        database.put(case.clone())?;
-        return database.write(path);
-    }
+/// Writes a case, whose tags or notes alone have changed, into a copy of the file at `path`, which takes its place; the
+/// other cases are copied, not read. `false` if the file is such that the crate cannot edit it.
+///
+/// # Errors
+/// If the file cannot be written, and if anything else in it would change; the old file is unchanged.
+pub(crate) fn replace_labels(path: &Path, case: &Case) -> Result<bool, Error> {
     let CaseId { group, name, .. } = &case.id;
-    let failed = |why: String| {
+    let failed = |why: &str| {
         let path = path.display();
         error!(Database, "{path}: {group}/{name} cannot be changed: {why}; the file is unchanged")
     };
-    write_by_path(path, |draft| {
+    let before = around(path, case)?;
+    let written = write_by_path(path, |draft| {
         fs::copy(path, draft).map_err(|source| Error::io(path, source))?;
-        let edit = || -> Result<(), EditError> {
-            let file = open(draft)?;
-            let found = file.root().group(group)?.group(name)?;
-            replace_attributes(&found, layout::with_hashes(&Database::default(), case)?)?;
-            drop(found);
-            Ok(file.close()?)
-        };
-        edit().map_err(|error| match error {
-            EditError::Hdf5(error) => failed(error.to_string()),
-            EditError::Content(error) => error,
-        })?;
-        if Database::read_case(draft, Some(group), name)? == *case {
-            Ok(())
-        } else {
-            Err(failed("it does not read back as it was written".into()))
+        let file = open(draft)?;
+        let found = file.root().group(group)?.group(name)?;
+        replace_attributes(&found, layout::with_hashes(&Database::default(), case)?)?;
+        drop(found);
+        file.close()?;
+        if around(draft, case)? != before {
+            return Err(failed("other objects of the file would be lost").into());
         }
-    })
+        if Database::read_case(draft, Some(group), name)? != *case {
+            return Err(failed("it does not read back as it was written").into());
+        }
+        Ok(())
+    });
+    match written {
+        Ok(()) => Ok(true),
+        Err(EditError::Hdf5(_)) => Ok(false),
+        Err(EditError::Content(error)) => Err(error),
+    }
+}
+
+/// All members of the root and of the group of a case, and what others have put into it: the objects that an edit of the case
+/// writes anew.
+fn around(path: &Path, case: &Case) -> Result<BTreeSet<Item>, Error> {
+    let CaseId { group, name, .. } = &case.id;
+    let opened = layout::open(path)?;
+    let mut all = Foreign(BTreeSet::new());
+    let mut walk = || -> Result<(), hdf5::Error> {
+        let root = opened.file.root();
+        let of_group = root.group(group)?;
+        let none = HashSet::new();
+        all.members("", &root, |_| false, &none, &[])?;
+        all.members(group, &of_group, |_| false, &none, &[])?;
+        all.of_case(&format!("{group}/{name}"), &of_group.group(name)?)
+    };
+    opened.check(group, walk())?;
+    Ok(all.0)
 }
 
 enum EditError {

@@ -131,6 +131,31 @@ impl Database {
         all.case(path, group, case).cloned()
     }
 
+    /// Reads one case, of `group` or of the only group that has it, without a look at the others; `None` if there is no such case,
+    /// or several, or the file is of an earlier layout.
+    ///
+    /// # Errors
+    /// As for [`Database::read_case`].
+    pub(crate) fn read_case_alone(
+        path: &Path,
+        group: Option<&str>,
+        case: &str,
+    ) -> Result<Option<Case>, Error> {
+        let opened = layout::open(path)?;
+        if opened.version != layout::VERSION {
+            return Ok(None);
+        }
+        let groups = match group {
+            Some(group) => vec![group.to_string()],
+            None => opened.file.root().groups().unwrap_or_default(),
+        };
+        let mut found = groups.iter().filter(|group| opened.find(Some(group), case).is_some());
+        match (found.next(), found.next()) {
+            (Some(group), None) => Self::read_case(path, Some(group), case).map(Some),
+            _ => Ok(None),
+        }
+    }
+
     /// Writes the database to `path` as a whole. What others have put into the file that is
     /// there, attributes, datasets and groups, stays in it.
     ///

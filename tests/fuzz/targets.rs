@@ -116,11 +116,9 @@ fn model(bytes: &[u8]) {
     }
 }
 
-/// A folder of this process, in memory where the system has one.
-fn folder() -> PathBuf {
-    let shared = Path::new("/dev/shm");
-    let base = if shared.is_dir() { shared.into() } else { std::env::temp_dir() };
-    let folder = base.join(format!("crumple-fuzz-{}", std::process::id()));
+/// A folder of this process; who runs the targets removes it.
+pub fn folder() -> PathBuf {
+    let folder = std::env::temp_dir().join(format!("crumple-fuzz-{}", std::process::id()));
     fs::create_dir_all(&folder).expect("the folder can be made");
     folder
 }
