@@ -1673,3 +1673,52 @@ fn an_earlier_validation_is_compared() {
         says(&crumple_fails(here, 1, "validate curves.h5 --against old.json"), message);
     }
 }
+
+/// A run at nearly the speed of another says nothing of the interval between them and the next: it makes neither errors nor
+/// bands smaller, nor the choice surer.
+#[test]
+fn a_speed_that_nearly_repeats_another_promises_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = build_fixture(folder.path(), "lead-car-wall");
+    let database = Database::read(&path).unwrap();
+    let of = |name: &str| {
+        database.cases("lead-car-wall").iter().find(|case| case.id.name == name).unwrap().clone()
+    };
+    let repeated = |km_per_h: f64| {
+        let mut case = of("36kmh");
+        case.id.name = format!("{km_per_h}kmh");
+        let factor = km_per_h / 36.0;
+        case.conditions.speed.m_per_s *= factor;
+        case.curves.closing_speed_m_per_s.iter_mut().for_each(|speed| *speed *= factor);
+        case
+    };
+    let found = |more: &[f64]| {
+        let mut cases = ["25kmh", "36kmh", "60kmh"].map(of).to_vec();
+        cases.extend(more.iter().map(|speed| repeated(*speed)));
+        cases.sort_by(|a, b| a.conditions.speed.m_per_s.total_cmp(&b.conditions.speed.m_per_s));
+        let best = Selection::Best(Purpose::Vehicle);
+        validate("lead-car-wall", &cases, &ModelKind::all(0), best).unwrap()
+    };
+    let alone = found(&[]);
+    for more in [&[36.3][..], &[36.1], &[35.7, 36.3]] {
+        let twice = found(more);
+        assert_eq!(twice.chosen, alone.chosen, "{more:?}");
+        let [before, after] = [&alone, &twice].map(|found| {
+            let means = found.means.iter().find(|means| means.model == found.chosen).unwrap();
+            (means.force_l1, found.band.as_ref().unwrap())
+        });
+        assert!((after.0 / before.0 - 1.0).abs() < 0.15, "{more:?}: {} {}", before.0, after.0);
+        let widths = [before.1, after.1].map(|band| band.pointwise_share);
+        assert!(widths[1] > 0.85 * widths[0], "{more:?}: {widths:?}");
+        assert!((after.1.span_m_per_s / before.1.span_m_per_s - 1.0).abs() < 0.01);
+        let note = "speeds that nearly repeat another are left out together with it: ";
+        assert!(twice.notes.iter().any(|said| said.starts_with(note)), "{:?}", twice.notes);
+        assert_eq!(
+            twice.rows.iter().filter(|row| row.inner).count(),
+            alone.rows.iter().filter(|row| row.inner).count()
+        );
+    }
+    // Speeds of their own.
+    let apart = found(&[38.0, 48.0]);
+    assert!(apart.notes.iter().all(|said| !said.contains("nearly repeat")), "{:?}", apart.notes);
+}

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::reference::{MotionErrors, Reference};
 use crate::curve::force_curve::ForceCurve;
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
-use crate::dataset::{OTHER_MASS, TrainingCase, TrainingSet, grid, is_same_speed};
+use crate::dataset::{OTHER_MASS, TrainingCase, TrainingSet, grid, is_within, nearly_same};
 use crate::error::{Error, error};
 use crate::signal::l1_ratio;
 use crate::signal::peaks::matched_peaks;
@@ -53,11 +53,11 @@ pub(crate) struct LeftOutCase<'a> {
 }
 
 impl<'a> LeftOutCase<'a> {
-    /// Leaves out all cases of the speed of the set's case `index`.
+    /// Leaves out all cases of the speed of the set's case `index`, and of speeds that nearly repeat it.
     pub(crate) fn new(set: &'a TrainingSet, index: usize) -> Result<Self, NotLeftOut> {
         let own = &set.cases[index];
-        let v = own.speed_m_per_s;
-        let rest = set.with(|case| !is_same_speed(case.speed_m_per_s, v));
+        let left_out = nearly_same(&set.speeds_m_per_s(), own.speed_m_per_s);
+        let rest = set.with(|case| !is_within(case.speed_m_per_s, left_out));
         Self::of(own, rest)
     }
 

@@ -17,7 +17,7 @@ use super::left_out::{Answers, LeftOutCase, LeftOutRun, Score, query_of};
 use super::scatter::scatter;
 use super::subsets::OverSubsets;
 use crate::curve::{Case, ForceKind, group};
-use crate::dataset::{TrainingSet, is_same_speed};
+use crate::dataset::{TrainingSet, is_same_speed, is_within, nearly_same};
 use crate::error::Error;
 use crate::plural::counted;
 use crate::rating::acceptance::Acceptance;
@@ -281,11 +281,13 @@ pub(super) fn left_out_cases(
         return Err(format!("the group has {speeds}: leaving one out needs at least 3"));
     }
     let (mut left_out, mut notes) = (Vec::new(), Vec::new());
-    let all = set.cases.len();
+    let (judged, repeated) = without_repeated(set);
+    notes.extend(repeated);
+    let all = judged.len();
     let chosen: Vec<usize> = if all > most_speeds {
-        (0..most_speeds).map(|k| k * (all - 1) / (most_speeds - 1)).collect()
+        (0..most_speeds).map(|k| judged[k * (all - 1) / (most_speeds - 1)]).collect()
     } else {
-        (0..all).collect()
+        judged
     };
     for index in chosen {
         match LeftOutCase::new(set, index) {
@@ -294,6 +296,32 @@ pub(super) fn left_out_cases(
         }
     }
     Ok((left_out, notes))
+}
+
+/// The cases that are judged, of those that nearly repeat each other one: as several they would count as evidence several times. And
+/// a note on the others.
+fn without_repeated(set: &TrainingSet) -> (Vec<usize>, Option<String>) {
+    let speeds = set.speeds_m_per_s();
+    let (mut judged, mut others): (Vec<usize>, Vec<String>) = (Vec::new(), Vec::new());
+    for (k, case) in set.cases.iter().enumerate() {
+        let left_out = nearly_same(&speeds, case.speed_m_per_s);
+        let repeats = judged.iter().map(|&j| &set.cases[j]).find(|other| {
+            is_within(other.speed_m_per_s, left_out)
+                && !is_same_speed(other.speed_m_per_s, case.speed_m_per_s)
+                && other.case.conditions.parameters == case.case.conditions.parameters
+        });
+        match repeats {
+            Some(other) => others.push(format!("{} with {}", case.name, other.name)),
+            None => judged.push(k),
+        }
+    }
+    let note = (!others.is_empty()).then(|| {
+        format!(
+            "speeds that nearly repeat another are left out together with it: {}",
+            others.join(", ")
+        )
+    });
+    (judged, note)
 }
 
 /// Every model at every case, in this order.
@@ -433,10 +461,10 @@ pub(crate) fn add_nested(
     let trials: Vec<LeftOutRun<'_>> = left_out
         .par_iter()
         .map(|held| {
-            let v = held.own.speed_m_per_s;
+            let left_out = nearly_same(&set.speeds_m_per_s(), held.own.speed_m_per_s);
             let others: Vec<Case> = cases
                 .iter()
-                .filter(|c| !is_same_speed(c.conditions.speed.m_per_s, v))
+                .filter(|c| !is_within(c.conditions.speed.m_per_s, left_out))
                 .cloned()
                 .collect();
             let predicted = choose_and_fit(&group, &others, seed).and_then(|model| {

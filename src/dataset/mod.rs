@@ -258,6 +258,41 @@ pub(crate) fn is_same_speed(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() <= SAME_SPEED
 }
 
+/// Speeds that nearly repeat one another lie within this share of the lowest, and of the intervals next to them.
+const NEARLY_SAME: (f64, f64) = (0.05, 0.1);
+
+/// The lowest and highest of the rising `speeds` that nearly repeat `v`, which is one of them: left out without the others it would be
+/// predicted over an interval far shorter than those of the series. `(v, v)` if the others are further away.
+pub(crate) fn nearly_same(speeds: &[f64], v: f64) -> (f64, f64) {
+    let (of_speed, of_interval) = NEARLY_SAME;
+    let mut low = speeds.partition_point(|&s| s < v && !is_same_speed(s, v));
+    let mut high = speeds.partition_point(|&s| s <= v || is_same_speed(s, v)) - 1;
+    let mut found = (v, v);
+    loop {
+        let below = low.checked_sub(1).map(|k| speeds[low] - speeds[k]);
+        let above = speeds.get(high + 1).map(|next| next - speeds[high]);
+        let interval = below.into_iter().chain(above).reduce(f64::min);
+        let Some(interval) = interval else { return found };
+        if speeds[high] - speeds[low] < of_interval * interval {
+            found = (speeds[low], speeds[high]);
+        }
+        // The nearer of the two next.
+        if above.is_none_or(|above| below.is_some_and(|below| below < above)) {
+            low -= 1
+        } else {
+            high += 1
+        }
+        if speeds[high] > (1.0 + of_speed) * speeds[low] {
+            return found;
+        }
+    }
+}
+
+/// Whether a speed is in such a range.
+pub(crate) fn is_within(speed: f64, (low, high): (f64, f64)) -> bool {
+    (low <= speed || is_same_speed(low, speed)) && (speed <= high || is_same_speed(high, speed))
+}
+
 /// Most steps of a grid: 40 m of [`GRID_M`], more than any vehicle crushes.
 const MOST_STEPS: f64 = 20_000.0;
 
@@ -475,4 +510,30 @@ fn loading_run(case: &Arc<TrainingCase>) -> Option<LoadingRun> {
         contact_n: over(&case.envelope)?,
         closing_m_per_s: over(&case.motion.closing_speed)?,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::nearly_same;
+
+    #[test]
+    fn speeds_that_nearly_repeat_one_another_are_found() {
+        #[rustfmt::skip]
+        let cases: [(&[f64], f64, (f64, f64)); 9] = [
+            (&[25.0, 36.0, 60.0], 36.0, (36.0, 36.0)),
+            (&[25.0, 36.0, 36.3, 60.0], 36.0, (36.0, 36.3)),
+            (&[25.0, 35.7, 36.0, 36.3, 60.0], 36.0, (35.7, 36.3)),
+            (&[25.0, 35.7, 36.0, 36.3, 60.0], 25.0, (25.0, 25.0)),
+            (&[25.0, 25.1, 36.0, 36.1, 60.0, 60.1], 60.1, (60.0, 60.1)),
+            // A tenth of the next interval or more, and a fine series beside a speed far away.
+            (&[25.0, 36.0, 38.0, 60.0], 36.0, (36.0, 36.0)),
+            (&[10.0, 11.0, 12.0, 13.0, 100.0], 12.0, (12.0, 12.0)),
+            // Runs of one speed are one.
+            (&[25.0, 36.0, 36.0, 60.0], 36.0, (36.0, 36.0)),
+            (&[36.0], 36.0, (36.0, 36.0)),
+        ];
+        for (speeds, v, expected) in cases {
+            assert_eq!(nearly_same(speeds, v), expected, "{v} of {speeds:?}");
+        }
+    }
 }
