@@ -306,7 +306,8 @@ fn without_repeated(set: &TrainingSet) -> (Vec<usize>, Option<String>) {
     for (k, case) in set.cases.iter().enumerate() {
         let left_out = nearly_same(&speeds, case.speed_m_per_s);
         let repeats = judged.iter().map(|&j| &set.cases[j]).find(|other| {
-            is_within(other.speed_m_per_s, left_out)
+            !other.truncated
+                && is_within(other.speed_m_per_s, left_out)
                 && !is_same_speed(other.speed_m_per_s, case.speed_m_per_s)
                 && other.case.conditions.parameters == case.case.conditions.parameters
         });

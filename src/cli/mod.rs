@@ -107,7 +107,7 @@ pub(crate) enum Outcome {
     Partly,
 }
 
-/// Warnings that are printed at once without --verbose, and one in place of "1 further".
+/// Warnings that are printed at once without --verbose; a single further one is printed as well.
 const SHOWN_WARNINGS: usize = 20;
 
 /// Where many cases have warnings, the first of them, and how many more there are.
