@@ -57,7 +57,7 @@ struct GivenArgs {
     /// Node of the other body of a pair
     #[arg(long, requires = "node")]
     minus_node: Option<i64>,
-    /// Contact force as FILE:ID[:SIDE][:COMPONENT], such as rcforc:3:surfa
+    /// Contact force as FILE:ID[:SIDE][:COMPONENT], such as rcforc:3:surfa; the sum of several as FILE:ID+ID
     #[arg(long)]
     force: Option<GivenForce>,
     /// Mass of the body, or of each body of a pair, such as 24t

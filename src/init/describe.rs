@@ -20,6 +20,8 @@ use crate::unit::{SPEED, UnitSystem, km_per_h};
 
 /// Bodies whose speed lies along an axis by less than this share move obliquely.
 const ALONG: f64 = 0.99;
+/// A record with so many times the usual interval makes the study coarse.
+const COARSE: f64 = 2.0;
 /// Masses of a pair that differ by more, according to their velocities, are not equal.
 const UNEQUAL: f64 = 0.1;
 
@@ -90,7 +92,7 @@ impl Facts<'_> {
         }
         let from = match (kind, force) {
             (StudyKind::Pair, Some(force)) => {
-                let from = format!("two bodies move, and {} {} drives them apart", force.file, force.id);
+                let from = format!("two bodies move, and {} drives them apart", force.label());
                 return Proposed::found(*kind, Computed, from);
             }
             (StudyKind::Pair, None) => format!(
@@ -159,14 +161,18 @@ impl Facts<'_> {
         let component = named.as_ref().and_then(|named| named.component.clone());
         let source = ForceSource::Contact {
             file: force.file.into(),
-            id: force.id,
-            also: force.also.clone(),
+            id: force.ids[0],
+            also: force.ids[1..].to_vec(),
             side: named.as_ref().and_then(|named| named.side).or(force.side),
             component: component.unwrap_or_else(|| force.component.into()),
         };
         if named.is_some() {
             Proposed::found(source, Given, "by --force")
-        } else if !force.also.is_empty() {
+        } else if force.ids.len() > 1 && self.recipe.beside.ids.is_empty() {
+            let from =
+                "they act one after the other: the bodies follow none of them alone, but their sum";
+            Proposed::found(source, Computed, from)
+        } else if force.ids.len() > 1 {
             let from = "they share the load: together they give the bodies their mass";
             Proposed::found(source, Computed, from)
         } else if other_forces.is_empty() {
@@ -245,11 +251,11 @@ impl Facts<'_> {
             record.over_momentum(given).is_some_and(|ratio| is_near(ratio, 1.0, SAME_MASS))
         };
         if let Some(force) = &recipe.force
-            && force.also.is_empty()
+            && let [id] = force.ids[..]
             && self.hints.force.is_none()
             && !self.records.iter().any(is_whole)
         {
-            let (file, id, whole) = (force.file, force.id, recipe.beside.whole);
+            let (file, whole) = (force.file, recipe.beside.whole);
             let listed =
                 |ids: &[i64]| ids.iter().map(i64::to_string).collect::<Vec<_>>().join(", ");
             let ids = listed(&recipe.beside.ids);
@@ -270,6 +276,20 @@ impl Facts<'_> {
                 "the force is that of a section, which may carry only part of what stops the body"
                     .into(),
             );
+        }
+        let mut by_interval: Vec<(&Record, &Impact)> = self.impacts().collect();
+        by_interval.sort_by(|a, b| a.1.interval_s.total_cmp(&b.1.interval_s));
+        if let Some((_, usual)) = by_interval.get(by_interval.len().saturating_sub(1) / 2)
+            && let Some((record, coarsest)) = by_interval.last()
+            && coarsest.interval_s > COARSE * usual.interval_s
+        {
+            let ms = |impact: &Impact| digits(impact.interval_s * 1e3);
+            warnings.push(format!(
+                "run {}: a state every {} ms, the others every {} ms: sampling and filter of all follow the coarsest; leave it out if they matter more",
+                record.run.name,
+                ms(coarsest),
+                ms(usual)
+            ));
         }
         let oblique = self.records.iter().find(|record| record.run.survey.aligned < ALONG);
         if let Some(Record { run, .. }) = oblique {

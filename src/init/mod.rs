@@ -63,13 +63,13 @@ pub(crate) struct UserHints {
     pub group: Option<String>,
 }
 
-/// A force as `FILE:ID[:SIDE][:COMPONENT]`, such as `rcforc:3:surfa`.
+/// A force as `FILE:ID[+ID…][:SIDE][:COMPONENT]`, such as `rcforc:3:surfa` or, of two walls together, `rwforc:1+2`.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct GivenForce {
     /// One of `rwforc`, `rcforc`, `secforc`, `rbdout`.
     pub(crate) file: String,
-    /// Number of the wall, interface or section.
-    pub(crate) id: i64,
+    /// Numbers of the walls, interfaces or sections, each once.
+    pub(crate) ids: Vec<i64>,
     pub(crate) side: Option<Side>,
     /// Such as `normal_force`.
     pub(crate) component: Option<String>,
@@ -82,14 +82,18 @@ impl FromStr for GivenForce {
         let wrong = || {
             error!(
                 Usage,
-                "\"{text}\" is not a force: write FILE:ID[:SIDE][:COMPONENT] with a file of {}, such as rwforc:1 or rcforc:3:surfa:x_force",
+                "\"{text}\" is not a force: write FILE:ID[:SIDE][:COMPONENT] with a file of {}, such as rwforc:1 or rcforc:3:surfa:x_force; for the sum of several FILE:ID+ID",
                 FORCES.join(", ")
             )
         };
         let mut parts = text.split(':');
         let file = parts.next().filter(|file| FORCES.contains(file)).ok_or_else(wrong)?;
-        let id = parts.next().and_then(|id| id.parse().ok()).ok_or_else(wrong)?;
-        let mut given = Self { file: file.into(), id, side: None, component: None };
+        let ids = parts.next().unwrap_or_default().split('+').map(str::parse);
+        let ids: Vec<i64> = ids.collect::<Result<_, _>>().map_err(|_| wrong())?;
+        if (1..ids.len()).any(|k| ids[..k].contains(&ids[k])) {
+            return Err(wrong());
+        }
+        let mut given = Self { file: file.into(), ids, side: None, component: None };
         for part in parts {
             match Side::parse(part) {
                 Some(side) if given.side.is_none() && given.component.is_none() => {
@@ -112,12 +116,24 @@ mod tests {
     #[test]
     fn forces_are_read() {
         let force: GivenForce = "rcforc:3:slave:x_force".parse().unwrap();
-        assert_eq!((&*force.file, force.id, force.side), ("rcforc", 3, Some(Side::SurfA)));
+        assert_eq!(
+            (&*force.file, &force.ids[..], force.side),
+            ("rcforc", &[3][..], Some(Side::SurfA))
+        );
         assert_eq!(force.component.as_deref(), Some("x_force"));
         assert_eq!("rwforc:1".parse::<GivenForce>().unwrap().component, None);
-        for wrong in
-            ["rwforc", "nodout:1", "rcforc:x", "rcforc:3:left", "rcforc:3:x_force:surfa", ""]
-        {
+        assert_eq!("rwforc:1+2".parse::<GivenForce>().unwrap().ids, [1, 2]);
+        let wrong = [
+            "rwforc",
+            "nodout:1",
+            "rcforc:x",
+            "rcforc:3:left",
+            "rcforc:3:x_force:surfa",
+            "",
+            "rwforc:1+1",
+            "rwforc:1+",
+        ];
+        for wrong in wrong {
             assert!(wrong.parse::<GivenForce>().is_err(), "{wrong}");
         }
     }

@@ -13,10 +13,10 @@ use rayon::prelude::*;
 use super::describe::{Facts, stated_units};
 use super::folders::{Folders, LeftOut, Reason, names, no_usable_run, seen_from};
 use super::measure::{Impact, SAME_MASS, is_near};
-use super::recipe::CommonRecipe;
+use super::recipe::{CommonRecipe, sum_of_forces};
 use super::record::{Record, Run};
 use super::sources::Sources;
-use super::survey::Survey;
+use super::survey::{ForceCandidate, Survey};
 use super::write::{Proposal, Proposed};
 use super::{GivenForce, UserHints, units};
 use crate::curve::contact::milliseconds;
@@ -44,7 +44,15 @@ pub(crate) fn propose(
     }
     let group = folders.group();
     let mut left_out = folders.left_out;
-    let runs = survey(&folders.runs, hints, &mut left_out, &progress);
+    let mut runs = survey(&folders.runs, hints, &mut left_out, &progress);
+    if let Some((file, ids)) = runs.iter().find_map(|run| sum_of_forces(&run.survey))
+        && hints.force.is_none()
+    {
+        // What succeeded once succeeds again.
+        runs.par_iter_mut().for_each(|Run { sources, survey, .. }| {
+            *survey = Survey::of(sources, Some((file, &ids))).unwrap_or_else(|_| survey.clone());
+        });
+    }
     let surveys: Vec<&Survey> = runs.iter().map(|run| &run.survey).collect();
     let Some(recipe) = CommonRecipe::of(&surveys, hints) else {
         return Err(no_usable_run(&left_out, &[]));
@@ -106,7 +114,7 @@ fn survey(
             }
         }
     }
-    let named = hints.force.as_ref().map(|force| (&*force.file, force.id));
+    let named = hints.force.as_ref().map(|force| (&*force.file, &force.ids[..]));
     let (runs, out): (Vec<Run>, Vec<LeftOut>) =
         unique.into_par_iter().partition_map(|(path, name, sources)| {
             let survey = Survey::of(&sources, named);
@@ -126,19 +134,19 @@ fn refuse_hints(
     surveys: &[&Survey],
     hints: &UserHints,
 ) -> Result<(), Error> {
-    if let Some(GivenForce { file, id, .. }) = &hints.force
+    if let Some(GivenForce { file, ids, .. }) = &hints.force
         && recipe.force.is_none()
     {
         let forces = surveys.iter().flat_map(|survey| &survey.forces);
-        let known: BTreeSet<String> =
-            forces.map(|force| format!("{} {}", force.file, force.id)).collect();
+        let known: BTreeSet<String> = forces.map(ForceCandidate::label).collect();
+        let ids = ids.iter().map(i64::to_string).collect::<Vec<_>>().join(" + ");
         let known = match known.len() {
             0 => "none".into(),
             _ => known.into_iter().collect::<Vec<_>>().join(", "),
         };
         return Err(error!(
             Study,
-            "no run has a force {file} {id} along the motion: there are {known}"
+            "no run has a force {file} {ids} along the motion: there are {known}"
         ));
     }
     if hints.half_model {
@@ -194,7 +202,7 @@ fn adding_shares(
     let Some(force) = recipe.force.as_mut().filter(|_| may_share) else {
         return (recipe, records);
     };
-    force.also = recipe.beside.ids.clone();
+    force.ids.extend(&recipe.beside.ids);
     let runs = records.into_iter().map(|record| record.run).collect();
     recipe.members = recipe.members.into_iter().filter(Result::is_ok).collect();
     let records = record(runs, &recipe, left_out);

@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use super::UserHints;
-use super::sources::Fit;
+use super::sources::{Fit, largest};
 use super::survey::{Body, ForceCandidate, NodeCandidate, STOPPED, Survey};
 use crate::curve::recipe::DisplacementComponent;
 use crate::study::StudyKind;
@@ -69,7 +69,7 @@ pub(crate) struct Alternative {
 }
 
 /// What runs must share to have one recipe.
-type Key = (StudyKind, DisplacementComponent, Option<(&'static str, i64)>);
+type Key = (StudyKind, DisplacementComponent, Option<(&'static str, Vec<i64>)>);
 
 /// A run's survey with what explains it best.
 struct RunView<'a> {
@@ -136,7 +136,7 @@ impl<'a> RunView<'a> {
     /// All runs, each with what explains it best: the force that the caller names if he does.
     fn all(surveys: &[&'a Survey], hints: &UserHints, kind: Option<StudyKind>) -> Vec<Self> {
         let best = |survey: &Survey| match &hints.force {
-            Some(named) => of_force(survey, survey.force(&named.file, named.id)?, kind),
+            Some(named) => of_force(survey, survey.force(&named.file, &named.ids)?, kind),
             None => best_of(survey, kind).or_else(|| without_force(survey, kind)),
         };
         let view = |survey: &&'a Survey| {
@@ -153,7 +153,8 @@ impl<'a> RunView<'a> {
 
     fn key(&self) -> Key {
         let best = self.best.as_ref();
-        let force = best.and_then(|best| self.moved_by(best)).map(|force| (force.file, force.id));
+        let force =
+            best.and_then(|best| self.moved_by(best)).map(|force| (force.file, force.ids.clone()));
         (best.map_or(StudyKind::Wall, |best| best.kind), self.survey.direction, force)
     }
 
@@ -188,19 +189,20 @@ impl<'a> RunView<'a> {
         if self.survey.direction != *direction {
             return Err(format!("it moves along {}", self.survey.direction.axis()));
         }
-        let explained = if let Some((file, id)) = *force {
+        let explained = if let Some((file, ids)) = force {
             let wanted = kind.unwrap_or(*of_others);
-            let force = self.survey.force(file, id);
+            let force = self.survey.force(file, ids);
             let found = force.and_then(|force| of_force(self.survey, force, Some(wanted)));
             let is_related =
                 |e: &Explanation| e.residual < RELATED || hints.force.is_some() || !self.counts;
             let own = self.best.as_ref().and_then(|best| self.moved_by(best));
+            let ids = ids.iter().map(i64::to_string).collect::<Vec<_>>().join(" + ");
             Some(found.filter(is_related).ok_or_else(|| match (own, force) {
                 (Some(own), _) => {
-                    format!("{file} {id} does not move its bodies, {} {} does", own.file, own.id)
+                    format!("{file} {ids} does not move its bodies, {} does", own.label())
                 }
-                (None, Some(_)) => format!("{file} {id} does not move its bodies"),
-                (None, None) => format!("it has no {file} {id} along the motion"),
+                (None, Some(_)) => format!("{file} {ids} does not move its bodies"),
+                (None, None) => format!("it has no {file} {ids} along the motion"),
             })?)
         } else if self.best.as_ref().is_some_and(|best| best.force.is_some()) {
             return Err("it has a contact force, the others have none".into());
@@ -344,7 +346,7 @@ fn chosen_force(views: &[RunView<'_>]) -> Option<(ForceCandidate, Vec<Alternativ
     let (first, force) = *of_members.first()?;
     let others = first.forces.iter().enumerate();
     let others: Vec<(&ForceCandidate, f64)> = others
-        .filter(|(_, other)| (other.file, other.id) != (force.file, force.id))
+        .filter(|(_, other)| other.file != force.file || !force.ids.contains(&other.ids[0]))
         .filter_map(|(k, other)| Some((other, of_force(first, k, None)?.residual)))
         .filter(|(_, residual)| *residual < RELATED)
         .collect();
@@ -357,15 +359,15 @@ fn chosen_force(views: &[RunView<'_>]) -> Option<(ForceCandidate, Vec<Alternativ
         |other: &&ForceCandidate| other.side == force.side && last(other) * last(force) > 0.0;
     let (alike, opposite): (Vec<_>, Vec<_>) = shares.map(|(other, _)| *other).partition(is_alike);
     let beside = Beside {
-        ids: alike.iter().map(|other| other.id).collect(),
+        ids: alike.iter().flat_map(|other| &other.ids).copied().collect(),
         whole: 1.0 + alike.iter().map(|other| other.size() / force.size()).sum::<f64>(),
-        opposite: opposite.iter().map(|other| other.id).collect(),
+        opposite: opposite.iter().flat_map(|other| &other.ids).copied().collect(),
     };
     let others = others
         .into_iter()
         .take(NAMED)
         .map(|(other, residual)| Alternative {
-            id: format!("{} {}", other.file, other.id),
+            id: other.label(),
             about: format!(
                 "{}bodies follow it within {} %; its impulse is {} % of the chosen one's",
                 title_before(&other.title),
@@ -408,6 +410,8 @@ pub(super) fn names_centre_of_gravity(title: Option<&str>) -> bool {
 pub(super) const FOLLOWS: f64 = 0.1;
 /// A node that leaves more than this share of an impulse has nothing to do with it.
 pub(super) const RELATED: f64 = 0.3;
+/// A force joins a sum if the bodies follow that so much more closely.
+const WORTH: f64 = 0.8;
 /// Impulses that differ by less are equal.
 const EQUAL: f64 = 0.02;
 
@@ -505,6 +509,45 @@ pub(super) fn without_force(survey: &Survey, kind: Option<StudyKind>) -> Option<
     let bodies = survey.bodies.len();
     let pair = best_pair(bodies, |a, b| Some(opposed(survey, a, b)));
     chosen(kind, None, pair, (bodies > 0).then(|| (1.0, vec![0])))
+}
+
+/// Walls or interfaces of a file that act one after the other: a body follows none of the run's forces alone, but
+/// their sum.
+pub(super) fn sum_of_forces(survey: &Survey) -> Option<(&'static str, Vec<i64>)> {
+    let least = best_of(survey, None).map_or(1.0, |best| best.residual);
+    if least <= FOLLOWS {
+        return None;
+    }
+    let of_body = |change: &[f64], first: &ForceCandidate| {
+        let left = |impulse: &[f64]| {
+            let end = largest(impulse).min(change.len().saturating_sub(1));
+            Fit::of(&impulse[..=end], &change[..=end]).residual
+        };
+        let (mut ids, mut impulse) = (first.ids.clone(), first.impulse.clone());
+        loop {
+            let others = survey.forces.iter().filter(|other| {
+                (other.file, other.side) == (first.file, first.side) && !ids.contains(&other.ids[0])
+            });
+            let sums = others.map(|other| {
+                let sum: Vec<f64> =
+                    impulse.iter().zip(&other.impulse).map(|(a, b)| a + b).collect();
+                (left(&sum), other.ids[0], sum)
+            });
+            let next = sums.min_by(|a, b| a.0.total_cmp(&b.0));
+            match next.filter(|(residual, ..)| *residual < WORTH * left(&impulse)) {
+                Some((_, id, sum)) => (ids.push(id), impulse = sum),
+                None => return (left(&impulse), ids),
+            };
+        }
+    };
+    let contacts = survey.forces.iter().filter(|force| ["rwforc", "rcforc"].contains(&force.file));
+    let sums = contacts.flat_map(|first| {
+        let moving = survey.bodies.iter().filter(|body| !body.change.is_empty());
+        moving.map(move |body| (first.file, of_body(&body.change, first)))
+    });
+    let (file, (residual, mut ids)) = sums.min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
+    ids.sort_unstable();
+    (ids.len() > 1 && residual <= FOLLOWS.min(0.5 * least)).then_some((file, ids))
 }
 
 /// Whether the bodies of an explanation stop closing within the record: a run that died before says

@@ -3,7 +3,7 @@
 
 use std::path::PathBuf;
 
-use super::folders::Reason;
+use super::folders::{Reason, speed_in};
 use super::measure::{Impact, MassEstimates};
 use super::recipe::CommonRecipe;
 use super::sources::{Source, Sources, component, impulse, picked, rising, velocity};
@@ -89,7 +89,7 @@ impl Record {
             let unusable = |why: String| Reason::Unusable { why };
             let source = run.sources.force(chosen.file);
             let source = source.ok_or_else(|| unusable(format!("it has no {}", chosen.file)))?;
-            let ids = [&[chosen.id], &chosen.also[..]].concat();
+            let ids = &chosen.ids;
             let side = chosen.side;
             let wanted = ids.iter().map(|&id| WantedId { id, side }).collect();
             let read = source.read(Some(wanted), &[chosen.component])?;
@@ -197,6 +197,7 @@ impl Record {
             crush: (self.travel[end] - self.travel[begin]).abs(),
             loading_time: self.time[end] - self.time[begin],
             mass: self.masses_by_momentum().map(|(masses, _)| masses[0]),
+            named_m_per_s: speed_in(&self.run.name),
         }
     }
 

@@ -6,6 +6,7 @@
 //! follow at all. A force is the one between two bodies if some node follows it; a contact within
 //! a body is followed as well, but has a smaller impulse than what acts on the body from outside.
 
+use std::cmp::Reverse;
 use std::collections::HashMap;
 
 use super::folders::Reason;
@@ -30,6 +31,9 @@ const STANDS: f64 = 0.02;
 const KEPT_FORCES: usize = 12;
 /// A wall's normal force is taken if its impulse differs from that along the motion by less.
 const SAME_IMPULSE: f64 = 0.02;
+
+/// A file of forces and the numbers of those that are added.
+pub(super) type Named<'a> = (&'a str, &'a [i64]);
 
 /// What a run has to choose from.
 #[derive(Clone, Debug)]
@@ -72,9 +76,8 @@ pub(super) struct NodeCandidate {
 #[derive(Clone, Debug)]
 pub(super) struct ForceCandidate {
     pub file: &'static str,
-    pub id: i64,
-    /// Others of the file that share the load with it.
-    pub also: Vec<i64>,
+    /// Several that are added: they share the load, or act one after the other.
+    pub ids: Vec<i64>,
     /// `None` where it has no sides, or is one side only without saying which.
     pub side: Option<Side>,
     /// Whether the other side has the same force.
@@ -88,8 +91,8 @@ pub(super) struct ForceCandidate {
 }
 
 impl Survey {
-    /// Looks over a run. A recipe's force may be named, which is then kept however small it is.
-    pub(super) fn of(sources: &Sources, named: Option<(&str, i64)>) -> Result<Self, Reason> {
+    /// Looks over a run. A recipe's force may be named, which is then kept however small it is; several are added.
+    pub(super) fn of(sources: &Sources, named: Option<Named<'_>>) -> Result<Self, Reason> {
         let source = &sources.motion;
         let components = if source.has("x_velocity") {
             DisplacementComponent::ALL.map(DisplacementComponent::velocity)
@@ -113,13 +116,20 @@ impl Survey {
             forces.extend(force_candidates(source, direction, &time, named)?);
         }
         keep_largest(&mut forces, named);
+        if let Some((file, ids @ [_, _, ..])) = named
+            && let Some(source) = sources.force(file)
+        {
+            let is_there = |id: &i64| source.titles.keys().any(|entity| entity.id == *id);
+            let sum = ForceCandidate::sum(&forces, file, ids).filter(|_| ids.iter().all(is_there));
+            forces.extend(sum);
+        }
         let mut bodies = bodies(starts, direction);
         fit_nodes(&mut each_node, &mut bodies, &forces, direction)?;
         Ok(Self { direction, aligned, bodies, forces })
     }
 
-    pub(super) fn force(&self, file: &str, id: i64) -> Option<usize> {
-        self.forces.iter().position(|f| f.file == file && f.id == id)
+    pub(super) fn force(&self, file: &str, ids: &[i64]) -> Option<usize> {
+        self.forces.iter().position(|f| f.file == file && f.ids == ids)
     }
 }
 
@@ -129,10 +139,37 @@ impl ForceCandidate {
         self.impulse.get(largest(&self.impulse)).map_or(0.0, |impulse| impulse.abs())
     }
 
-    /// Its place among those of equal size.
-    pub(super) fn rank(&self) -> (usize, i64) {
+    /// Its place among those of equal size: a sum is asked for where another run needs it.
+    pub(super) fn rank(&self) -> (usize, Reverse<usize>, &[i64]) {
         let kind = FORCES.iter().position(|name| *name == self.file);
-        (kind.unwrap_or(FORCES.len()), self.id)
+        (kind.unwrap_or(FORCES.len()), Reverse(self.ids.len()), &self.ids)
+    }
+
+    /// As it is called in messages: `rwforc 1`, or `rwforc 1 + 2`.
+    pub(super) fn label(&self) -> String {
+        let ids: Vec<String> = self.ids.iter().map(i64::to_string).collect();
+        format!("{} {}", self.file, ids.join(" + "))
+    }
+
+    /// The sum of those of a file that act in a run; `None` if none does, or they are of different sides.
+    fn sum(forces: &[Self], file: &str, ids: &[i64]) -> Option<Self> {
+        let is_part = |force: &&Self| {
+            force.file == file && matches!(force.ids[..], [id] if ids.contains(&id))
+        };
+        let mut parts = forces.iter().filter(is_part);
+        let mut sum = Self { ids: ids.to_vec(), title: None, ..parts.next()?.clone() };
+        for part in parts {
+            if part.side != sum.side {
+                return None;
+            }
+            sum.impulse.iter_mut().zip(&part.impulse).for_each(|(sum, own)| *sum += own);
+            sum.covers = sum.covers.min(part.covers);
+            sum.other_side &= part.other_side;
+            if part.component != "normal_force" {
+                sum.component = part.component;
+            }
+        }
+        Some(sum)
     }
 }
 
@@ -218,7 +255,7 @@ fn force_candidates(
     source: &Source,
     direction: DisplacementComponent,
     time: &[f64],
-    named: Option<(&str, i64)>,
+    named: Option<Named<'_>>,
 ) -> Result<Vec<ForceCandidate>, Reason> {
     let mut components = vec![direction.force()];
     if source.has("normal_force") {
@@ -232,8 +269,7 @@ fn force_candidates(
             let last = of[0].time.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             let candidate = ForceCandidate {
                 file: source.name,
-                id: entity.id,
-                also: Vec::new(),
+                ids: vec![entity.id],
                 side: entity.side,
                 other_side: false,
                 component,
@@ -249,12 +285,13 @@ fn force_candidates(
 }
 
 /// Keeps the forces with the largest impulses, so that thousands of contacts are not held.
-fn keep_largest(forces: &mut Vec<ForceCandidate>, named: Option<(&str, i64)>) {
+fn keep_largest(forces: &mut Vec<ForceCandidate>, named: Option<Named<'_>>) {
     forces.sort_by(|a, b| b.size().total_cmp(&a.size()).then(a.rank().cmp(&b.rank())));
     let mut rank = 0;
     forces.retain(|force| {
         rank += 1;
-        rank <= KEPT_FORCES || named == Some((force.file, force.id))
+        let is_named = |(file, ids): Named<'_>| file == force.file && ids.contains(&force.ids[0]);
+        rank <= KEPT_FORCES || named.is_some_and(is_named)
     });
 }
 
@@ -282,7 +319,7 @@ fn along(
 /// Adds a force; of an interface's two sides the one with the larger impulse counts, the first if
 /// they are equal.
 fn add(found: &mut Vec<ForceCandidate>, mut candidate: ForceCandidate) {
-    let Some(known) = found.iter_mut().find(|f| f.id == candidate.id) else {
+    let Some(known) = found.iter_mut().find(|f| f.ids == candidate.ids) else {
         return found.push(candidate);
     };
     let at = largest(&known.impulse);

@@ -4,6 +4,7 @@
 //! has a speed, a crush, a time to the maximum crush, a mean deceleration and a mass that vehicles
 //! have.
 
+use super::measure::is_near;
 use super::write::Evidence::{self, Computed, Given, Guessed, Read};
 use super::write::Proposed;
 use crate::unit::{UnitSystem, km_per_h};
@@ -15,6 +16,8 @@ pub(super) struct Magnitudes {
     pub crush: f64,
     pub loading_time: f64,
     pub mass: Option<f64>,
+    /// Speed that the folder's name states, in m/s.
+    pub named_m_per_s: Option<f64>,
 }
 
 /// A quantity of an impact in SI: what is possible, and what is usual.
@@ -39,6 +42,13 @@ const LOADING_S: Range = Range { low: 5e-4, high: 5.0, usual: 0.08, spread: 3.0 
 const DECELERATION_M_PER_S2: Range = Range { low: 0.2, high: 5e3, usual: 100.0, spread: 5.0 };
 /// From a test body to a train.
 const MASS_KG: Range = Range { low: 1.0, high: 5e6, usual: 15e3, spread: 8.0 };
+
+/// Systems of inches and feet: in them the numbers of a usual impact are those of a slow one in millimetres or metres.
+const CUSTOMARY: [&str; 2] = ["in-slinch-s", "ft-slug-s"];
+/// By so much more usual an impact has to be in one of these to put the metric system in doubt.
+const DOUBT: f64 = 5.0;
+/// A name may round a speed to this share of it.
+const NAMED: f64 = 0.1;
 
 impl Range {
     fn holds(&self, value: f64) -> bool {
@@ -76,6 +86,17 @@ impl Magnitudes {
         all.into_iter().find(|(value, range, _)| !range.holds(*value)).map(|(.., said)| said)
     }
 
+    /// Why the speed in the folder's name is not that of the record, if it is far from it, from twice it (half a model) and
+    /// from half of it (each body of a pair).
+    fn is_not_as_named(&self, units: &UnitSystem) -> Option<String> {
+        let (named, speed) = (self.named_m_per_s?, self.speed * units.speed());
+        let is_as_named = [0.5, 1.0, 2.0].iter().any(|times| is_near(named, times * speed, NAMED));
+        (!is_as_named).then(|| {
+            let (speed, named) = (shown_speed(speed), shown_speed(named));
+            format!("an impact at {speed} where the folder's name states {named}")
+        })
+    }
+
     /// The quantity that is least usual, and how unusual all are together.
     fn unusual(&self, units: &UnitSystem) -> (f64, String) {
         let all = self.in_si(units);
@@ -98,7 +119,7 @@ pub(super) fn choose(
     let refused = |units: &UnitSystem| runs.iter().find_map(|run| run.impossible(units));
     if let Some(units) = given {
         if let Some(why) = refused(&units) {
-            let better = match guessed(runs) {
+            let better = match guessed(runs, &mut Vec::new()) {
                 Some((guess, ..)) => format!("{guess} would fit"),
                 None => "no usual system fits better".into(),
             };
@@ -110,7 +131,7 @@ pub(super) fn choose(
     }
     if let Some((units, place)) = stated {
         let Some(why) = refused(&units) else {
-            let from = match guessed(runs) {
+            let from = match guessed(runs, &mut Vec::new()) {
                 Some((guess, _, from)) if guess == units => format!("{place}; and {from}"),
                 _ => place,
             };
@@ -119,7 +140,7 @@ pub(super) fn choose(
         warnings
             .push(format!("units: {place} states {units}, which would make {why}; it is not used"));
     }
-    match (guessed(runs), runs.first()) {
+    match (guessed(runs, warnings), runs.first()) {
         (Some((units, evidence, from)), _) => Proposed::found(units, evidence, from),
         (None, Some(first)) => Proposed::missing(format!(
             "in none of the usual systems ({}) is this an impact: speed {}, crush {}, time to it {} in the file's units",
@@ -132,48 +153,77 @@ pub(super) fn choose(
     }
 }
 
-fn usual_systems() -> impl Iterator<Item = UnitSystem> {
-    UnitSystem::USUAL.into_iter().filter_map(|name| UnitSystem::parse(name).ok())
+/// The systems of some names.
+fn systems(names: &[&str]) -> Vec<UnitSystem> {
+    names.iter().filter_map(|name| UnitSystem::parse(name).ok()).collect()
 }
 
 /// For each run whether it is possible in the usual system in which most runs are.
 pub(super) fn most_agree(runs: &[Magnitudes]) -> Vec<bool> {
-    let agreeing = usual_systems().map(|units| {
-        let agree: Vec<bool> = runs.iter().map(|run| run.impossible(&units).is_none()).collect();
-        let agreeing = runs.iter().zip(&agree).filter(|(_, agrees)| **agrees);
-        let unusual: Vec<f64> = agreeing.map(|(run, _)| run.unusual(&units).0).collect();
-        (unusual.len(), unusual.iter().sum::<f64>(), agree)
-    });
-    let best =
-        agreeing.reduce(|a, b| if b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).is_gt() { b } else { a });
-    match best {
-        Some((count, _, agree)) if count > 0 => agree,
-        _ => vec![true; runs.len()],
-    }
+    let best = |names: &[&str]| {
+        let agreeing = systems(names).into_iter().map(|units| {
+            let agree: Vec<bool> =
+                runs.iter().map(|run| run.impossible(&units).is_none()).collect();
+            let agreeing = runs.iter().zip(&agree).filter(|(_, agrees)| **agrees);
+            let unusual: Vec<f64> = agreeing.map(|(run, _)| run.unusual(&units).0).collect();
+            (unusual.len(), unusual.iter().sum::<f64>(), agree)
+        });
+        let most = agreeing
+            .reduce(|a, b| if b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).is_gt() { b } else { a });
+        most.filter(|(count, ..)| *count > 0).map(|(.., agree)| agree)
+    };
+    let best = best(&UnitSystem::USUAL).or_else(|| best(&CUSTOMARY));
+    best.unwrap_or_else(|| vec![true; runs.len()])
 }
 
-/// The usual system in which all runs are possible, and why it is that one; of several the most
-/// usual one.
-fn guessed(runs: &[Magnitudes]) -> Option<(UnitSystem, Evidence, String)> {
+/// The usual system in which all runs are possible and have the speeds of their folders' names, and why it is that one; of
+/// several the most usual one, of inches and feet only where no metric one is possible. Warns where they are as likely.
+fn guessed(
+    runs: &[Magnitudes],
+    warnings: &mut Vec<String>,
+) -> Option<(UnitSystem, Evidence, String)> {
     let first = runs.first()?;
-    let (mut possible, mut others) = (Vec::new(), Vec::new());
-    for units in usual_systems() {
-        match runs.iter().find_map(|run| run.impossible(&units)) {
-            Some(why) => others.push(format!("{units} would make {why}")),
-            None => {
-                let unusual = runs.iter().map(|run| run.unusual(&units).0).sum::<f64>();
-                possible.push((unusual, units));
-            }
+    let refused = |units: &UnitSystem, why: &dyn Fn(&Magnitudes) -> Option<String>| {
+        runs.iter().find_map(why).map(|why| format!("{units} would make {why}"))
+    };
+    let unusual = |units: &UnitSystem| runs.iter().map(|run| run.unusual(units).0).sum::<f64>();
+    let (mut possible, mut others): (Vec<UnitSystem>, Vec<String>) = Default::default();
+    for units in systems(&UnitSystem::USUAL) {
+        match refused(&units, &|run| run.impossible(&units)) {
+            Some(why) => others.push(why),
+            None => possible.push(units),
         }
     }
-    possible.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let ((_, units), less) = possible.split_first()?;
+    let mut customary = systems(&CUSTOMARY);
+    customary.retain(|units| runs.iter().all(|run| run.impossible(units).is_none()));
+    let misnamed = |units: &UnitSystem| refused(units, &|run| run.is_not_as_named(units));
+    let is_named = runs.iter().any(|run| run.named_m_per_s.is_some());
+    if is_named && possible.iter().chain(&customary).any(|units| misnamed(units).is_none()) {
+        others.extend(possible.iter().filter_map(misnamed));
+        possible.retain(|units| misnamed(units).is_none());
+        customary.retain(|units| misnamed(units).is_none());
+    }
+    if possible.is_empty() {
+        possible = std::mem::take(&mut customary);
+    }
+    possible.sort_by(|a, b| unusual(a).total_cmp(&unusual(b)));
+    let (units, less) = possible.split_first()?;
+    customary.retain(|other| unusual(other) + DOUBT * (runs.len() as f64) < unusual(units));
+    if let Some(other) = customary.first() {
+        let speed = |units: &UnitSystem| shown_speed(first.speed * units.speed());
+        warnings.push(format!(
+            "units: {units} is taken, an impact at {}; if the model is in inches or feet, such as {other} with {}, use --units",
+            speed(units),
+            speed(other)
+        ));
+    }
     let others = others.join(", ");
-    if less.is_empty() {
+    if less.is_empty() && customary.is_empty() {
         let from = format!("the only usual system in which these impacts are possible: {others}");
         return Some((*units, Computed, from));
     }
-    let less = less.iter().map(|(_, units)| format!("{units} ({})", first.unusual(units).1));
+    let less = less.iter().chain(&customary);
+    let less = less.map(|units| format!("{units} ({})", first.unusual(units).1));
     let from = format!(
         "the impacts are the most usual ones in it; also possible, but less usual: {}; impossible: {others}",
         less.collect::<Vec<_>>().join(", ")
@@ -234,6 +284,7 @@ mod tests {
             crush: 0.55 / units.length_m,
             loading_time: 0.06 / units.time_s,
             mass: Some(1200.0 / units.mass_kg),
+            named_m_per_s: None,
         }
     }
 
@@ -255,19 +306,52 @@ mod tests {
             crush: 0.6 * km_per_h / 3.6 * 0.02 * 1e3,
             loading_time: 0.02,
             mass: None,
+            named_m_per_s: None,
         };
         let in_si = shunting(0.5).in_si(&UnitSystem::SI);
         let others = in_si.iter().filter(|(_, range, _)| range.high != DECELERATION_M_PER_S2.high);
         assert!(others.clone().all(|(value, range, _)| range.holds(*value)), "each alone may be");
         assert_eq!(others.count(), 3);
         for km_per_h in [0.4, 0.5, 0.7, 3.0] {
-            let found = choose(&[shunting(km_per_h)], None, None, &mut Vec::new());
-            let units = found.value().map(ToString::to_string);
-            assert_eq!(units.as_deref(), Some("mm-t-s"), "{km_per_h} km/h: {found}");
-            assert!(found.to_string().starts_with("computed: "), "{found}");
+            let named = Magnitudes { named_m_per_s: Some(km_per_h / 3.6), ..shunting(km_per_h) };
+            for (run, evidence, warned) in
+                [(shunting(km_per_h), "guessed: ", 1), (named, "computed: ", 0)]
+            {
+                let mut warnings = Vec::new();
+                let found = choose(&[run], None, None, &mut warnings);
+                let units = found.value().map(ToString::to_string);
+                assert_eq!(units.as_deref(), Some("mm-t-s"), "{km_per_h} km/h: {found}");
+                assert!(found.to_string().starts_with(evidence), "{found}");
+                assert_eq!(warnings.len(), warned, "{warnings:?}");
+            }
         }
         let found = choose(&[shunting(0.5)], None, None, &mut Vec::new()).to_string();
         assert!(found.contains("SI would make a mean deceleration of 6944 m/s²"), "{found}");
+    }
+
+    /// A car in inches has the numbers of a slow one in millimetres: the folder's name decides, else the user is asked.
+    #[test]
+    fn inches_are_not_millimetres() {
+        let inches = UnitSystem::parse("in-slinch-s").unwrap();
+        let run = car(&inches);
+        let mut warnings = Vec::new();
+        let found = choose(&[run], None, None, &mut warnings);
+        assert_eq!(found.value().unwrap().to_string(), "mm-t-s");
+        assert!(found.to_string().starts_with("guessed: "), "{found}");
+        let warned = "units: mm-t-s is taken, an impact at 1.97 km/h; if the model is in inches or feet, such as in-slinch-s with 50.04 km/h, use --units";
+        assert_eq!(warnings, [warned]);
+        for half in [1.0, 2.0] {
+            let named = Magnitudes { named_m_per_s: Some(half * 13.9), ..run };
+            let mut warnings = Vec::new();
+            let found = choose(&[named], None, None, &mut warnings);
+            assert_eq!(found.value(), Some(&inches), "{found}");
+            assert!(found.to_string().starts_with("computed: "), "{found}");
+            assert!(warnings.is_empty(), "{warnings:?}");
+        }
+        // A name that fits nothing decides nothing.
+        let named = Magnitudes { named_m_per_s: Some(3.0), ..car(&UnitSystem::SI) };
+        let found = choose(&[named], None, None, &mut Vec::new());
+        assert_eq!(found.value(), Some(&UnitSystem::SI), "{found}");
     }
 
     #[test]
@@ -300,7 +384,13 @@ mod tests {
 
     #[test]
     fn what_is_no_impact_has_no_units() {
-        let slow = Magnitudes { speed: 1e-9, crush: 1e-9, loading_time: 1e-9, mass: None };
+        let slow = Magnitudes {
+            speed: 1e-9,
+            crush: 1e-9,
+            loading_time: 1e-9,
+            mass: None,
+            named_m_per_s: None,
+        };
         let found = choose(&[slow], None, None, &mut Vec::new());
         assert!(found.value().is_none());
         assert!(found.to_string().starts_with("fill in: in none of the usual systems"), "{found}");
