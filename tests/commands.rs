@@ -599,6 +599,48 @@ fn energy_rule_takes_up_the_kinetic_energy() {
     }
 }
 
+/// Left-out speeds say nothing of a mass that crushes far beyond the runs, or of one that is not a vehicle's.
+#[test]
+fn a_mass_far_from_the_runs_has_no_band() {
+    let folder = demo_folder();
+    let predict = |mass: &str| {
+        let command = format!("predict lead.model --speed 50km/h --mass {mass} --json");
+        let curve = json(&crumple_ok(folder.path(), &command));
+        let warnings = curve["warnings"].as_array().unwrap().clone();
+        let of = |code: &str| {
+            let found = warnings.iter().find(|warning| warning["code"] == code);
+            found.map(|warning| warning["message"].as_str().unwrap().to_string())
+        };
+        let provenance = &curve["provenance"];
+        assert_eq!(provenance["band"].is_null(), provenance["body_band"].is_null());
+        assert_eq!(provenance["band"].is_null(), curve["force_low_N"].is_null(), "{mass}");
+        assert_eq!(provenance["band"].is_null(), of("no_band").is_some(), "{warnings:?}");
+        (of("no_band"), of("other_mass"))
+    };
+    assert_eq!(predict("24t"), (None, None));
+    let (none, other) = predict("20t");
+    assert_eq!(none, None);
+    says(&other.unwrap(), "rate effects and any band are those of the training mass");
+    says(&predict("80t").0.unwrap(), "no left-out curve goes on beyond the crush");
+    let (none, other) = predict("1t");
+    says(&none.unwrap(), "the mass is nowhere near the training runs'");
+    says(&other.unwrap(), "the curve is not reliable: check the unit");
+}
+
+/// Just outside the training speeds a band is as wide as at the nearest of them.
+#[test]
+fn the_band_outside_says_what_it_rests_on() {
+    let folder = demo_folder();
+    let at = |speed: &str| {
+        let printed = crumple_ok(folder.path(), &format!("predict lead.model --speed {speed}"));
+        printed.lines().find(|line| line.starts_with("  band")).unwrap().to_string()
+    };
+    says(&at("71km/h"), "between training speeds, from");
+    says(&at("73km/h"), "outside the training speeds, from");
+    says(&at("73km/h"), "left out in turn, as wide as at the nearest training speed");
+    says(&at("80km/h"), "of the range left out, growing with the distance");
+}
+
 #[test]
 fn simulate_writes_the_promised_columns_and_ledger() {
     let folder = demo_folder();

@@ -342,6 +342,10 @@ fn ends_are_all_that_a_user_writes() {
         .collect();
     let expected = ["A2 front|A2", "A1|A2", "A1 rear|A1", "A1 front|A1", "A1|wall"];
     assert_eq!(names, expected);
+    // What a plate does is not the impact of its vehicle.
+    for interface in run["summary"]["interfaces"].as_array().unwrap() {
+        assert!(interface["restitution"].is_null(), "{interface}");
+    }
     let first = |name: &str| run[name].as_array().unwrap()[0].as_f64().unwrap();
     assert!((first("deflection_m[A1|A2]") + 0.032).abs() < 1e-12);
     let bodies = run["summary"]["bodies"].as_array().unwrap();

@@ -97,6 +97,18 @@ fn wide_ids_cut_at_every_byte() {
     }
 }
 
+/// Ten digits may also fill the columns of the id and the blank behind them.
+#[test]
+fn ids_that_fill_their_columns_are_read() {
+    let rows = row("1234567890", "-3.70368E-11", 12).replacen("1234567890 ", "1234567890", 1);
+    assert_eq!(rows.trim_end().len(), 154);
+    let text = state(1, "0.0000000E+00") + TRANSLATIONS + &rows;
+    let file = read("nodout", &(text + &state(2, "1.0000000E+00") + TRANSLATIONS + &rows));
+    assert_eq!(file.problems, []);
+    assert_eq!(values(&file, 1234567890, "x_displacement"), [-3.70368e-11; 2]);
+    assert_eq!(values(&file, 1234567890, "z_coordinate"), [-3.70368e-11; 2]);
+}
+
 #[test]
 fn damage_in_fields_that_are_not_kept_is_found_by_an_audit() {
     let text = state(1, "0.0000000E+00") + TRANSLATIONS + &row("7", "************", 12);

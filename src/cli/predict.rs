@@ -137,6 +137,9 @@ fn print_found(out: &mut dyn Write, found: &SpeedOfCrush) -> io::Result<()> {
 fn rests_on(band: &Band, in_range: bool) -> String {
     let place = if in_range { "between training speeds" } else { "outside the training speeds" };
     let (one, how) = match band.left_out {
+        LeftOutSpeeds::Inner if !in_range => {
+            ("curve", "left out in turn, as wide as at the nearest training speed")
+        }
         LeftOutSpeeds::Inner => {
             ("curve", "left out in turn, scaled to the interval between the neighbouring speeds")
         }

@@ -182,7 +182,7 @@ pub struct InterfaceHistory {
     /// When both sides first had the same velocity, in s.
     pub common_velocity_time_s: Option<f64>,
     /// Separation speed over speed of approach at the interface, once it has opened again.
-    /// `None` below 0.1 m/s of approach, and above 1: where contacts repeat or neighbours push.
+    /// `None` below 0.1 m/s of approach, above 1 (where contacts repeat or neighbours push), and at the plate of an end.
     pub restitution: Option<f64>,
 }
 

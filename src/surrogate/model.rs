@@ -15,7 +15,7 @@ use super::models::{MODELS, ModelKind};
 use super::{CaseCurve, QueryPoint, Surrogate, Warning, WarningCode};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{ForceKind, Masses};
-use crate::dataset::{Feature, TrainingSet, nearest};
+use crate::dataset::{Feature, MASS, TrainingSet, nearest};
 use crate::error::{Error, error};
 use crate::forest::RegressionForest;
 use crate::unit::{SpeedKind, UnitSystem};
@@ -192,6 +192,11 @@ impl Model {
     pub(super) fn contains(&self, speed_m_per_s: f64) -> bool {
         let (low, high) = self.range_m_per_s();
         (low * (1.0 - ROUNDING)..=high * (1.0 + ROUNDING)).contains(&speed_m_per_s)
+    }
+
+    /// Whether the mass is among its parameters.
+    pub(super) fn has_mass(&self) -> bool {
+        self.features.iter().any(|feature| feature.parameter == MASS)
     }
 
     /// The band of a force at a query's place, or why there is none although speeds were left out.

@@ -20,6 +20,7 @@ use super::max_crush::{MaxCrush, MaxCrushRule, chosen};
 use super::predicted::{Beyond, ForestQuantiles, PredictedCurve, Provenance, envelope};
 use super::query::{Query, ResolvedQuery, over_speed};
 use super::spikes::without_spikes;
+use super::warning::is_unlike;
 use super::{Model, QueryPoint, Warning};
 use crate::curve::{Envelope, ForceCurve, ForceKind};
 use crate::dataset::{OTHER_MASS, grid, nearest};
@@ -278,11 +279,26 @@ impl<'a> Prediction<'a> {
         if crush_m > CRUSH_BEYOND * data_end_m {
             warnings.push(Warning::beyond_data(crush_m, data_end_m));
         }
-        let own = self.banded(model.force_kind, &declared, &mut warnings);
-        let of_body = body
-            .as_ref()
-            .map(|b| self.banded(ForceKind::Body, b, &mut warnings))
-            .unwrap_or_default();
+        // Between the training speeds no curve that was left out goes on there: a mass does that.
+        let is_beyond = crush_m > CRUSH_BEYOND * data_end_m && model.contains(v);
+        let ratio = asked.mass_kg / model.masses().effective_kg();
+        let without_band = match () {
+            () if is_unlike(ratio) && !model.has_mass() => {
+                Some("the mass is nowhere near the training runs'")
+            }
+            () if is_beyond => {
+                Some("no left-out curve goes on beyond the crush of the training runs")
+            }
+            () => None,
+        };
+        let has_band = model.band(&at, model.force_kind).is_ok_and(|band| band.is_some());
+        warnings.extend(without_band.filter(|_| has_band).map(Warning::no_band));
+        let mut banded = |force, envelope| match without_band {
+            None => self.banded(force, envelope, &mut warnings),
+            Some(_) => Banded::default(),
+        };
+        let own = banded(model.force_kind, &declared);
+        let of_body = body.as_ref().map(|b| banded(ForceKind::Body, b)).unwrap_or_default();
         let end = declared.end_m();
         let mut curve = PredictedCurve {
             // Without a rebound a softer unloading than the steepest rise would create energy.

@@ -190,8 +190,7 @@ impl<'a> ResolvedQuery<'a> {
         if unloading.is_none() {
             warnings.push(Warning::no_unloading());
         }
-        let mass_is_feature = self.model.features.iter().any(|f| f.parameter == MASS);
-        if !mass_is_feature && !self.same_mass {
+        if !self.model.has_mass() && !self.same_mass {
             warnings.push(Warning::other_mass(self.masses, self.model.masses()));
         }
         if (energy - 1.0).abs() > EnergyAudit::TOLERANCE {

@@ -12,6 +12,11 @@ use crate::unit::{Shown, km_per_h};
 /// A mass that differs from the training runs' by such a factor is a mistaken unit rather than another vehicle.
 const UNLIKE_MASS: f64 = 10.0;
 
+/// Whether a mass over the training runs' is rather a mistaken unit.
+pub(super) fn is_unlike(ratio: f64) -> bool {
+    !(1.0 / UNLIKE_MASS..UNLIKE_MASS).contains(&ratio)
+}
+
 /// Something to know before trusting a predicted curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Warning {
@@ -227,7 +232,7 @@ impl Warning {
         Self {
             code: WarningCode::OutOfRange,
             message: format!(
-                "the maximum crush of {crush_m:.3} m lies beyond the {data_end_m:.3} m of the training runs: the force there is an assumption, and no band holds there"
+                "the maximum crush of {crush_m:.3} m lies beyond the {data_end_m:.3} m of the training runs: the force there is an assumption"
             ),
         }
     }
@@ -241,10 +246,10 @@ impl Warning {
             Some(other) => format!("{} against {other}", Shown::one_mass(of.body_kg)),
         };
         let ratio = asked.effective_kg() / trained.effective_kg();
-        let effect = if (1.0 / UNLIKE_MASS..UNLIKE_MASS).contains(&ratio) {
-            "rate effects and the band are those of the training mass, and the error may be larger"
+        let effect = if is_unlike(ratio) {
+            "so far from it, the curve is not reliable: check the unit"
         } else {
-            "so far from it, neither the curve nor its band is reliable: check the unit"
+            "rate effects and any band are those of the training mass, and the error may be larger"
         };
         Self {
             code: WarningCode::OtherMass,

@@ -48,6 +48,8 @@ const ROTATIONS: [&str; 9] = [
 /// one column rule for E12.5 and E12.4. The blank of column 10 counts as the id's.
 const ID_WIDTH: usize = 10;
 const FIELD_WIDTH: usize = 12;
+/// From the letter or the sign of an exponent to the end of its field.
+const EXPONENT: usize = 4;
 /// Digits, point and exponent of a time.
 const TIME: usize = 13;
 
@@ -194,13 +196,16 @@ fn cycle_and_time(line: &[u8]) -> Option<(i64, f64)> {
     rest[close + 1..].trim_ascii().is_empty().then_some((cycle, time))
 }
 
-/// One node. Ids of more than nine digits push l2a's rows to the right, so the first
-/// field begins where the id ends; a row of any other width is damaged or cut.
+/// One node. Ids of more than nine digits push l2a's rows to the right, so the first field begins one column behind the
+/// id, unless ten digits fill the id's columns; a row of any other width is damaged or cut.
 fn row(table: TableId, line: &Line<'_>, states: &mut StateReader<'_>) {
     let text = line.text.trim_ascii_end();
     let id_end = id_end(text);
-    let first = id_end.max(ID_WIDTH - 1) + 1;
     let fields = [TRANSLATIONS.len(), ROTATIONS.len()][table.0];
+    let is_filled = id_end == ID_WIDTH
+        && text.len() == ID_WIDTH + fields * FIELD_WIDTH
+        && !text[ID_WIDTH + FIELD_WIDTH - EXPONENT].is_ascii_digit();
+    let first = if is_filled { ID_WIDTH } else { id_end.max(ID_WIDTH - 1) + 1 };
     let width = first + fields * FIELD_WIDTH;
     let Some(id) = integer(&text[..id_end]).filter(|_| text.len() == width) else {
         let message = format!(
