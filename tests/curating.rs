@@ -265,6 +265,12 @@ fn differences_of_two_databases_are_named() {
                     (larger(curve), larger(&case.curves.original));
             }
             2 => case.provenance.tags = vec!["reviewed".into()],
+            4 => {
+                _ = case
+                    .conditions
+                    .parameters
+                    .insert("thickness_mm".into(), crumple::curve::Parameter::Number(3.5))
+            }
             3 => case.id.name = "other".into(),
             _ => {}
         }
@@ -275,18 +281,19 @@ fn differences_of_two_databases_are_named() {
     let name = |k: usize| format!("{WALL}/{}", cases[k].id.name);
     assert_eq!(found["removed"], serde_json::json!([name(0), name(3)]));
     assert_eq!(found["added"], serde_json::json!([format!("{WALL}/other")]));
-    assert_eq!(found["unchanged"], cases.len() - 3);
+    assert_eq!(found["unchanged"], cases.len() - 4);
     let of = &found["changed"][0];
     assert_eq!(
         (of["case"].as_str(), found["changed"].as_array().unwrap().len()),
-        (Some(&*cases[1].id.name), 1)
+        (Some(&*cases[1].id.name), 2)
     );
     for key in ["peak_force_difference", "force_l1"] {
         assert!((of[key].as_f64().unwrap() - 0.1).abs() < 1e-9, "{key}: {of}");
     }
     let text = ok(folder, &format!("db diff {database} after.h5 --accept-changed"));
     says(&text, " mass  max crush ");
-    says(&text, "1 case added, 2 removed, 1 changed, ");
+    says(&text, "1 case added, 2 removed, 2 changed, ");
+    says(&text, &format!("{WALL}/{}: thickness_mm - -> 3.5\n", cases[4].id.name));
     says(
         &ok(folder, &format!("db diff {database} {database}")),
         "0 cases added, 0 removed, 0 changed, ",

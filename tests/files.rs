@@ -916,6 +916,9 @@ fn a_folder_that_is_not_there_is_named() {
     ];
     let t = |target: &str, expected: &str| {
         for command in commands {
+            // A database is not named like a table.
+            let target =
+                if command[0] == "build" { &target.replace(".csv", ".h5") } else { target };
             let line = [command, &[target]].concat();
             let error = crumple_fails(here, 1, &line);
             assert!(error.contains(&format!("cannot write {target}")), "{line:?} said:\n{error}");
@@ -1018,4 +1021,27 @@ fn changed_numbers_are_not_read_in_silence() {
     fs::write(here.join("x.model"), format!("{old}}}\n")).unwrap();
     let error = crumple_fails(here, 1, &predict);
     says(&error, "of the impact's energy: a mass, speed or force was changed");
+}
+
+/// A run above the study's folder is named without the way up.
+#[test]
+fn runs_beside_the_study_have_names_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let from = fixture("fe/lead-car-wall");
+    fs::create_dir_all(here.join("studies")).unwrap();
+    for run in ["36kmh", "48kmh"] {
+        fs::create_dir_all(here.join("runs").join(run)).unwrap();
+        for file in ["nodout", "rwforc"] {
+            fs::copy(from.join(run).join(file), here.join("runs").join(run).join(file)).unwrap();
+        }
+    }
+    crumple_ok(here, "init runs -o studies/study.toml");
+    let study = here.join("studies/study.toml");
+    let text = fs::read_to_string(&study).unwrap();
+    fs::write(&study, text.replace("name = \"36kmh\"\n", "")).unwrap();
+    crumple_ok(here, "build studies/study.toml -o curves.h5 -q");
+    let database = crumple::database::Database::read(&here.join("curves.h5")).unwrap();
+    let names: Vec<&str> = database.all().map(|case| &*case.id.name).collect();
+    assert_eq!(names, ["runs_36kmh", "48kmh"]);
 }

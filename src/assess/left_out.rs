@@ -117,21 +117,34 @@ impl<'a> LeftOutCase<'a> {
         }
     }
 
+    /// The model without the case's speed: the same for all cases that a set lacks.
+    pub(super) fn fit(&self, kind: ModelKind) -> Result<Model, Error> {
+        Model::fit_curves(&self.rest, kind)
+            .map_err(|error| error!(Validation, "without this speed: {}", error))
+    }
+
     /// Predicts the case by one model and every rule for the maximum crush.
     pub(super) fn trial(&self, kind: ModelKind) -> LeftOutRun<'_> {
-        let to_text = |error: Error| error.to_string();
-        let answers = || -> Result<Answers, Error> {
-            let model = Model::fit_curves(&self.rest, kind)
-                .map_err(|error| error!(Validation, "without this speed: {}", error))?;
-            let query = query_of(self.case, &model);
+        self.trial_of(kind, &self.fit(kind), &MaxCrushRule::ALL)
+    }
+
+    /// Predicts the case by a fitted model and some rules for the maximum crush.
+    pub(super) fn trial_of(
+        &self,
+        kind: ModelKind,
+        model: &Result<Model, Error>,
+        rules: &[MaxCrushRule],
+    ) -> LeftOutRun<'_> {
+        let answers = || -> Result<Answers, String> {
+            let model = model.as_ref().map_err(Error::to_string)?;
+            let query = query_of(self.case, model);
             // Body force and motion are the same by all rules.
-            let prediction = Prediction::new(&model, &query)?;
+            let prediction = Prediction::new(model, &query).map_err(|e| e.to_string())?;
             let by = |rule| self.answer(prediction.curve(rule)?);
-            Ok(MaxCrushRule::ALL.map(|rule| (rule, by(rule).map_err(to_text))).into())
+            Ok(rules.iter().map(|&rule| (rule, by(rule).map_err(|e| e.to_string()))).collect())
         };
-        let answers = answers().unwrap_or_else(|error| {
-            MaxCrushRule::ALL.map(|rule| (rule, Err(error.to_string()))).into()
-        });
+        let answers = answers()
+            .unwrap_or_else(|error| rules.iter().map(|&rule| (rule, Err(error.clone()))).collect());
         LeftOutRun { model: kind.name(), held: self, answers }
     }
 

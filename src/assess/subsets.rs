@@ -112,7 +112,9 @@ fn subset(
     let mut inside: BTreeMap<String, Vec<f64>> = BTreeMap::new();
     for of in &tables.means {
         let kind = fitting.iter().find(|kind| kind.name() == of.model)?;
-        let judged = lacking.iter().map(|case| case.trial(*kind).judged(of.max_crush_rule));
+        let model = lacking[0].fit(*kind);
+        let rule = of.max_crush_rule;
+        let judged = lacking.iter().map(|case| case.trial_of(*kind, &model, &[rule]).judged(rule));
         // The models are compared over the same subsets.
         let judged = judged.collect::<Result<Vec<_>, _>>().ok()?;
         for (kind, residuals) in judged.iter().flat_map(|score| &score.residuals) {

@@ -39,6 +39,8 @@ pub(super) struct Args {
 /// Name of a study that is not named, and of a database that is not.
 const STUDY: &str = "study.toml";
 const DATABASE: &str = "curves.h5";
+/// Endings of files that no database has.
+const TEXTS: [&str; 5] = ["csv", "json", "toml", "txt", "model"];
 
 impl Args {
     /// The study and the database.
@@ -61,6 +63,13 @@ impl Args {
             }
         };
         let output = self.output.clone().unwrap_or_else(|| study.with_file_name(DATABASE));
+        let ending = output.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+        if TEXTS.contains(&ending) {
+            return usage(format!(
+                "{}: the database is an HDF5 file, not .{ending}: name it .h5 (crumple export and crumple db show write curves as text)",
+                output.display()
+            ));
+        }
         Ok((study, output))
     }
 }

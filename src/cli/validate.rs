@@ -511,7 +511,9 @@ fn band_line(force: &str, band: &Band) -> String {
         ),
         LeftOutSpeeds::Ends => (
             "end",
-            format!("{span} outside the training speeds, elsewhere in proportion to the distance"),
+            format!(
+                "{span} outside the training speeds, elsewhere in proportion to the distance but no narrower than inside"
+            ),
         ),
     };
     let coverage = match band.coverage {

@@ -275,6 +275,7 @@ fn sign<'de, D: Deserializer<'de>>(value: D) -> Result<Option<i64>, D::Error> {
 impl RunEntry {
     pub(crate) fn case_name(&self) -> String {
         let name = self.name.as_deref().unwrap_or(&self.path);
-        name.trim_start_matches("./").trim_matches('/').replace('/', "_")
+        let name = name.trim_start_matches("./").trim_start_matches("../");
+        name.trim_matches('/').replace('/', "_")
     }
 }

@@ -54,7 +54,7 @@ def looked_at(browser, scheme):
     hover = [line for line in figure.locator(".wide-view .values").inner_text().split("\n") if line.startswith(f"{SERIES}:")]
 
     def axes():
-        return [t.text_content() for t in svg.locator("text").all() if t.is_visible()]
+        return svg.evaluate("(svg) => [...svg.querySelectorAll('text')].filter((t) => t.checkVisibility()).map((t) => t.textContent)")
 
     whole = axes()
     box = svg.bounding_box()

@@ -1,10 +1,11 @@
 //! `crumple db diff`: what of a database a new one has added, removed and changed.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use super::super::{CommandResult, GlobalOptions, Outcome, output};
 use crate::curate::{self, Difference};
-use crate::curve::Case;
+use crate::curve::{Case, Parameter};
 use crate::database::Database;
 use crate::plural::counted;
 use crate::table::Table;
@@ -64,6 +65,27 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
                     of.force_l1.map_or("-".into(), |l1| format!("{:.2} %", 100.0 * l1))
                 });
             output::table(out, table)?;
+            // What may be all that has changed.
+            let parameters = |case: &Case| -> BTreeMap<String, String> {
+                let all = case.conditions.parameters.iter();
+                let text = |value: &Parameter| match value {
+                    Parameter::Number(number) => number.to_string(),
+                    Parameter::Category(text) => text.clone(),
+                };
+                all.map(|(name, value)| (name.clone(), text(value))).collect()
+            };
+            for before in old.all().filter(is_meant) {
+                let Some(after) = find(&new, before) else { continue };
+                let (was, is) = (parameters(before), parameters(after));
+                let names: BTreeSet<&String> = was.keys().chain(is.keys()).collect();
+                let of = |all: &BTreeMap<String, String>, name| {
+                    all.get(name).cloned().unwrap_or_else(|| "-".into())
+                };
+                for parameter in names.into_iter().filter(|name| was.get(*name) != is.get(*name)) {
+                    let (was, is) = (of(&was, parameter), of(&is, parameter));
+                    writeln!(out, "{}: {parameter} {was} -> {is}", name(before))?;
+                }
+            }
         }
         writeln!(
             out,
