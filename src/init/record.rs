@@ -29,6 +29,10 @@ const FURTHER: usize = 3;
 /// A flight after the contact that is shorter than this, in states and as a share of the record,
 /// gives no mass.
 const FREE: (usize, f64) = (5, 0.03);
+/// A flight shorter than this share of the time over which the mass is taken shows no force that acts all along.
+const MOMENT: f64 = 0.05;
+/// A velocity has a trend if it changes by more than so many times its scatter.
+const CHANCE: f64 = 3.0;
 
 /// What the recipe names of a run, up to the last time that motion and force share.
 pub(super) struct Record {
@@ -256,15 +260,18 @@ impl Record {
         let free = self.free_flight(end);
         let before = self.time.partition_point(|&t| t < first);
         let velocity = &self.velocities[k];
+        let all = self.time.len();
+        let at = free.map_or(end, |from| (from + all - 1) / 2);
+        let span = self.time[at] - self.time[0];
+        // What vibrates for a moment is not extended over the whole impact.
         let acceleration = |from: usize, to: usize| match to.saturating_sub(from) {
             states if states < FREE.0 => 0.0,
-            _ => slope(&self.time[from..to], &velocity[from..to]).abs(),
+            _ if self.time[to - 1] - self.time[from] < MOMENT * span => 0.0,
+            _ => trend(&self.time[from..to], &velocity[from..to]),
         };
-        let all = self.time.len();
         let most = acceleration(0, before).max(acceleration(free.unwrap_or(all), all));
-        let at = free.map_or(end, |from| (from + all - 1) / 2);
         let change = (velocity[at] - velocity[0]).abs();
-        let share = most * (self.time[at] - self.time[0]) / change;
+        let share = most * span / change;
         if share.is_finite() { share } else { 0.0 }
     }
 
@@ -293,15 +300,19 @@ impl Record {
     }
 }
 
-/// Slope of the line of least squares through values over time.
-fn slope(time: &[f64], values: &[f64]) -> f64 {
+/// Slope of the line of least squares through values over time, less what values that scatter about it so widely may show
+/// by chance.
+fn trend(time: &[f64], values: &[f64]) -> f64 {
     let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
     let (t0, v0) = (mean(time), mean(values));
     let (of, by) = time
         .iter()
         .zip(values)
         .fold((0.0, 0.0), |(of, by), (t, v)| (of + (t - t0) * (v - v0), by + (t - t0).powi(2)));
-    of / by
+    let slope = of / by;
+    let left = time.iter().zip(values).map(|(t, v)| (v - v0 - slope * (t - t0)).powi(2));
+    let scatter = (left.sum::<f64>() / time.len() as f64).sqrt();
+    (slope.abs() - CHANCE * scatter / (time[time.len() - 1] - time[0])).max(0.0)
 }
 
 /// The first damage of a source, found when it was listed or when it was read.
