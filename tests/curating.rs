@@ -282,6 +282,8 @@ fn differences_of_two_databases_are_named() {
     assert_eq!(found["removed"], serde_json::json!([name(0), name(3)]));
     assert_eq!(found["added"], serde_json::json!([format!("{WALL}/other")]));
     assert_eq!(found["unchanged"], cases.len() - 4);
+    let parameter = &found["parameters"][0];
+    assert_eq!((&parameter["before"], &parameter["after"]), (&Value::Null, &Value::from(3.5)));
     let of = &found["changed"][0];
     assert_eq!(
         (of["case"].as_str(), found["changed"].as_array().unwrap().len()),

@@ -1,6 +1,6 @@
 //! `crumple db diff`: what of a database a new one has added, removed and changed.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use super::super::{CommandResult, GlobalOptions, Outcome, output};
@@ -45,9 +45,27 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             changed.extend(compared.cases.pop().map(|difference| (name(before), difference)));
         }
     }
+    // What may be all that has changed.
+    let mut parameters = Vec::new();
+    for before in old.all().filter(is_meant) {
+        let Some(after) = find(&new, before) else { continue };
+        let (was, is) = (&before.conditions.parameters, &after.conditions.parameters);
+        let names: BTreeSet<&String> = was.keys().chain(is.keys()).collect();
+        let differ =
+            names.into_iter().filter(|parameter| was.get(*parameter) != is.get(*parameter));
+        parameters.extend(differ.map(|k| (name(before), k.as_str(), was.get(k), is.get(k))));
+    }
     let differences: Vec<&Difference> = changed.iter().map(|(_, difference)| difference).collect();
-    let document =
-        document! { added: &added, removed: &removed, changed: &differences, unchanged: same };
+    let of_parameters = parameters.iter().map(|(case, parameter, before, after)| {
+        document! { case: case, parameter: parameter, before: before, after: after }
+    });
+    let document = document! {
+        added: &added,
+        removed: &removed,
+        changed: &differences,
+        parameters: of_parameters.collect::<Vec<_>>(),
+        unchanged: same,
+    };
     options.show(&document, |out| {
         for (what, names) in [("added", &added), ("removed", &removed)] {
             names.iter().try_for_each(|name| writeln!(out, "{what}: {name}"))?;
@@ -65,26 +83,8 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
                     of.force_l1.map_or("-".into(), |l1| format!("{:.2} %", 100.0 * l1))
                 });
             output::table(out, table)?;
-            // What may be all that has changed.
-            let parameters = |case: &Case| -> BTreeMap<String, String> {
-                let all = case.conditions.parameters.iter();
-                let text = |value: &Parameter| match value {
-                    Parameter::Number(number) => number.to_string(),
-                    Parameter::Category(text) => text.clone(),
-                };
-                all.map(|(name, value)| (name.clone(), text(value))).collect()
-            };
-            for before in old.all().filter(is_meant) {
-                let Some(after) = find(&new, before) else { continue };
-                let (was, is) = (parameters(before), parameters(after));
-                let names: BTreeSet<&String> = was.keys().chain(is.keys()).collect();
-                let of = |all: &BTreeMap<String, String>, name| {
-                    all.get(name).cloned().unwrap_or_else(|| "-".into())
-                };
-                for parameter in names.into_iter().filter(|name| was.get(*name) != is.get(*name)) {
-                    let (was, is) = (of(&was, parameter), of(&is, parameter));
-                    writeln!(out, "{}: {parameter} {was} -> {is}", name(before))?;
-                }
+            for (name, parameter, was, is) in &parameters {
+                writeln!(out, "{name}: {parameter} {} -> {}", shown(was), shown(is))?;
             }
         }
         writeln!(
@@ -97,6 +97,15 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         )
     })?;
     Ok(Outcome::Clean)
+}
+
+/// A parameter's value; `-` where the case has none.
+fn shown(value: &Option<&Parameter>) -> String {
+    match value {
+        None => "-".into(),
+        Some(Parameter::Number(number)) => number.to_string(),
+        Some(Parameter::Category(text)) => text.clone(),
+    }
 }
 
 /// The case of the same group and name.
