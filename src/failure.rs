@@ -21,7 +21,7 @@ pub(crate) const DONE_WITH_WARNINGS: u8 = 3;
 pub const EXIT_CODES: [(u8, &str); 4] = [
     (DONE, "done"),
     (FAILED, "failed: nothing was done, or only part of it; standard error says which"),
-    (USAGE, "the arguments are invalid, or fit neither together nor the file"),
+    (USAGE, "the arguments are invalid, or do not fit each other or the file"),
     (DONE_WITH_WARNINGS, "done, but with damage or warnings, and `--strict` was given"),
 ];
 

@@ -23,7 +23,7 @@ use crate::guess;
 /// Metres per second in one kilometre per hour.
 pub(crate) const M_PER_S_PER_KM_PER_H: f64 = 1.0 / 3.6;
 
-/// What a speed is measured against. A speed is never bare.
+/// What a speed is measured against. A speed is never stated without it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SpeedKind {

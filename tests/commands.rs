@@ -964,7 +964,7 @@ fn scenarios_choose_the_force() {
     assert_eq!(contact["summary"]["interfaces"][0]["curve_force"], "contact");
     says(&contact["warnings"].to_string(), "it has a contact force only");
     scenario("file = \"a.csv\", force = \"contact\"");
-    says(&crumple_fails(here, 1, "simulate s.toml"), "force names another force than");
+    says(&crumple_fails(here, 1, "simulate s.toml"), "force contradicts the force that");
     // One that says neither is taken for what moves the body, and unloads steeply: both said.
     let text = std::fs::read_to_string(here.join("a.csv")).unwrap();
     let bare: Vec<&str> = text.lines().filter(|l| !l.starts_with('#')).collect();

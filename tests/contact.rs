@@ -407,7 +407,7 @@ fn the_units_that_would_fit_are_named() {
             let hints = [
                 format!("likely the units: read as \"{written}\" it would fit"),
                 "likely the units: the solver files have others".into(),
-                "look at id, component, sign and units".into(),
+                "check id, component, sign and units".into(),
             ];
             let hinted = hints.iter().any(|hint| error.contains(hint));
             assert!(hinted, "{written} read as {read}: {error}");

@@ -104,7 +104,8 @@ fn a_deck_and_its_includes_are_read_up_to_a_bound() {
     };
     let error =
         parse_deck(&mut &b"*KEYWORD\n*INCLUDE\nendless.k\n*END\n"[..], &mut open).unwrap_err();
-    assert_eq!(error.to_string(), "a deck is read up to 4 GB with its includes; it has more");
+    let expected = "at most 4 GB of a deck and its includes are read; this one is larger";
+    assert_eq!(error.to_string(), expected);
 }
 
 #[test]

@@ -490,7 +490,7 @@ fn other_layouts_are_refused() {
         case.remove_attr("hashes").unwrap();
     });
     let error = crumple_fails(folder.path(), 1, "db ls curves.h5");
-    let expected = "lead-car-wall/36kmh: attribute hashes is missing or not a text";
+    let expected = "lead-car-wall/36kmh: attribute hashes is missing or not text";
     says(&error, expected);
     assert!(findings(folder.path()).iter().any(|f| f["code"] == "damaged"));
     for version in [1, 4] {

@@ -358,7 +358,7 @@ fn stored_forests() {
         ("/members/trees/0/first/1", 9.into(), "the samples of the leaves do not fit the trees"),
         ("/members/trees/1/members/0", 300.into(), "the samples of the leaves do not fit the trees"),
         ("/importance", vec![1.0].into(), "the shares of the features do not fit their number"),
-        ("/trees/2/left", left.into(), "node 0 has children that do not stand side by side after it"),
+        ("/trees/2/left", left.into(), "node 0 has children that are not next to each other after it"),
     ];
     for (part, wrong, expected) in cases {
         let mut damaged = stored.clone();

@@ -636,7 +636,7 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
     }
     fs::write(here.join("nose.csv"), &text).unwrap();
     let added = crumple_ok(here, &adding(&["--speed", "10m/s", "--kind", "wall", "--mass", "24t"]));
-    says(&added, "motion: that of the file's times");
+    says(&added, "motion: from the file's times");
     says(&added, "force: sign flipped, positive in compression");
     let case = &cases(here, "tests")[0];
     let crush = case["max_deflection_m"].as_f64().unwrap();

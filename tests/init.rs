@@ -265,8 +265,8 @@ fn every_value_says_where_it_is_from() {
     let units = above("units");
     for why in [
         "computed: the only usual system",
-        "SI would make an impact at 3333 m/s",
-        "mm-kg-ms would make a crush that takes 53.3 µs",
+        "SI would give an impact at 3333 m/s",
+        "mm-kg-ms would give a crush that takes 53.3 µs",
     ] {
         says(&units, why);
     }
@@ -453,8 +453,8 @@ fn pairs_have_both_bodies() {
     fs::write(here.join("exchanged.toml"), exchanged.replace("\"M\"", &format!("\"{other}\"")))
         .unwrap();
     let said = warned(&here, "build exchanged.toml -o exchanged.h5");
-    says(&said, "mass: by the changes of velocity of the two bodies the other one has 1.6");
-    says(&said, "they are exchanged");
+    says(&said, "mass: by the velocity changes of the two bodies, the other one has 1.6");
+    says(&said, "they are swapped");
     // What a model says of them has both masses, too.
     crumple_ok(&here, "train curves.h5 --model nearest -o pair.model -q");
     crumple_ok(&here, "predict pair.model --speed 57.6km/h -o pair.csv -q");
@@ -512,7 +512,7 @@ fn a_pair_without_forces_is_guessed() {
         (force["evidence"].as_str(), force["value"]["times"].as_str()),
         (Some("guessed"), Some("mass"))
     );
-    says(&document["fill_in"].to_string(), "other_mass of a: by their velocities 1.6");
+    says(&document["fill_in"].to_string(), "other_mass of a: judging by their velocities, 1.6");
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
     says(&text, "\nkind = \"pair\"\n");
     says(&text, "\n# other_mass =     # fill in\n");
@@ -520,7 +520,7 @@ fn a_pair_without_forces_is_guessed() {
     assert!((speed / 16.0 - 1.0).abs() < 1e-3, "{speed}");
     // One mass for both is not what the velocities say.
     let said = warned(&here, "init --mass 1.2t -o one.toml");
-    says(&said, "mass: by their velocities the other body is 1.6");
+    says(&said, "mass: judging by their velocities, the other body is 1.6");
     let both = ["init", "--mass", "1.2t", "--other-mass", "2t", "-o", "both.toml"];
     assert_eq!(String::from_utf8(crumple_in(&here, &both).stderr).unwrap(), "");
     crumple_ok(&here, "build both.toml -q");
@@ -754,7 +754,7 @@ fn a_run_that_died_early_says_where_its_record_ends() {
     let whole: Vec<&str> = forces.split_inclusive('\n').take(9 + 20).collect();
     fs::write(killed.join("rwforc"), whole.concat()).unwrap();
     let document = json(&crumple_ok(&here, "init --json -o force.toml"));
-    let died = died.replace("ms,", "ms, where rwforc ends and the motion goes on,");
+    let died = died.replace("ms,", "ms, where rwforc ends but the motion goes on,");
     assert_eq!(left_out(&document), [("killed".into(), died)]);
 }
 
@@ -808,7 +808,7 @@ fn groups_in_one_folder_are_told_apart() {
     assert_eq!(entries(folder.path()), ["lead-car-wall", "vehicle-pair"]);
     // As one group their masses show that they are none.
     let said = warned(folder.path(), "init --group all");
-    says(&said, "the runs' masses differ (20.2, 24 t): are they of one vehicle?");
+    says(&said, "the runs' masses differ (20.2, 24 t): do they belong to one vehicle?");
     let found = study(folder.path(), "study.toml");
     assert_eq!(found["study"]["group"].as_str(), Some("all"));
     assert_eq!(found["run"][0]["path"].as_str(), Some("vehicle-pair/25kmh"));
@@ -860,7 +860,7 @@ fn wrong_units_are_not_believed() {
     says(&error, "crumple build would refuse it");
     says(
         &error,
-        "units: SI as given would make an impact at 6944 m/s, which is not a crash; mm-t-s would fit",
+        "units: SI as given would imply an impact at 6944 m/s, which is not a crash; mm-t-s would fit",
     );
     assert!(!here.join("study.toml").exists());
     crumple_fails(&here, 2, "init --units mm-t-fortnight");
@@ -874,7 +874,7 @@ fn wrong_units_are_not_believed() {
     says(&text, "# read: the deck main.k, line 2: \"Mg mm s\"; and the only usual system");
     deck("kg m s");
     let output = crumple_in(&here, "init");
-    says(&String::from_utf8(output.stderr).unwrap(), "states SI, which would make an impact at");
+    says(&String::from_utf8(output.stderr).unwrap(), "states SI, which would give an impact at");
     assert_eq!(study(&here, "study.toml")["study"]["units"].as_str(), Some("mm-t-s"));
 }
 
@@ -899,7 +899,7 @@ fn inches_are_taken_where_the_folder_says_so() {
     let said = warned(here, "init unnamed -o unnamed.toml");
     says(
         &said,
-        "units: mm-t-s is taken, an impact at 1.97 km/h; if the model is in inches or feet, such as in-slinch-s with 50 km/h, use --units",
+        "units: mm-t-s is assumed, which gives an impact at 1.97 km/h; if the model is in inches or feet, such as in-slinch-s with 50 km/h, use --units",
     );
     let found = study(here, "unnamed.toml");
     assert_eq!(found["study"]["units"].as_str(), Some("mm-t-s"));
@@ -952,7 +952,7 @@ fn of_several_files_with_one_history_one_is_chosen() {
         document["notes"].as_array().unwrap().iter().map(|n| n.as_str().unwrap()).collect();
     assert_eq!(
         notes,
-        ["nodout is read, crashT01 holds it too", "rwforc is read, crashT01 holds it too"]
+        ["nodout is read; crashT01 also holds it", "rwforc is read; crashT01 also holds it"]
     );
     assert_eq!(
         left_out(&document),
@@ -1272,7 +1272,7 @@ fn walls_that_act_one_after_the_other_are_added() {
     let text = fs::read_to_string(here.join("found.toml")).unwrap();
     says(
         &text,
-        "they act one after the other: the bodies follow none of them alone, but their sum",
+        "they act one after the other: the bodies follow their sum, but none of them alone",
     );
     crumple_ok(here, "build found.toml -o found.h5 -q");
     // The user may ask for the sum.
@@ -1361,7 +1361,7 @@ fn a_late_force_is_not_taken_for_gravity() {
     assert!(!said.contains("free flight"), "{said}");
     layout.rwforc(&run, &history, &[wall(&force_n)]);
     let said = warned(here, "build s.toml -o s.h5");
-    says(&said, "as neither gravity nor brakes change it: the force is recorded late");
+    says(&said, "in a way that neither gravity nor brakes explain: the force is recorded late");
 }
 
 /// A body that falls through its impact takes more impulse than its mass times its change of speed.
@@ -1391,7 +1391,7 @@ fn gravity_does_not_falsify_the_mass() {
     let said = warned(here, "init drop --units mm-t-s -o without.toml");
     says(
         &said,
-        "the body's speed changes without the force too (gravity, brakes, another contact)",
+        "the body's speed also changes without the force (gravity, brakes, another contact)",
     );
     Layout { units: MM_T_S, axis: 0, sign: 1.0 }.glstat(&run, &history);
     crumple_ok(here, "init drop --units mm-t-s -o with.toml");

@@ -316,7 +316,7 @@ fn factors_of_oasys_curves() {
     };
     #[rustfmt::skip]
     let cases = [
-        (y, x, "line 2: expected a deflection in the first column, found \"Contact force <FORCE/1000>;\": name the columns by --deflection-column"),
+        (y, x, "line 2: expected a deflection in the first column, found \"Contact force <FORCE/1000>;\": choose the columns with --deflection-column"),
         ("Crush <FORCE/1000>;", y, "line 2: the unit \"FORCE/1000\" of the deflection is not known"),
         ("Crush <LENGTH/mm>;", y, "line 2: the unit \"LENGTH/mm\" of the deflection is not known"),
         ("Velocity (m/s)", y, "line 2: the unit \"m/s\" of the deflection is not known"),

@@ -438,7 +438,7 @@ fn far_outside_the_training_speeds_nothing_is_answered_unasked() {
     predict(&one, &Query::at(10.0)).unwrap();
     let error = predict(&one, &Query::at(11.0)).unwrap_err().to_string();
     assert!(
-        error.contains("39.6 km/h is 3.6 km/h from 36 km/h, the one training speed"),
+        error.contains("39.6 km/h is 3.6 km/h from 36 km/h, the only training speed"),
         "{error}"
     );
 

@@ -152,7 +152,7 @@ fn a_killed_run_says_nothing_of_the_others() {
     let copied = binout_of(&fixture("fe/lead-car-wall/48kmh"));
     fs::write(here.join("runs/48kmh/binout0000"), copied).unwrap();
     let printed = crumple_ok(here, "init runs -o binout.toml");
-    let hint = "; binout0000 holds it too, and is read where there is no nodout\n";
+    let hint = "; binout0000 also holds it, and is read where there is no nodout\n";
     says(&printed, hint);
     fs::remove_file(here.join("runs/48kmh/binout0000")).unwrap();
     // The run that died counts as damage for --strict.

@@ -342,7 +342,7 @@ fn a_restart_goes_on_where_the_run_ended() {
     let joined = section(&at("runT01"), "rwforc");
     let before = joined.time[98];
     let expected = format!(
-        "states after time {before:?} are missing: the forces on both sides are differences across the hole"
+        "states after time {before:?} are missing: the forces on both sides are differences across the gap"
     );
     assert!(
         joined.problems.iter().any(|p| p.message.starts_with(&expected)),
@@ -382,7 +382,7 @@ fn a_restart_goes_on_where_the_run_ended() {
     assert_eq!(file.time.len(), 5);
     assert_eq!(
         file.problems[0].to_string(),
-        "T02, the continuation, holds other histories: it and what follows are not read"
+        "T02, the continuation, holds other histories: neither it nor what follows is read"
     );
 }
 
@@ -431,7 +431,7 @@ fn every_group_is_read() {
     let notes = section(&path, "rwforc").notes;
     assert_eq!(
         notes[1],
-        "no tangential impulses are recorded for 3: their forces are the normal ones alone"
+        "no tangential impulses are recorded for 3: their forces are the normal components only"
     );
     // The variables of one object may be in several groups: no force is then half of one.
     fs::write(&path, written(3040, &[(102, 3, 3), (102, 3, 6)], 5)).unwrap();

@@ -280,7 +280,7 @@ fn sweeps_are_drawn_from_csv_and_hdf5() {
     crumple_ok(folder, "plot same.data --result peak_force -o c.svg");
     says(
         &crumple_fails(folder, 2, "export same.h5 --to csv"),
-        "is a sweep's result, which holds no curve",
+        "is the result of a sweep and holds no curve",
     );
     let whole = fs::read(folder.join("same.h5")).unwrap();
     let spoil = |from: &[u8], to: &[u8]| {
@@ -321,7 +321,7 @@ fn wrong_wishes_are_refused() {
         (1, "two-sets.toml --body A9 -o a.svg", "there is no body \"A9\": expected one of A1, A2"),
         (2, "two-sets.toml --interface A1|A2 -o a.svg", "this quantity is chosen with --body"),
         (2, "lead.model --speed 50km/h --over speed -o a.svg", "--over is for a sweep"),
-        (1, "cut.csv -o a.svg", "cut.csv: expected \"# crumple sweep\" in the first line and a whole head"),
+        (1, "cut.csv -o a.svg", "cut.csv: expected \"# crumple sweep\" in the first line and a complete header"),
         (1, "other.csv -o a.svg", "expected the columns of crumple simulate -o"),
         (1, "nothing.csv -o a.svg", "nothing.csv"),
         (2, "lead.model --speed 50km/h -o lead.model", "pictures are written"),

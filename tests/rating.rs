@@ -209,11 +209,12 @@ fn parts_and_units_are_said() {
         let column = header.split_once(',').unwrap().1;
         let other = format!("c.csv:{column}");
         let of = rate(here, &["a.csv:a_m_per_s2[A1]", &other]);
-        let expected =
-            format!("by their names the reference is in m/s² and the prediction in {unit}");
+        let expected = format!(
+            "according to their names, the reference is in m/s² and the prediction in {unit}"
+        );
         says(&of["warnings"].to_string(), &expected);
         let of = rate(here, &["a.csv:a_m_per_s2[A1]", &format!("{other},scale=0.5")]);
-        assert!(!of["warnings"].to_string().contains("by their names"), "{of}");
+        assert!(!of["warnings"].to_string().contains("according to their names"), "{of}");
     }
 }
 

@@ -258,7 +258,7 @@ fn every_command_takes_replicates() {
     cases[4].provenance.recipe = r#"{"recipe": {"filter": "CFC60"}}"#.into();
     database_of(&here.join("d.h5"), &[("made", cases)]);
     crumple_fails(here, 1, "validate d.h5");
-    says(&crumple_ok(here, "db check d.h5"), "has the same speed as a, but another recipe");
+    says(&crumple_ok(here, "db check d.h5"), "has the same speed as a, but a different recipe");
 }
 
 /// Dents 5 % deeper, sheets 1 % thicker, friction 10 % higher: nominally one run.

@@ -176,7 +176,7 @@ fn what_has_no_effect_is_refused() {
     let by = |values: &str| {
         format!("{force} }}, {{ what = \"curve\", curve = \"nose\", values = [{values}]")
     };
-    refused(SCENARIO, &by("\"soft\""), "puts other curves in the place of \"nose\" in every item");
+    refused(SCENARIO, &by("\"soft\""), "another variable replaces curve \"nose\" in every item");
     let both = by("\"soft\", \"nose\"");
     folder.put("s.toml", &format!("{SCENARIO}[sweep]\nvary = [ {{ {both} }} ]\n"));
     folder.ok("sweep s.toml -q --dry-run");
@@ -924,7 +924,7 @@ fn another_sweeps_file_is_not_taken_up() {
         let error = folder.fails(1, "sweep s.toml -q -o out.csv");
         says(
             &error,
-            "out.csv.part belongs to another sweep: plan, scenario or a file it names have changed since; --restart replaces it",
+            "out.csv.part belongs to another sweep: the plan, the scenario or a file it names has changed since; --restart replaces it",
         );
         assert!(folder.read("out.csv.part") == begun);
         folder.put(file, &old);
@@ -1111,9 +1111,9 @@ fn wrong_plans_are_named_by_file_and_key() {
         ("what = \"curve\", curve = \"nose\", from = 1, to = 2, steps = 2", "a curve needs values"),
         ("what = \"force\", curve = \"nose\", distribution = \"cauchy\"", "unknown variant `cauchy`"),
         ("what = \"force\", curve = \"nose\", distribution = \"normal\", mean = 1, sd = 0", "sd must be above 0"),
-        ("what = \"force\", curve = \"nose\", distribution = \"normal\", mean = 1, sd = 1, min = 3, max = 2", "min must lie below max"),
-        ("what = \"force\", curve = \"nose\", distribution = \"uniform\", from = 1, to = 1", "from must lie below to"),
-        ("what = \"force\", curve = \"nose\", distribution = \"triangular\", from = 1, mode = 3, to = 2", "from, mode and to must rise"),
+        ("what = \"force\", curve = \"nose\", distribution = \"normal\", mean = 1, sd = 1, min = 3, max = 2", "min must be less than max"),
+        ("what = \"force\", curve = \"nose\", distribution = \"uniform\", from = 1, to = 1", "from must be less than to"),
+        ("what = \"force\", curve = \"nose\", distribution = \"triangular\", from = 1, mode = 3, to = 2", "from, mode and to must increase"),
         ("what = \"force\", curve = \"nose\", distribution = \"uniform\", from = 1, to = 2", "add samples = … to [sweep]"),
         ("what = \"force\", curve = \"nose\", from = 1, to = 2, steps = 1000000000000000000", "the sweep has 1000000000000000000 items: 1000000000000 at most"),
     ];

@@ -595,7 +595,7 @@ fn limits_on_occupants_are_judged() {
     let (text, _) = judged(&limits, "15ms");
     says(
         &text,
-        "secondary impact above 0.1 m/s: no vehicle of which it is known; the run ended before it is known of A1, A2, A3",
+        "secondary impact above 0.1 m/s: no vehicle for which it is known; the run ended before it was known for A1, A2, A3",
     );
     let text = std::fs::read_to_string(here.join("limits.toml")).unwrap();
     let coarse = text.replace("output_interval = \"0.75ms\"", "output_interval = \"7.5ms\"");
@@ -991,7 +991,7 @@ fn curves_of_a_scenario_are_bounded() {
     says(&said, "[curves] has 1001 curves: expected at most 1000");
     std::fs::File::create(here.join("a.csv")).unwrap().set_len(60 << 20).unwrap();
     let said = fails(&many[..40].join("\n").replace("nose0 ", "nose "));
-    let expected = "the files of [curves] have 2400 MB together: expected at most 2048";
+    let expected = "the files of [curves] total 2400 MB: expected at most 2048";
     says(&said, expected);
 }
 

@@ -171,7 +171,7 @@ pub struct Gap {
     /// run there would take away.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub expected_force_l1: Option<f64>,
-    /// Whether the collapse changes its mode between the two speeds, which a run there decides.
+    /// Whether the collapse mode changes between the two speeds, which a run there decides.
     pub mode_switch: bool,
 }
 
@@ -230,7 +230,7 @@ pub(crate) fn next_run(set: &TrainingSet, validation: &Validation) -> Option<Nex
     let Gap { between_m_per_s: (low, high), expected_force_l1, mode_switch } = gaps.next()?;
     let reason = match expected_force_l1 {
         _ if mode_switch => format!(
-            "the collapse changes its mode between {} and {}: a run in the middle decides which of the two a speed between them follows",
+            "the collapse mode changes between {} and {}: a run in the middle decides which of the two a speed between them follows",
             km_per_h(low),
             km_per_h(high)
         ),

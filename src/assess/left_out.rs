@@ -271,7 +271,7 @@ impl LeftOutRun<'_> {
         let judged = match self.answers.get(&rule) {
             Some(Ok(answer)) => self.held.judged(self.model, answer).map_err(|e| e.to_string()),
             Some(Err(error)) => Err(error.clone()),
-            None => Err(format!("the rule {} was not asked", rule.name())),
+            None => Err(format!("the rule {} was not requested", rule.name())),
         };
         let speed = km_per_h(self.held.own.speed_m_per_s);
         let Score { row, residuals } =

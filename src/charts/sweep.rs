@@ -34,7 +34,10 @@ pub(crate) fn sweep(
     let varied: Vec<&ResultColumn> =
         columns.varied.iter().filter(|column| distinct(column).len() > 1).collect();
     if varied.is_empty() {
-        return Err(error!(Plot, "the sweep varies no number, so there is nothing to draw over"));
+        return Err(error!(
+            Plot,
+            "the sweep varies no numeric quantity, so there is nothing to plot against"
+        ));
     }
     let is_grid = |column: &ResultColumn| {
         let values = distinct(column).len();

@@ -68,7 +68,7 @@ pub(super) struct Args {
 
 /// Where the genetic algorithm may start.
 const STARTS: &[(&str, Start, &str)] = &[
-    ("random", Start::Random, "From values drawn evenly, as the reference method has it"),
+    ("random", Start::Random, "From values drawn evenly, as in the reference method"),
     (
         "least-squares",
         Start::LeastSquares,

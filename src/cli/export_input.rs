@@ -35,7 +35,7 @@ impl Input {
             FileKind::Curve => Self::Curve(Box::new(json::predicted(path)?)),
             FileKind::Sweep => {
                 let (path, of) = (path.display(), "give a curve, a model or a database");
-                return usage(format!("{path} is a sweep's result, which holds no curve: {of}"));
+                return usage(format!("{path} is the result of a sweep and holds no curve: {of}"));
             }
             FileKind::Scenario | FileKind::Result | FileKind::Solver => Self::File(path.into()),
         })

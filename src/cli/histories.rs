@@ -203,7 +203,7 @@ fn stream_csv(
         None => {
             let written = output::print_data(write)?;
             if written.is_none() {
-                read_error.get_or_insert(io::Error::other("it has changed while it was read"));
+                read_error.get_or_insert(io::Error::other("it changed while it was being read"));
             }
             written
         }

@@ -256,7 +256,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         && of_a != of_b
     {
         rating.warnings.push(format!(
-            "by their names the reference is in {of_a} and the prediction in {of_b}, and they are compared as they stand: write the factor after a file's name, such as {},scale=0.001",
+            "according to their names, the reference is in {of_a} and the prediction in {of_b}, and they are compared as they stand: write the factor after a file's name, such as {},scale=0.001",
             b.path().display()
         ));
     }

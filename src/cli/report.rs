@@ -38,7 +38,7 @@ pub(super) struct Args {
     /// Title of the page (default: the first file's name)
     #[arg(long)]
     title: Option<String>,
-    /// Who answers for the page
+    /// Person responsible for the page
     #[arg(long)]
     author: Option<String>,
     /// Left-out speeds at which the methods are compared, half a second each

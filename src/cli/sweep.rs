@@ -45,7 +45,7 @@ pub(super) struct Args {
     /// Scenario (TOML) with a [sweep] table
     #[arg(required = true)]
     scenario: Option<PathBuf>,
-    /// File (TOML) whose [sweep] table takes the place of the scenario's
+    /// File (TOML) whose [sweep] table replaces the scenario's
     #[arg(long, value_name = "PLAN")]
     plan: Option<PathBuf>,
     /// Where to write: .csv, .h5 or .hdf5; "-" is CSV on standard output
@@ -54,8 +54,8 @@ pub(super) struct Args {
     /// Run block I of N blocks of the items
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<Shard>,
-    /// Stop as soon as the mean of a result is known within ± this much, with 95 % confidence: by its column, in its unit;
-    /// of over_limits the share. Needs variables that are all drawn at random; the plan's samples are the most
+    /// Stop as soon as the mean of a result (of over_limits the share of runs) is known within ±HALFWIDTH, in the
+    /// column's unit, with 95 % confidence. All variables must be drawn at random; the plan's samples are the upper limit
     #[arg(long, value_name = "COLUMN=HALFWIDTH", value_parser = precision, conflicts_with_all = ["shard", "dry_run"])]
     until: Option<Precision>,
     /// Start from the beginning and discard the results of an earlier run

@@ -51,7 +51,7 @@ pub(super) struct Args {
     /// Minimum samples per leaf
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     min_samples_leaf: u32,
-    /// Split thresholds [default: midpoint of a forest, random of extra]
+    /// Split thresholds [default: midpoint for forest, random for extra]
     #[arg(long, value_parser = one_of(THRESHOLDS))]
     thresholds: Option<Thresholds>,
     /// When a node is no longer split

@@ -65,10 +65,10 @@ pub(super) struct Args {
     /// Also leave speeds out of the choice itself, for an unbiased error of auto (takes longer)
     #[arg(long)]
     nested: bool,
-    /// Judge the choice by every subset of 4 and 5 speeds, which predicts the speeds that it lacks (takes longer)
+    /// Assess the choice on every subset of 4 and 5 speeds by predicting the speeds that it lacks (takes longer)
     #[arg(long)]
     subsets: bool,
-    /// Leave out every case, not 20 spread over the range of more (takes longer)
+    /// Leave out every case, even if there are more than 20 (takes longer)
     #[arg(long)]
     thorough: bool,
     /// Show what has changed since an earlier validation: the document that --json printed

@@ -24,7 +24,7 @@ pub struct ForceCurve {
     /// Loading branch from (0, 0) to the maximum crush.
     pub loading: Envelope,
     /// The same force along deflections of which some lie beyond the maximum crush: neighbours
-    /// in a train push on where a body by itself would have stopped.
+    /// in a train keep pushing where a body by itself would have stopped.
     pub beyond: Option<Envelope>,
     /// From the end of the loading branch.
     pub unloading: CurveUnloading,

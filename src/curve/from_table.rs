@@ -145,9 +145,9 @@ fn recorded(
     time_s: &[f64],
     impact: &Impact,
 ) -> Result<(RecordedCurves, Quality), Error> {
-    let mut notes = vec!["motion: that of the file's times, not filtered".to_string()];
+    let mut notes = vec!["motion: from the file's times, not filtered".to_string()];
     let contact = begins_in_contact(time_s, table.force_n).then(|| {
-        notes.push("contact: the record starts with it".into());
+        notes.push("contact: the record starts at contact".into());
         StatedContact::Time { s: time_s[0] }
     });
     let common = Sampling::default();
@@ -222,7 +222,7 @@ fn unloading_of_record(found: Option<f64>, stated: f64) -> Result<String, String
             Shown::one_stiffness(found),
             Shown::one_stiffness(stated)
         )),
-        None => Err("unloading: a record over time keeps its own, which it does not hold; the stated one is not used".into()),
+        None => Err("unloading: a record over time unloads as recorded, but this one ends before it unloads; the stated stiffness is not used".into()),
     }
 }
 

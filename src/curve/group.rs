@@ -221,7 +221,7 @@ fn designs(runs: &[&Case]) -> Vec<Remark> {
         let why = if !(LEAST_RATIO..=most).contains(&ratio) {
             format!("its mean force is {ratio:.2} times that of {}", slow.id.name)
         } else if likeness < LEAST_CORRELATION {
-            format!("its peaks come in another order than those of {}", slow.id.name)
+            format!("its peaks come in a different order from those of {}", slow.id.name)
         } else {
             continue;
         };

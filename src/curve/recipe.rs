@@ -188,7 +188,7 @@ struct ForceTable {
     node: Option<i64>,
     /// Such as "normal_force", "x_force"; for a body force "x_acceleration" or "x_velocity".
     component: String,
-    /// "mass" makes a body force of the node's acceleration.
+    /// "mass" makes a body force from the node's acceleration.
     #[serde(skip_serializing_if = "Option::is_none")]
     times: Option<String>,
 }

@@ -104,7 +104,7 @@ pub(super) fn retrace(
             .into(),
     );
     if table.body_force_n.is_some() {
-        builder.motion.notes.push("motion: by the work of the body force".into());
+        builder.motion.notes.push("motion: from the work of the body force".into());
     }
     builder.begin(0.0, f[0], v0);
     let speeds: Vec<f64> =

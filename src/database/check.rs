@@ -372,7 +372,7 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
             && one.conditions.parameters == other.conditions.parameters;
         // Equal runs of one recipe are replicates.
         if same_value && !one.is_measured_as(other) {
-            let message = format!("has the same speed as {}, but another recipe", one.id.name);
+            let message = format!("has the same speed as {}, but a different recipe", one.id.name);
             add(&pair[1].id.name, "equal_speeds", message);
         }
     }

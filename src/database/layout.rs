@@ -562,7 +562,7 @@ impl Attrs<'_> {
         self.map
             .get(name)
             .and_then(AttrValue::as_str)
-            .ok_or_else(|| self.place.damaged(format!("attribute {name} is missing or not a text")))
+            .ok_or_else(|| self.place.damaged(format!("attribute {name} is missing or not text")))
     }
 
     fn kind<T>(&self, name: &str, parse: fn(&str) -> Option<T>) -> Result<T, Error> {

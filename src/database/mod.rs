@@ -461,7 +461,7 @@ pub(crate) fn check_name(name: &str) -> Result<(), &'static str> {
     if name.trim().is_empty() {
         Err("it is blank")
     } else if name == "." || name == ".." {
-        Err("HDF5 takes it for a place")
+        Err("it has a special meaning in HDF5")
     } else if name.contains(|c: char| c.is_control() || c == '/') {
         Err("it may not contain \"/\" or control characters")
     } else if name.len() > MAX_NAME {

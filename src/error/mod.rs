@@ -231,7 +231,7 @@ impl StdError for Error {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum ErrorCode {
-    /// The arguments are invalid, or fit neither together nor the file.
+    /// The arguments are invalid, or do not fit each other or the file.
     Usage,
     /// A file cannot be opened, read or written.
     Io,

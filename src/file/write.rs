@@ -121,7 +121,7 @@ impl Draft {
             there => there.map(|meta| meta.permissions()),
         };
         if existing.as_ref().is_some_and(fs::Permissions::readonly) {
-            let message = "the file is read-only: name another, or allow writing it";
+            let message = "the file is read-only: name another, or make it writable";
             return Err(io::Error::new(io::ErrorKind::PermissionDenied, message));
         }
         let target = target_of(path)?;

@@ -367,7 +367,7 @@ impl<F: Float> Tree<F> {
             let (left, right) = (self.left[node] as usize, self.right[node] as usize);
             if left <= node || right != left.saturating_add(1) || right >= nodes {
                 return damaged(format!(
-                    "node {node} has children that do not stand side by side after it"
+                    "node {node} has children that are not next to each other after it"
                 ));
             }
         }

@@ -336,10 +336,10 @@ impl ExportCurve {
         match (self.predicted.rebound.is_some(), softer) {
             (true, false) => "along this stiffness from the maximum crush it gives the rebound",
             (true, true) => {
-                "along this stiffness from the maximum crush it gives the rebound; from a point of the steepest rise it would give energy"
+                "along this stiffness from the maximum crush it gives the rebound; from a point of the steepest rise it would generate energy"
             }
             (false, _) => {
-                "no run shows the rebound: at least the steepest rise, so that it gives no energy"
+                "no run shows the rebound: at least the steepest rise, so as to generate no energy"
             }
         }
     }
@@ -349,11 +349,11 @@ impl ExportCurve {
         match self.other_mass_kg() {
             None => "one body of this mass against a rigid wall".into(),
             Some(other) if other == self.predicted.mass_kg => {
-                "two bodies of this mass each; the speed is that of their closure".into()
+                "two bodies of this mass each; the speed is their closing speed".into()
             }
             Some(other) => {
                 format!(
-                    "two bodies, of this mass and of {other} kg; the speed is that of their closure"
+                    "two bodies, of this mass and of {other} kg; the speed is their closing speed"
                 )
             }
         }

@@ -101,7 +101,7 @@ impl Facts<'_> {
             ),
             (StudyKind::Wall, None) if *bodies > 1 => "several bodies move, no force shows which of them meet, and no two changes of momentum balance: the fastest is taken, as if it hit a wall".into(),
             (StudyKind::Wall, Some(force)) if force.file == "rwforc" => "one body moves, and a rigid wall stops it (which may be the symmetry plane of a pair: see half_model)".into(),
-            (StudyKind::Wall, _) => "one body moves in the files: if what it meets moves too, write one of its nodes to nodout".into(),
+            (StudyKind::Wall, _) => "one body moves in the files: if the object that it hits moves too, write one of its nodes to nodout".into(),
         };
         Proposed::found(*kind, Guessed, from)
     }
@@ -170,7 +170,7 @@ impl Facts<'_> {
             Proposed::found(source, Given, "by --force")
         } else if force.ids.len() > 1 && self.recipe.beside.ids.is_empty() {
             let from =
-                "they act one after the other: the bodies follow none of them alone, but their sum";
+                "they act one after the other: the bodies follow their sum, but none of them alone";
             Proposed::found(source, Computed, from)
         } else if force.ids.len() > 1 {
             let from = "they share the load: together they give the bodies their mass";
@@ -285,7 +285,7 @@ impl Facts<'_> {
         {
             let ms = |impact: &Impact| digits(impact.interval_s * 1e3);
             warnings.push(format!(
-                "run {}: a state every {} ms, the others every {} ms: sampling and filter of all follow the coarsest; leave it out if they matter more",
+                "run {}: a state every {} ms, the others every {} ms: sampling and filter of all runs follow the coarsest; leave this run out if the others matter more",
                 record.run.name,
                 ms(coarsest),
                 ms(usual)
@@ -294,7 +294,7 @@ impl Facts<'_> {
         let oblique = self.records.iter().find(|record| record.run.survey.aligned < ALONG);
         if let Some(Record { run, .. }) = oblique {
             warnings.push(format!(
-                "run {}: only {:.0} % of the initial speed lie along {}: deflection and speed of a recipe are along an axis",
+                "run {}: only {:.0} % of the initial speed lies along {}: deflection and speed of a recipe are along an axis",
                 run.name,
                 run.survey.aligned * 100.0,
                 recipe.direction.axis()
@@ -315,7 +315,7 @@ impl Facts<'_> {
             for source in [&run.sources.motion].into_iter().chain(force) {
                 if !source.others.is_empty() {
                     let (read, others) = (source.shown(), source.others.join(" and "));
-                    *chosen.entry(format!("{read} is read, {others} holds it too")).or_default() +=
+                    *chosen.entry(format!("{read} is read; {others} also holds it")).or_default() +=
                         1;
                 }
             }
@@ -477,18 +477,18 @@ impl Facts<'_> {
         let times = digits(mean);
         if self.hints.mass_kg.is_some() {
             warnings.push(format!(
-                "mass: by their velocities the other body is {times} times as heavy, and --mass alone would apply to both: use --other-mass"
+                "mass: judging by their velocities, the other body is {times} times as heavy, and --mass alone would apply to both: use --other-mass"
             ));
             return None;
         }
-        Some(format!("by their velocities {times} times the mass: use --other-mass"))
+        Some(format!("judging by their velocities, {times} times the mass: use --other-mass"))
     }
 }
 
 /// Why not the usual class, which keeps so much of the work.
 fn taken(kept: f64) -> String {
     let (usual, taken) = (measure::CLASSES[0], 100.0 * (1.0 - kept));
-    format!("the impacts are short: CFC {usual} would take {taken:.1} % of the work from the force")
+    format!("the impacts are short: CFC {usual} would remove {taken:.1} % of the work of the force")
 }
 
 /// Speeds in a folder's name and the run's own deck that contradict the record.

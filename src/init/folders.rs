@@ -242,7 +242,7 @@ pub(crate) enum Reason {
         damage: String,
     },
     #[error(
-        "it terminated early: the record ends at {end}, while the bodies still close at {} % of their first speed{}{damage}", (share * 100.0).round(), if *.share < MOVES_ON { " (an obstacle that moves on needs --kind pair --minus-node ID)" } else { "" }
+        "it terminated early: the record ends at {end}, while the bodies still close at {} % of their first speed{}{damage}", (share * 100.0).round(), if *.share < MOVES_ON { " (an obstacle that keeps moving needs --kind pair --minus-node ID)" } else { "" }
     )]
     EndsWhileLoading {
         /// Last time that motion and force share, with its unit if that is known.

@@ -136,7 +136,7 @@ pub(super) fn agree(
             && !mass.is_explained(momentum, energy)
         {
             warnings.push(format!(
-                "mass: in {name} momentum gives {}, the kinetic energy at the start {}: the force acts on only part of the moving mass, or more than the bodies moves",
+                "mass: in {name} momentum gives {}, the kinetic energy at the start {}: the force acts on only part of the moving mass, or more than the bodies is moving",
                 shown_mass(momentum),
                 shown_mass(energy)
             ));
@@ -145,7 +145,7 @@ pub(super) fn agree(
             && mass.unexplained > UNEXPLAINED
         {
             warnings.push(format!(
-                "mass: in {name} the body's speed changes without the force too (gravity, brakes, another contact), which may change the mass by momentum by {:.0} %: give --mass",
+                "mass: in {name} the body's speed also changes without the force (gravity, brakes, another contact), which may change the mass from momentum by {:.0} %: give --mass",
                 100.0 * mass.unexplained
             ));
         }
@@ -195,7 +195,7 @@ pub(super) fn differ(masses: &[Proposed<f64>]) -> Option<String> {
     (all.len() > 1).then(|| {
         let shown: Vec<String> = all.iter().map(|kg| digits(kg / 1e3)).collect();
         format!(
-            "mass: the runs' masses differ ({} t): are they of one vehicle? Models then take the mass as a parameter",
+            "mass: the runs' masses differ ({} t): do they belong to one vehicle? Models then take the mass as a parameter",
             shown.join(", ")
         )
     })

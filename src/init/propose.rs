@@ -66,7 +66,7 @@ pub(crate) fn propose(
     let (mut records, unnamed): (Vec<Record>, Vec<Record>) =
         records.into_iter().partition(|record| seen_from(folder, &record.run.path).is_some());
     left_out.extend(unnamed.into_iter().map(|record| {
-        let why = "its path is not UTF-8, which no study can hold: rename the folder".into();
+        let why = "its path is not UTF-8, so no study can name it: rename the folder".into();
         LeftOut::new(record.run.path, Reason::Unusable { why })
     }));
     if records.is_empty() {
@@ -155,7 +155,7 @@ fn refuse_hints(
         if found.is_some_and(|found| found.kind == StudyKind::Pair) {
             return Err(error!(
                 Study,
-                "two bodies move in these runs, and a half model has one: leave out --half-model"
+                "two bodies move in these runs, but a half model has only one: remove --half-model"
             ));
         }
     } else if (hints.kind == Some(StudyKind::Pair) || hints.minus_node.is_some())
@@ -163,7 +163,7 @@ fn refuse_hints(
     {
         return Err(error!(
             Study,
-            "only one body moves in these runs: if it represents a pair, cut at its symmetry plane, use --half-model; if it hits a wall, leave out --kind pair and --minus-node"
+            "only one body moves in these runs: if it represents a pair, cut at its symmetry plane, use --half-model; if it hits a wall, remove --kind pair and --minus-node"
         ));
     }
     Ok(())
@@ -264,7 +264,7 @@ fn agree_on_units(
         let others = match &motion.others[..] {
             [] => String::new(),
             others => format!(
-                "; {} holds it too, and is read where there is no {}",
+                "; {} also holds it, and is read where there is no {}",
                 others.join(" and "),
                 motion.shown()
             ),
@@ -274,7 +274,7 @@ fn agree_on_units(
                 Some(units) => milliseconds(end * units.time_s),
                 None => format!("{end} in the file's unit of time"),
             } + &record.force_ends.as_ref().map_or(String::new(), |file| {
-                format!(", where {file} ends and the motion goes on")
+                format!(", where {file} ends but the motion goes on")
             }),
             share: record.loading_end().err().unwrap_or_default(),
             damage: record.damage() + &others,

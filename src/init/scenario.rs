@@ -70,7 +70,7 @@ pub(crate) fn propose_scenario(
     if !(1..=2).contains(&models.len()) {
         return Err(error!(
             Usage,
-            "a scenario takes one model or two, found {found}: the curve between the noses, or nose and wall, then that between the vehicles of a train",
+            "a scenario takes one model or two, found {found}: first the curve between the noses, or nose and wall, then that between the vehicles of a train",
             found = models.len()
         ));
     }
@@ -80,7 +80,7 @@ pub(crate) fn propose_scenario(
     if inner.is_some_and(|inner| inner.speed_kind == SpeedKind::Wall) {
         return Err(error!(
             Study,
-            "{path}: its speeds are wall speeds, and the curve between the vehicles of a train is one of closing speeds: name such a model second",
+            "{path}: its speeds are wall speeds, but the curve between the vehicles of a train needs closing speeds: give a model with closing speeds second",
             path = models[1].display()
         ));
     }

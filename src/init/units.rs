@@ -124,7 +124,7 @@ pub(super) fn choose(
                 None => "no usual system fits better".into(),
             };
             warnings.push(format!(
-                "units: {units} as given would make {why}, which is not a crash; {better}"
+                "units: {units} as given would imply {why}, which is not a crash; {better}"
             ));
         }
         return Proposed::found(units, Given, "by --units");
@@ -138,12 +138,12 @@ pub(super) fn choose(
             return Proposed::found(units, Read, from);
         };
         warnings
-            .push(format!("units: {place} states {units}, which would make {why}; it is not used"));
+            .push(format!("units: {place} states {units}, which would give {why}; it is not used"));
     }
     match (guessed(runs, warnings), runs.first()) {
         (Some((units, evidence, from)), _) => Proposed::found(units, evidence, from),
         (None, Some(first)) => Proposed::missing(format!(
-            "in none of the usual systems ({}) is this an impact: speed {}, crush {}, time to it {} in the file's units",
+            "this is not an impact in any of the usual systems ({}): speed {}, crush {}, time to it {} in the file's units",
             UnitSystem::USUAL.join(", "),
             digits(first.speed),
             digits(first.crush),
@@ -184,7 +184,7 @@ fn guessed(
 ) -> Option<(UnitSystem, Evidence, String)> {
     let first = runs.first()?;
     let refused = |units: &UnitSystem, why: &dyn Fn(&Magnitudes) -> Option<String>| {
-        runs.iter().find_map(why).map(|why| format!("{units} would make {why}"))
+        runs.iter().find_map(why).map(|why| format!("{units} would give {why}"))
     };
     let unusual = |units: &UnitSystem| runs.iter().map(|run| run.unusual(units).0).sum::<f64>();
     let (mut possible, mut others): (Vec<UnitSystem>, Vec<String>) = Default::default();
@@ -212,7 +212,7 @@ fn guessed(
     if let Some(other) = customary.first() {
         let speed = |units: &UnitSystem| shown_speed(first.speed * units.speed());
         warnings.push(format!(
-            "units: {units} is taken, an impact at {}; if the model is in inches or feet, such as {other} with {}, use --units",
+            "units: {units} is assumed, which gives an impact at {}; if the model is in inches or feet, such as {other} with {}, use --units",
             speed(units),
             speed(other)
         ));
@@ -326,7 +326,7 @@ mod tests {
             }
         }
         let found = choose(&[shunting(0.5)], None, None, &mut Vec::new()).to_string();
-        assert!(found.contains("SI would make a mean deceleration of 6944 m/s²"), "{found}");
+        assert!(found.contains("SI would give a mean deceleration of 6944 m/s²"), "{found}");
     }
 
     /// A car in inches has the numbers of a slow one in millimetres: the folder's name decides, else the user is asked.
@@ -338,7 +338,7 @@ mod tests {
         let found = choose(&[run], None, None, &mut warnings);
         assert_eq!(found.value().unwrap().to_string(), "mm-t-s");
         assert!(found.to_string().starts_with("guessed: "), "{found}");
-        let warned = "units: mm-t-s is taken, an impact at 1.97 km/h; if the model is in inches or feet, such as in-slinch-s with 50.04 km/h, use --units";
+        let warned = "units: mm-t-s is assumed, which gives an impact at 1.97 km/h; if the model is in inches or feet, such as in-slinch-s with 50.04 km/h, use --units";
         assert_eq!(warnings, [warned]);
         for half in [1.0, 2.0] {
             let named = Magnitudes { named_m_per_s: Some(half * 13.9), ..run };
@@ -374,7 +374,7 @@ mod tests {
         assert_eq!(
             warnings,
             [
-                "units: main.k, line 3 states SI, which would make an impact at 13900 m/s; it is not used"
+                "units: main.k, line 3 states SI, which would give an impact at 13900 m/s; it is not used"
             ]
         );
         let found = choose(&[car(&UnitSystem::SI)], None, stated, &mut Vec::new());
@@ -393,7 +393,8 @@ mod tests {
         };
         let found = choose(&[slow], None, None, &mut Vec::new());
         assert!(found.value().is_none());
-        assert!(found.to_string().starts_with("fill in: in none of the usual systems"), "{found}");
+        let said = "fill in: this is not an impact in any of the usual systems";
+        assert!(found.to_string().starts_with(said), "{found}");
     }
 
     #[test]

@@ -251,7 +251,7 @@ impl Chain {
                 return Some("a rate that follows a body that does not exist");
             }
             if interface.tension.is_some() {
-                return Some("a rate and a coupling: a rate is that of compression");
+                return Some("a rate and a coupling: a rate applies to compression only");
             }
         }
         let stopping = interface.stopping.as_ref()?;

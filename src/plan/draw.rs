@@ -102,7 +102,7 @@ impl Distribution {
         if from < to {
             Ok(Self::Uniform { from, to })
         } else {
-            Err(error!(Sweep at "to", "from must lie below to"))
+            Err(error!(Sweep at "to", "from must be less than to"))
         }
     }
 
@@ -111,7 +111,7 @@ impl Distribution {
         if from < to && from <= mode && mode <= to {
             Ok(Self::Triangular { from, mode, to })
         } else {
-            Err(error!(Sweep at "mode", "from, mode and to must rise"))
+            Err(error!(Sweep at "mode", "from, mode and to must increase"))
         }
     }
 
@@ -161,7 +161,7 @@ impl Distribution {
 
 fn order(sd: f64) -> Error {
     if sd > 0.0 {
-        error!(Sweep at "max", "min must lie below max")
+        error!(Sweep at "max", "min must be less than max")
     } else {
         error!(Sweep at "sd", "sd must be above 0")
     }

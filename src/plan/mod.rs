@@ -36,7 +36,7 @@ pub(crate) struct Plan {
     /// Of the random draws; 0 if absent.
     #[serde(default)]
     pub(crate) seed: u64,
-    /// Draws at each point of the grid; needed as soon as one variable has a distribution.
+    /// Draws at each point of the grid; needed if a variable has a distribution.
     pub(crate) samples: Option<u64>,
     /// How distributions are drawn.
     #[serde(default)]
@@ -163,11 +163,11 @@ pub(crate) struct Vary {
     pub(crate) factor: bool,
     /// The values; of a curve, names among the curves that take its place.
     pub(crate) values: Option<Vec<Entry>>,
-    /// First of `steps` even values, or lower end of a distribution.
+    /// First of `steps` evenly spaced values, or lower end of a distribution.
     pub(crate) from: Option<Entry>,
-    /// Last of `steps` even values, or upper end of a distribution.
+    /// Last of `steps` evenly spaced values, or upper end of a distribution.
     pub(crate) to: Option<Entry>,
-    /// Number of even values, both ends among them.
+    /// Number of evenly spaced values, including both ends.
     pub(crate) steps: Option<u64>,
     /// How values are drawn, if they are.
     pub(crate) distribution: Option<DistributionName>,

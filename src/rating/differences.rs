@@ -173,7 +173,7 @@ pub(crate) struct Cora {
     pub size: f64,
     /// 1 for a shift up to 1 % of the interval, falling to 0 at 12 %.
     pub phase: f64,
-    /// Half the progression, a quarter of size and of phase each.
+    /// Half the progression, plus a quarter each of size and phase.
     pub cross_correlation: f64,
     /// Mean of corridor and cross-correlation.
     pub rating: f64,
@@ -243,8 +243,8 @@ pub(crate) struct Deceleration {
     pub from_s: Option<f64>,
     /// Time at which it ends, in s.
     pub to_s: Option<f64>,
-    /// Whether the interval ends while −a still exceeds 5 % of its largest value: the mean is then
-    /// of a part of the deceleration.
+    /// Whether the interval ends while −a still exceeds 5 % of its largest value: the mean then
+    /// covers only part of the deceleration.
     pub is_cut: bool,
     /// Largest mean of −a over 120 ms; null if the interval is shorter.
     pub largest_120ms_mean: Option<f64>,

@@ -72,7 +72,7 @@ pub(crate) struct RatingSettings {
 /// they agree. What has no meaning, such as a ratio to zeros, is null.
 #[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
 pub(crate) struct Rating {
-    /// The signal that is taken as right.
+    /// The signal that is taken as correct.
     pub(crate) reference: Rated,
     /// The signal that is rated.
     pub(crate) prediction: Rated,
@@ -240,7 +240,7 @@ fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Ve
         (settings.from_s.unwrap_or(rating.from_s), settings.to_s.unwrap_or(rating.to_s));
     if from_s < rating.from_s - INTERVAL_S || to_s > rating.to_s + INTERVAL_S {
         warnings.push(format!(
-            "{from_s} s to {to_s} s was requested, but the signals have in common only {} s to {} s",
+            "{from_s} s to {to_s} s was requested, but the signals have only {} s to {} s in common",
             rating.from_s, rating.to_s
         ));
     }
@@ -275,7 +275,7 @@ fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Ve
     {
         if of.mean.is_none() {
             warnings.push(format!(
-                "the {who} is never decelerated: an acceleration is negative while the body is slowed down, so scale it by -1 if it has the other sign"
+                "the {who} is never decelerated: an acceleration is negative while the body is slowed down, so scale it by -1 if it has the opposite sign"
             ));
         }
         if of.is_cut {

@@ -58,7 +58,7 @@ pub(super) fn add_scenarios(content: &mut Content, ran: Vec<Ran>) -> Result<(), 
     let mut parts = vec![Part::table("What is compared", conditions)];
     if !apart.is_empty() {
         let apart = apart.join(", ");
-        parts.push(Part::Text(format!("Not compared, because the vehicles are others: {apart}.")));
+        parts.push(Part::Text(format!("Not compared, because the vehicles differ: {apart}.")));
     }
     let g = |digits: usize| move |g: f64| format!("{g:.digits$} g");
     let m_per_s = |v: f64| format!("{v:.1} m/s");

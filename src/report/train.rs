@@ -180,7 +180,7 @@ fn range(
 }
 
 /// What the ranges say.
-const RANGES: &str = "Smallest and largest of three runs: with the curves as they are, with every one that has a band at its lower edge, and at its upper. Ends of vehicles, curves with a rate and recorded curves have none and stay. Mean decelerations are those that limits are held against. A band holds 90 % of the points of a curve that was left out; all at the same edge together are less likely than that.";
+const RANGES: &str = "Smallest and largest of three runs: with the curves as they are, with all curves that have a band at its lower edge, and at its upper edge. Ends of vehicles, curves with a rate and recorded curves have no band and stay the same. Mean decelerations are those compared with limits. A band holds 90 % of the points of a curve that was left out; all at the same edge together are less likely than that.";
 
 /// Each vehicle's results over the bands.
 fn ranges_of_vehicles(found: &Numbers, edges: &[Numbers]) -> impl Into<Table> {
@@ -284,7 +284,7 @@ fn add_limits(
     }
     if !limits.unknown.is_empty() && limits.beyond_data.is_empty() {
         let unknown = limits.unknown.join(", ");
-        verdict("unknown", format!("{what}: the run ended before it is known of {unknown}"));
+        verdict("unknown", format!("{what}: the run ended before it was known for {unknown}"));
     }
     let limit_g = limits.mean_deceleration_limit_g;
     let found = Numbers::of(summary);
@@ -370,7 +370,7 @@ fn ledger(ledger: &Ledger) -> String {
 }
 
 /// What the columns of vehicles mean.
-const VEHICLES: &str = "Positive: slowed down in the direction of the first train. Mean deceleration: while the net contact force acts for the first time, until it ends or changes its sign, and then in the contact that changes the speed most, if that is a later one; limits are held against both. Secondary impact: speed of an unrestrained occupant against the interior after 0.6 m. Occupant load: deceleration that stops an occupant within 235 mm after 65 mm of slack.";
+const VEHICLES: &str = "Positive: slowed down in the direction of the first train. Mean deceleration: while the net contact force acts for the first time, until it ends or changes its sign, and then in the contact that changes the speed most, if that is a later one; limits apply to both. Secondary impact: speed of an unrestrained occupant against the interior after 0.6 m. Occupant load: deceleration that stops an occupant within 235 mm after 65 mm of slack.";
 
 /// Masses, speeds and decelerations.
 fn vehicles(summary: &Summary<'_>) -> impl Into<Table> {

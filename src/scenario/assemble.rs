@@ -66,7 +66,7 @@ pub(super) fn assemble_at(
         && gaps.fold(f64::INFINITY, f64::min) > 0.0
     {
         warnings.push(
-            "resistance acts from the first contact on: the trains run up to it at the speeds given".into(),
+            "resistance acts from the first contact on: until then the trains move at the given speeds".into(),
         );
     }
     warnings.extend(scenario.train.iter().filter_map(without_use));

@@ -414,7 +414,7 @@ fn check_models_of_ends(scenario: &Scenario) -> Result<(), Error> {
             };
             return Err(error!(
                 Scenario,
-                "{end} of vehicle \"{name}\": curve \"{curve}\" is not a model, which would know the mass that is stopped: {instead}, or name a model"
+                "{end} of vehicle \"{name}\": curve \"{curve}\" is not a model, so the stopped mass is unknown: {instead}, or name a model"
             )
             .at(scenario.vehicle(name).key(end)));
         }
@@ -456,7 +456,7 @@ fn check_tension(curve: &str, tension: &str, scenario: &Scenario) -> Result<(), 
         ),
         Some(other) if other.model.is_some() => error!(
             Scenario,
-            "curve \"{tension}\" is the tension of \"{curve}\": models know compression only; give a file or stages"
+            "curve \"{tension}\" is the tension of \"{curve}\": models describe compression only; give a file or stages"
         ),
         Some(_) => return Ok(()),
     };

@@ -119,7 +119,7 @@ impl Sources {
         if bytes > MAX_BYTES {
             let error = error!(
                 Scenario at "curves",
-                "the files of [curves] have {} MB together: expected at most {}; name fewer, or smaller ones",
+                "the files of [curves] total {} MB: expected at most {}; name fewer, or smaller ones",
                 bytes >> 20,
                 MAX_BYTES >> 20
             );
@@ -292,7 +292,7 @@ impl CurveSource {
                 if held.kind.is_some() && stated != held.kind {
                     return Err(of_curve(error!(
                         Scenario at "force",
-                        "force names another force than {} says it holds: remove force",
+                        "force contradicts the force that {} states: remove force",
                         file.display()
                     )));
                 }

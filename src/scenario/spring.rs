@@ -235,7 +235,7 @@ impl Spring {
             let secant = secants.fold(0.0, f64::max);
             if asked < secant {
                 warnings.push(format!(
-                    "unloading {} is softer than the line from the origin to the stages' forces ({} from the end of the first on, more before): there it unloads along that line, since less would give energy",
+                    "unloading {} is softer than the line from the origin to the stages' forces ({} from the end of the first on, more before): there it unloads along that line, since a softer one would generate energy",
                     Shown::one_stiffness(asked),
                     Shown::one_stiffness(secant)
                 ));

@@ -175,12 +175,12 @@ impl OccupantLimit<'_> {
 fn known(over: &[&str], unknown: &[&str]) -> String {
     let known = match (over, unknown) {
         ([], []) => "no vehicle".into(),
-        ([], _) => "no vehicle of which it is known".into(),
+        ([], _) => "no vehicle for which it is known".into(),
         (over, _) => over.join(", "),
     };
     match unknown {
         [] => known,
-        names => format!("{known}; the run ended before it is known of {}", names.join(", ")),
+        names => format!("{known}; the run ended before it was known for {}", names.join(", ")),
     }
 }
 

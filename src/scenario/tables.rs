@@ -127,7 +127,7 @@ pub(crate) struct CurveTable {
     /// Of a file that does not state its units, such as "mm-t-s".
     #[schemars(with = "Option<String>")]
     pub(crate) units: Option<UnitSystem>,
-    /// Of a file of several curves: number or name of the one that is meant.
+    /// Of a file of several curves: number or name of the one to use.
     pub(crate) curve: Option<String>,
     /// Curve database, with `case`.
     pub(crate) database: Option<PathBuf>,
@@ -162,7 +162,7 @@ pub(crate) struct CurveTable {
     /// one that the vehicles need (body force for one mass, contact force for split ones). Of a CSV file that does not state it: the force that it holds.
     pub(crate) force: Option<ForceKind>,
     /// Of a model or predicted curve: member of the band of the force that is taken, from −1
-    /// (lower edge) over 0 (the curve) to 1 (upper edge).
+    /// (lower edge) through 0 (the curve) to 1 (upper edge).
     pub(crate) band: Option<f64>,
     /// Factor on the force.
     pub(crate) scale: Option<f64>,
@@ -178,7 +178,7 @@ pub(crate) struct StageTable {
     pub(crate) stroke: LengthText,
     /// Force at the start of the stage, 0 if absent: it steps there from the stage before.
     pub(crate) from: Option<ForceText>,
-    /// Force at its end; the same as at its begin if absent.
+    /// Force at its end; the same as at its start if absent.
     pub(crate) to: Option<ForceText>,
 }
 
@@ -187,7 +187,7 @@ pub(crate) struct StageTable {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DampingTable {
-    /// Closing speeds, rising; 0 if absent.
+    /// Closing speeds, increasing; 0 if absent.
     #[serde(default = "zero")]
     pub(crate) speed_m_per_s: Vec<f64>,
     /// The coefficient at each.
@@ -206,7 +206,7 @@ pub(crate) enum LawName {
     /// Elastic-plastic: unloads on a line of the unloading stiffness.
     #[default]
     Memory,
-    /// Follows the curve back, as the reference model.
+    /// Follows the curve back, as in the reference model.
     Elastic,
     /// Of a model: its crush force `Q(d; v) (1 + β√u)`, which follows the closing speed `u` in the
     /// run, and unloads like `memory`.
@@ -219,9 +219,9 @@ pub(crate) enum LawName {
 pub(crate) struct TrainTable {
     /// Of the train, such as "A".
     pub(crate) name: String,
-    /// In the direction in which the first train moves; below 0 if it comes against it.
+    /// In the direction in which the first train moves; below 0 if it moves against it.
     pub(crate) speed: SignedSpeedText,
-    /// Curve of the interfaces between its vehicles; needless where both facing ends come from a
+    /// Curve of the interfaces between its vehicles; not needed where both facing ends come from a
     /// model.
     pub(crate) inner: Option<String>,
     /// Clear distance between its vehicles before contact: between the surfaces that meet, so
@@ -309,8 +309,8 @@ impl CrushZone<'_> {
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CrushZoneTable {
-    /// Part of the vehicle's mass. If absent, the curve is a model, which knows how much mass the
-    /// crush zone stops.
+    /// Part of the vehicle's mass. If absent, the curve is a model, which determines how much
+    /// mass the crush zone stops.
     pub(crate) mass: Option<MassText>,
     /// Curve between it and the body.
     pub(crate) curve: String,
@@ -333,7 +333,7 @@ fn wall_name() -> String {
 #[derive(Clone, Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ContactTable {
-    /// Name of its curve; needless where the noses come from models.
+    /// Name of its curve; not needed where the noses come from models.
     pub(crate) curve: Option<String>,
     /// Free distance between the surfaces before contact; the curve's own if absent.
     pub(crate) gap: Option<LengthText>,

@@ -119,7 +119,7 @@ impl Walk {
             }
             Ok(_) if leads_out => {
                 let why = format!(
-                    "it is a link to {}, which is not a run and lies outside: name that folder, if runs are below it",
+                    "it is a link to {}, which is not a run and lies outside the folder searched: name that folder if there are runs below it",
                     place.display()
                 );
                 self.found.unreadable.push((folder.into(), why));

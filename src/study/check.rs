@@ -36,7 +36,7 @@ pub(super) fn check(manifest: &Manifest) -> Result<(), Error> {
         (StudyKind::Pair, true, true) => {
             return Err(error!(
                 Study at "study.half_model",
-                "half_model = true doubles the deflection, which minus_node already completes: keep one of them"
+                "half_model = true doubles the deflection, but minus_node already makes it that of both bodies: keep one of them"
             ));
         }
         (StudyKind::Wall, true, _) => {
@@ -175,7 +175,7 @@ fn check_name(key: &str, name: &str, slash: bool) -> Result<(), Error> {
 pub(crate) struct Manifest {
     /// What all runs share.
     pub(crate) study: StudyHeader,
-    /// How a curve is made of a run.
+    /// How a curve is made from a run.
     pub recipe: Recipe,
     /// One entry per FE run.
     pub(crate) run: Vec<RunEntry>,
@@ -199,8 +199,8 @@ pub(crate) struct StudyHeader {
     /// deflection are twice the run's.
     #[serde(default)]
     pub half_model: bool,
-    /// Take runs whose energy or impulse cannot be an impact's (0.67 to 1.5 of what mass and
-    /// speed ask for).
+    /// Take runs whose energy or impulse is impossible for an impact (outside 0.67 to 1.5
+    /// times that of mass and speed).
     #[serde(default)]
     pub accept_energy: bool,
 }
@@ -241,7 +241,7 @@ pub(crate) struct RunEntry {
     pub mass: MassText,
     /// Mass of the other body, if the bodies of a pair differ.
     pub other_mass: Option<MassText>,
-    /// Solver's time at which contact begins; found in the force if absent.
+    /// Solver's time at which contact begins; determined from the force if absent.
     pub contact_time: Option<InstantText>,
     /// Contact begins when the bodies have moved this far towards each other from the first
     /// state: the clear distance between their surfaces (between mid-surfaces of shells less

@@ -42,7 +42,7 @@ impl LocatedRun<'_> {
         if let Some(units) = self.study.manifest.study.units {
             if let Some((name, stated, _)) = stated.filter(|(.., system)| *system != units) {
                 remarks.warn(format!(
-                    "units: the deck {name} states \"{}\", the manifest has others; the manifest's are used",
+                    "units: the deck {name} states \"{}\", the manifest states others; those of the manifest are used",
                     stated.text.trim()
                 ));
             }
@@ -138,7 +138,7 @@ impl LocatedRun<'_> {
         let ratio = found_j / stated_j;
         ((ratio - 1.0).abs() > SAME_ENERGY).then(|| {
             format!(
-                "mass: glstat has {} at the start, the masses of the manifest give {}: the mass of the run is wrong ({} would agree), or more than its bodies moves",
+                "mass: glstat has {} at the start, the masses of the manifest give {}: the mass of the run is wrong ({} would agree), or more than its bodies is moving",
                 Shown::one_energy(found_j),
                 Shown::one_energy(stated_j),
                 Shown::one_mass(ratio * masses.body_kg)
@@ -152,7 +152,7 @@ impl LocatedRun<'_> {
             && let Some(side) = files.force_history()?.entity.and_then(|e| e.side)
         {
             remarks.note(format!(
-                "force: side {} of interface {id} is used, the recipe names none",
+                "force: side {} of interface {id} is used, since the recipe names none",
                 side.name()
             ));
         }
@@ -483,7 +483,7 @@ fn read_force(
                 let path = file.path.display();
                 error!(
                     Run,
-                    "{path} does not hold {component} of {ids:?} at the same times: forces that are added need them"
+                    "{path} does not hold {component} of {ids:?} at the same times: only forces at common times can be added"
                 )
             })?)
         }

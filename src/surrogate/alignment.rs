@@ -9,7 +9,7 @@
 //!
 //! On structures whose events keep their places no pair is aligned, and nothing changes.
 //!
-//! Tried and dropped: to follow the run nearer in speed where the collapse changes its mode, instead of the blend. With speeds of
+//! Tried and dropped: to follow the run nearer in speed where the collapse mode changes, instead of the blend. With speeds of
 //! the staged front left out, force, crush, velocity and acceleration all became worse: half of the blend's error is certain, but
 //! the whole of the other branch's is as likely.
 
@@ -115,7 +115,7 @@ impl<F: Fn(usize, f64) -> f64> Sampled<'_, F> {
     }
 }
 
-/// Pairs of neighbouring curves between which the collapse changes its mode: they differ by more than a shift, or by a much larger
+/// Pairs of neighbouring curves between which the collapse mode changes: they differ by more than a shift, or by a much larger
 /// one than the other pairs.
 pub(super) fn mode_switches(cases: &[CaseCurve]) -> Vec<(usize, usize)> {
     let pair = |i: usize| {

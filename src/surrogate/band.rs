@@ -76,7 +76,7 @@ impl LeftOutSpeeds {
 /// Residuals are taken relative to the local level of the force, and to the span over which each
 /// was predicted: a left-out speed opens a wider gap than a query finds. With a handful of curves
 /// no level can be guaranteed; the range is the one that a further residual of the same kind
-/// would keep to: their root mean square times Student's t, for as many independent stretches as the
+/// would lie in: their root mean square times Student's t, for as many independent stretches as the
 /// curves have; for a whole curve, and outside the training speeds, for as many curves.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Band {
@@ -88,12 +88,12 @@ pub struct Band {
     #[serde(default)]
     pub(crate) left_out: LeftOutSpeeds,
     /// What the half widths below hold for. `inner`: distance of the two training speeds that a
-    /// query lies between, and the widths go with its power 0.5; `ends`: distance to the
+    /// query lies between, and the widths scale with its power 0.5; `ends`: distance to the
     /// nearest training speed, and they are in proportion to it.
     pub span_m_per_s: f64,
     /// Half width at any one deflection, as a share of the local level of the force.
     pub pointwise_share: f64,
-    /// Half width that the whole curve keeps to.
+    /// Half width that holds for the whole curve.
     pub simultaneous_share: f64,
     /// The part of both that comes from the scatter between repeated runs, whatever the span; the
     /// squares of it and of the error of interpolation add. Absent without such runs.

@@ -91,7 +91,7 @@ impl CrushLaw {
         if self.stopped.is_sound() {
             Ok(())
         } else {
-            Err("the stopped mass of its crush law is none".into())
+            Err("the stopped mass of its crush law is impossible".into())
         }
     }
 

@@ -120,8 +120,8 @@ pub struct Means {
 
 /// Deviation of runs of one speed from their mean: no model can remove this part of an error.
 ///
-/// Errors of runs that the mean is made of are multiplied by √(n/(n − 1)): they are those of a run
-/// that it does not know.
+/// Errors of runs that are part of the mean are multiplied by √(n/(n − 1)): they are those of a
+/// run that is not part of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Scatter {
     /// Those that have several runs.
@@ -215,7 +215,7 @@ pub struct Validation {
     /// The same outside the training speeds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub body_band_outside: Option<Band>,
-    /// Models that this group's runs do not suit, with the reason: no fault of any run.
+    /// Models that do not suit this group's runs, with the reason; not the fault of any run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub unsuited: Vec<String>,
     /// What was left out of the table, with the reason.

@@ -51,14 +51,14 @@ impl MaxCrushRule {
 pub(crate) struct MaxCrush {
     /// By a cubic spline over the speeds.
     pub spline_m: Option<f64>,
-    /// By a cubic that never falls with the speed.
+    /// By a cubic that never decreases with the speed.
     pub monotone_m: Option<f64>,
     /// Where the curve has absorbed the impact's energy.
     pub energy_m: Option<f64>,
     /// Absent in files of earlier versions.
     #[serde(default)]
     pub motion_m: Option<f64>,
-    /// Largest less smallest.
+    /// Largest minus smallest.
     pub spread_m: f64,
 }
 

@@ -54,7 +54,7 @@ pub struct Model {
     pub kind: ModelKind,
     /// How the maximum crush is found by default.
     pub max_crush_rule: MaxCrushRule,
-    /// Pairs of neighbouring training speeds between which the collapse changes its mode.
+    /// Pairs of neighbouring training speeds between which the collapse mode changes.
     pub mode_switches_m_per_s: Vec<(f64, f64)>,
     /// Leave-one-speed-out of the group, if it was requested.
     pub leave_one_out: Option<Validation>,
@@ -267,7 +267,7 @@ impl Model {
         self.fitted_body.is_some()
     }
 
-    /// The curves of a force at the two training speeds around `v` if the collapse changes its mode between them: a run
+    /// The curves of a force at the two training speeds around `v` if the collapse mode changes between them: a run
     /// there may follow either.
     pub(super) fn branches(&self, v: f64, force: ForceKind) -> impl Iterator<Item = &CaseCurve> {
         let of_body = force != self.force_kind;

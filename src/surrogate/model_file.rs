@@ -233,7 +233,7 @@ impl Model {
             return Err("its speeds are not increasing".into());
         }
         if self.cases.iter().any(|c| c.features.len() != self.features.len()) {
-            return Err("its cases have not as many features as it names".into());
+            return Err("its cases do not have as many features as it names".into());
         }
         if !self.cases.iter().all(|c| c.max_deflection_m > 0.0 && c.max_deflection_m.is_finite()) {
             return Err("a maximum deflection is not above 0".into());
@@ -249,7 +249,7 @@ impl Model {
             .iter()
             .flat_map(|of| [of.band, of.band_outside, of.body_band, of.body_band_outside]);
         if !bands.flatten().all(|band| band.is_sound()) {
-            return Err("the widths or the span of its band are not a measurement".into());
+            return Err("the widths or the span of its band are impossible".into());
         }
         let masses = [Some(self.mass_kg), self.other_mass_kg];
         if !masses.into_iter().flatten().all(|m| m > 0.0 && m.is_finite()) {
@@ -265,7 +265,7 @@ impl Model {
             return Err("it lacks the curves of its cases".into());
         }
         if self.crush_law.is_some() && self.curves.declared.len() != self.cases.len() {
-            return Err("it has a crush law and lacks the curves of its cases".into());
+            return Err("it has a crush law but lacks the curves of its cases".into());
         }
         self.crush_law.as_ref().map_or(Ok(()), CrushLaw::check)?;
         self.fitted.check(self.features.len())?;

@@ -230,7 +230,7 @@ impl<'a> Prediction<'a> {
         Beyond { data_end_m, deflection_m, force_n, body_force_n }
     }
 
-    /// The band around one force, with both branches where the collapse changes its mode; what was reported for the other
+    /// The band around one force, with both branches where the collapse mode changes; what was reported for the other
     /// force is not repeated.
     fn banded(&self, force: ForceKind, envelope: &Envelope, warnings: &mut Vec<Warning>) -> Banded {
         let asked = &self.motion.asked;

@@ -21,7 +21,7 @@ const LEAST_FREE: f64 = 0.9;
 pub struct PredictedCurve {
     /// Loading branch from (0, 0) to the maximum crush.
     pub deflection_m: Vec<f64>,
-    /// Force in N, one value per deflection; which force it is says `provenance.force_kind`.
+    /// Force in N, one value per deflection; `provenance.force_kind` states which force it is.
     #[serde(rename = "force_N")]
     pub force_n: Vec<f64>,
     /// Band around the force, where the model gives one.
@@ -73,7 +73,7 @@ pub struct PredictedCurve {
     pub speed_kind: SpeedKind,
     /// Mass of the body, or of each body of a pair.
     pub mass_kg: f64,
-    /// How the forces go on beyond the maximum crush; absent for a recorded curve.
+    /// How the forces continue beyond the maximum crush; absent for a recorded curve.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub beyond: Option<Beyond>,
     /// Integral of force over deflection.
@@ -87,14 +87,14 @@ pub struct PredictedCurve {
     pub provenance: Provenance,
 }
 
-/// The forces beyond the maximum crush, along faster runs: neighbours in a train push on where a
-/// body by itself would have stopped. They are those of the runs: exports and trains multiply them by one factor, so that
+/// The forces beyond the maximum crush, along faster runs: neighbours in a train keep pushing
+/// where a body by itself would have stopped. They are those of the runs: exports and trains multiply them by one factor, so that
 /// they begin with the last force of the curve.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Beyond {
-    /// Largest crush of the model's runs, in m: further on the forces are an assumption.
+    /// Largest crush of the model's runs, in m: beyond it the forces are an assumption.
     pub data_end_m: f64,
-    /// Rising, from the maximum crush on.
+    /// Increasing, from the maximum crush on.
     pub deflection_m: Vec<f64>,
     /// Force in N, one value per deflection.
     #[serde(rename = "force_N")]
@@ -117,7 +117,7 @@ pub struct ForestQuantiles {
     pub high_n: Vec<f64>,
 }
 
-/// How the bodies part after the maximum crush.
+/// How the bodies separate after the maximum crush.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Rebound {
     /// In m/s; a line over the impact speed, relative to the force before the maximum crush.
@@ -145,7 +145,7 @@ pub struct Provenance {
     /// Units of the training runs' files: what an export to their solver is written in.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub study_units: Option<UnitSystem>,
-    /// Speeds of the training cases, in m/s, rising.
+    /// Speeds of the training cases, in m/s, increasing.
     pub training_speeds_m_per_s: Vec<f64>,
     /// Whether the speed lies within those of training.
     pub in_range: bool,

@@ -34,7 +34,7 @@ pub enum WarningCode {
     OutOfRange,
     /// A midpoint forest jumps here from one training curve to the next.
     NearSplitMidpoint,
-    /// The curve takes up another energy than the impact has.
+    /// The energy of the curve differs from that of the impact.
     EnergyMismatch,
     /// A training run ended while loading; it is left out of the maximum crush.
     TruncatedTrainingRun,
@@ -44,7 +44,7 @@ pub enum WarningCode {
     OtherMass,
     /// The speed lies between training speeds that are far apart.
     FarFromTraining,
-    /// The collapse changes its mode between the neighbouring training speeds.
+    /// The collapse mode changes between the neighbouring training speeds.
     ModeSwitch,
     /// Too few curves to assess the model.
     TooFewCurves,
@@ -76,7 +76,7 @@ pub(super) fn outside_of(speed_m_per_s: f64, low: f64, high: f64) -> String {
     };
     let (speed, by) = (km_per_h(speed_m_per_s), km_per_h(by));
     if low == high {
-        format!("{speed} is {by} from {}, the one training speed", km_per_h(low))
+        format!("{speed} is {by} from {}, the only training speed", km_per_h(low))
     } else {
         format!("{speed} is {by} {side} training speed ({} to {})", km_per_h(low), km_per_h(high))
     }
@@ -166,7 +166,7 @@ impl Warning {
         Self {
             code: WarningCode::ModeSwitch,
             message: format!(
-                "the training curves differ between {} and {} by more than a shift of their peaks and steps with the speed: the collapse changes its mode there, and a run between the two may follow either",
+                "the training curves differ between {} and {} by more than a shift of their peaks and steps with the speed: the collapse mode changes there, and a run between the two may follow either",
                 km_per_h(below),
                 km_per_h(above)
             ),

@@ -292,7 +292,7 @@ fn ordered(files: &mut [ShardFile]) -> Result<ShardHeader, Error> {
         if head.differs_from(&ShardHeader { shard: head.shard, ..first.clone() }).is_some() {
             return Err(error!(
                 Sweep,
-                "{path} and {first_path} are of different sweeps: plan, scenario, a file it names or crumple's version differ"
+                "{path} and {first_path} are of different sweeps: the plan, the scenario, a file it names or crumple's version differs"
             ));
         }
         if count != first_count {

@@ -269,7 +269,10 @@ fn results(plan: &Plan, has_limits: bool) -> Result<Vec<ResultName>, Error> {
     if kept.len() == asked.len() && !kept.is_empty() {
         Ok(kept)
     } else {
-        Err(error!(Sweep at "results", "sweep.results: name each result once, and at least one"))
+        Err(error!(
+            Sweep at "results",
+            "sweep.results: name at least one result, and each only once"
+        ))
     }
 }
 

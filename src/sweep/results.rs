@@ -41,7 +41,7 @@ impl SweepColumns {
             return Ok(columns.sorted());
         }
         let file = ShardFile::read_head(path)?.ok_or_else(|| {
-            error!(Sweep, "{}: expected \"# {FORMAT}\" in the first line and a whole head: run its sweep again with --restart", path.display())
+            error!(Sweep, "{}: expected \"# {FORMAT}\" in the first line and a complete header: run its sweep again with --restart", path.display())
         })?;
         let mut columns = Self::none(&file.head);
         let threshold = sample_threshold(columns.rows);

@@ -230,13 +230,13 @@ impl ShardHeader {
         }
         if self.items != wanted.items && self.columns == wanted.columns {
             return Some(format!(
-                "it is of {} items, this of {}: plan, scenario or a file it names have changed since, or it ended at a stated precision (--until)",
+                "it has {} items, this sweep has {}: the plan, the scenario or a file it names has changed since, or it ended at a stated precision (--until)",
                 self.items, wanted.items
             ));
         }
         if self.hash != wanted.hash || self.items != wanted.items || self.columns != wanted.columns
         {
-            return Some("plan, scenario or a file it names have changed since".into());
+            return Some("the plan, the scenario or a file it names has changed since".into());
         }
         let (found, this) = (self.shard, wanted.shard);
         (found != this).then(|| {

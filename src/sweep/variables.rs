@@ -130,7 +130,7 @@ impl Binder<'_> {
         if self.plan.vary.iter().any(is_replaced) && !self.replaces(curve) {
             return Err(error!(
                 Sweep at "curve",
-                "another variable puts other curves in the place of \"{curve}\" in every item, so this one has no effect: name it among the values of that variable, or vary those curves"
+                "another variable replaces curve \"{curve}\" in every item, so this one has no effect: name the curve among the values of that variable, or vary those curves"
             ));
         }
         Ok(())
@@ -165,7 +165,7 @@ impl Binder<'_> {
                 if !self.replaces(curve) && !scenario::takes_gap_of(self.scenario, curve)? {
                     return Err(error!(
                         Sweep at "curve",
-                        "where curve \"{curve}\" is used, the contact, a train or a vehicle has its own gap, so that of the curve has no effect: remove these (of the contact, vary interface = \"contact\")"
+                        "where curve \"{curve}\" is used, the contact, a train or a vehicle has its own gap, so that of the curve has no effect: remove these (for the contact, vary interface = \"contact\")"
                     ));
                 }
                 self.one("gap_m", "gap_factor", curve, Target::CurveGap(curve.clone()))

@@ -15,7 +15,7 @@ struct JoinOptions {
     /// Rename a new case whose name is taken by a different curve, such as 36kmh_2
     #[arg(long, conflicts_with = "replace")]
     rename: bool,
-    /// Replace a different curve of the same name by the new case
+    /// Replace a different curve of the same name with the new case
     #[arg(long)]
     replace: bool,
     /// Only show what would be done

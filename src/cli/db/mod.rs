@@ -242,7 +242,7 @@ fn export(args: &ExportArgs, options: GlobalOptions) -> CommandResult {
     let is_old = !args.croissant && description.exists();
     let warning = is_old.then(|| {
         let old = description.display();
-        format!("{old} was there before and may describe other tables: --croissant writes it anew")
+        format!("{old} existed before and may describe other tables: --croissant rewrites it")
     });
     let outcome = options.warn_all(&warning);
     let database = args.database.display().to_string();

@@ -123,10 +123,10 @@ pub(super) fn masses(measured: &Measured<'_>, masses: Masses) -> Option<String> 
     (found.is_finite() && found > 0.0 && is_off(stated)).then(|| {
         let what_to_do = match is_off(1.0 / stated) {
             true => "one of them is wrong, the node of another body, or brakes act on one",
-            false => "they are exchanged",
+            false => "they are swapped",
         };
         format!(
-            "mass: by the changes of velocity of the two bodies the other one has {found:.3} times the mass of the first, by the manifest {stated:.3} times ({} and {}): {what_to_do}",
+            "mass: by the velocity changes of the two bodies, the other one has {found:.3} times the mass of the first, by the manifest {stated:.3} times ({} and {}): {what_to_do}",
             Shown::one_mass(masses.body_kg),
             Shown::one_mass(stated * masses.body_kg)
         )
@@ -143,7 +143,7 @@ pub(super) fn filter(class: u32, filtered: &Curve, recorded_n: &[f64]) -> Option
     let kept = cfc::work_kept(&force[states.clone()], &recorded[..states.len()], &path[states]);
     (kept < cfc::KEPT).then(|| {
         format!(
-            "filter: CFC{class} takes {:.1} % of the work from the force, for the impact is short: use a higher class, or filter = \"none\"",
+            "filter: CFC{class} removes {:.1} % of the work of the force, because the impact is short: use a higher class, or filter = \"none\"",
             100.0 * (1.0 - kept)
         )
     })
@@ -211,7 +211,7 @@ impl<'a> Motion<'a> {
             return Ok(());
         }
         Err(ExtractError::Prescribed(format!(
-            "the motion is prescribed: the body keeps its {:.4} m/s up to the maximum deflection, though the force would have stopped it {:.1} times",
+            "the motion is prescribed: the body keeps its {:.4} m/s up to the maximum deflection, although the force would have stopped it {:.1} times over",
             closing[0],
             impulse / self.momentum_ns()
         )))
@@ -321,7 +321,7 @@ impl<'a> Motion<'a> {
         let is_sudden = (halfway - first).abs() < SUDDEN * (last - first).abs();
         if share.abs() > OTHER_WORK && (is_sudden || rate.abs() > STEEPEST) {
             remarks.warn(format!(
-                "free flight: the speed changes by {:.3} m/s before contact, as neither gravity nor brakes change it: the force is recorded late, or another one acts before it: check the times of both files",
+                "free flight: the speed changes by {:.3} m/s before contact, in a way that neither gravity nor brakes explain: the force is recorded late, or another one acts before it: check the times of both files",
                 last - first
             ));
         } else if share.abs() > OTHER_WORK {

@@ -18,7 +18,7 @@ pub(crate) enum ExtractError {
     NotFinite { origin: Origin, what: String, state: usize, value: f64 },
     /// The force never exceeds what counts as contact.
     #[error(
-        "the force is never positive: there is no contact in this record; look at id, component, sign and units"
+        "the force is never positive: there is no contact in this record; check id, component, sign and units"
     )]
     NoContact,
     /// Deflection and force have no common times.
@@ -60,7 +60,7 @@ pub(crate) enum ExtractError {
     NoSpeed { component: String },
     /// The body does not move in the first state.
     #[error(
-        "the body is at rest in the first state: name a node of the body that moves, or add speed = \"…km/h\" to the run"
+        "the body is at rest in the first state: name a node of the moving body, or add speed = \"…km/h\" to the run"
     )]
     Standing,
     /// The force cannot be filtered.

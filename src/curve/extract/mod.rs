@@ -167,7 +167,7 @@ fn audited(curve: &Curve, kind: ForceKind, balance: energy::EnergyBalance) -> No
         let agrees = |i: f64| (i - 1.0).abs() <= MOMENTUM_AGREES;
         if is_contact && balance.impulse.is_some_and(agrees) {
             remarks.note(format!(
-                "energy: the work of the contact force is {share:.1} % of the kinetic energy, and its impulse the change of momentum: it stops the crush zone before the body"
+                "energy: the work of the contact force is {share:.1} % of the kinetic energy, but its impulse equals the change of momentum: it stops the crush zone before the body"
             ));
         } else {
             remarks

@@ -51,7 +51,7 @@ impl Start {
             Some(StatedContact::Gap { m }) => {
                 let mut remarks = Notes::default();
                 let time_s = closing_time(record, m)?;
-                remarks.note(format!("contact: the gap is closed at {}", milliseconds(time_s)));
+                remarks.note(format!("contact: the gap closes at {}", milliseconds(time_s)));
                 remarks.notes.extend(found_elsewhere(record, time_s, setup));
                 Ok((Self { time_s, by: StartBy::Manifest }, remarks))
             }
@@ -118,7 +118,7 @@ impl Start {
                     && (missing_m - setup.stated.offset_m).abs() > MISSING_SHARE * crush_m =>
             {
                 remarks.warn(format!(
-                    "contact: offset = {:.1} mm, but by its first state the record, which starts in contact, lacks {:.1} mm of the crush",
+                    "contact: offset = {:.1} mm, but judging by its first state, the record, which starts in contact, lacks {:.1} mm of the crush",
                     setup.stated.offset_m * 1e3,
                     missing_m * 1e3
                 ));
@@ -338,7 +338,7 @@ impl ImpactSpeed {
             && differ(first, recorded)
         {
             remarks.warn(format!(
-                "speed: the first state moves at {}, the last before contact at {}; the latter is used",
+                "speed: {} in the first state, {} in the last before contact; the latter is used",
                 km_per_h(first),
                 km_per_h(recorded)
             ));

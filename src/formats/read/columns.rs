@@ -192,7 +192,7 @@ impl Points {
         self.set_steps_apart(notes);
         let points = self.list.len();
         if points < MIN_POINTS {
-            return Err(too_few(points, " without those of guard and repetition"));
+            return Err(too_few(points, " without guard points and repeats"));
         }
         self.check_order()?;
         if self.list[0].d > 0.0 {

@@ -102,7 +102,7 @@ pub(super) fn layout(
         if label(field, name).is_some_and(|label| label.quantity != quantity) {
             return Err(error!(
                 CurveFile,
-                "{place}: expected a {what} in the {which} column, found \"{found}\": name the columns by --deflection-column and --force-column, if the label is right",
+                "{place}: expected a {what} in the {which} column, found \"{found}\": choose the columns with --deflection-column and --force-column if the label is right",
                 found = shown(name),
                 place = Place::Line(*line),
                 what = quantity.name()

@@ -171,7 +171,7 @@ impl<'a> Blocks<'a> {
         }
         let left = self.visits.get().checked_sub(1);
         self.visits.set(
-            left.ok_or_else(|| wrong("the blocks of the file refer to each other without end"))?,
+            left.ok_or_else(|| wrong("the blocks of the file refer to each other in a loop"))?,
         );
         let begin = usize::try_from(at).map_err(|_| cut())?;
         let (length, links) =

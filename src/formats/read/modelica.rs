@@ -250,7 +250,7 @@ pub(super) fn read_package(input: &Input<'_>) -> Result<ReadCurve, Error> {
             "constant f",
             format_args!("{} forces", package.f.values.len()),
             format_args!("{} deflections", package.d.values.len()),
-            "write the file anew",
+            "write the file again",
         ));
     }
     let mut notes = vec![

@@ -40,7 +40,7 @@ pub enum EnvelopeEnd {
     Hold,
     /// The last segment is continued if it rises, else the last force is held.
     Slope,
-    /// The structure is taken as fully crushed at 1.5 times the maximum crush, for a model at 1.5 times that of its
+    /// The structure is assumed to be fully crushed at 1.5 times the maximum crush, for a model at 1.5 times that of its
     /// fastest run: from there the force rises with the unloading stiffness. Of a law by itself: as `slope`.
     Bottom,
     /// The run ends with an error that names the interface.

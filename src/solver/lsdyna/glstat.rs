@@ -67,7 +67,7 @@ impl Body for Glstat {
         let rest = line.text.get(columns[1]..).unwrap_or_default().trim_ascii();
         let wall = wall_number(rest);
         if !rest.is_empty() && wall.is_none() {
-            let message = "expected the line to end behind its value";
+            let message = "expected the line to end after its value";
             states.damage(line, Some([columns[1] + 1, line.text.len()]), message.into());
             return Some(());
         }

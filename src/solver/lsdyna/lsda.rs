@@ -223,7 +223,7 @@ fn record<'a>(
     match command {
         CD => {
             if payload > MAX_PATH as u64 {
-                return Ok(Err(Some(format!("a path of {payload} bytes is too long for one"))));
+                return Ok(Err(Some(format!("a path of {payload} bytes is too long"))));
             }
             let Some(path) = window.get(from, near, 0)? else { return Ok(Err(None)) };
             match text(path) {

@@ -150,7 +150,7 @@ impl StateReader {
     /// Says that the record ends before its `number`-th file, and why.
     pub(crate) fn end_before(&mut self, number: usize, what: &str) {
         let message =
-            format!("T{number:02}, the continuation, {what}: it and what follows are not read");
+            format!("T{number:02}, the continuation, {what}: neither it nor what follows is read");
         self.problems.add(ProblemCode::UnreadRows, None, message);
     }
 
@@ -385,7 +385,7 @@ impl StateReader {
             let ids: Vec<String> = ids.iter().take(5).map(|(_, id)| id.to_string()).collect();
             let more = if ids.len() == 5 { " and others" } else { "" };
             files[file].notes.push(format!(
-                "no tangential impulses are recorded for {}{more}: their forces are the normal ones alone",
+                "no tangential impulses are recorded for {}{more}: their forces are the normal components only",
                 ids.join(", ")
             ));
         }
@@ -413,7 +413,7 @@ fn cut(after: f64, is_last: bool) -> Problem {
             "the record continues after time {after:?}: the forces there are differences over one interval, and will change"
         ),
         false => format!(
-            "states after time {after:?} are missing: the forces on both sides are differences across the hole, so they are not those of their times"
+            "states after time {after:?} are missing: the forces on both sides are differences across the gap, so they are not those of their times"
         ),
     };
     Problem::new(ProblemCode::CutRecord, message)

@@ -150,8 +150,9 @@ impl Tree {
             Some(&index) => index,
             None if self.sections.len() == MAX_SECTIONS => {
                 if !self.is_full {
-                    let message =
-                        format!("{name} and what follows is left out: there are too many sections");
+                    let message = format!(
+                        "{name} and what follows are left out: there are too many sections"
+                    );
                     self.problems.add(ProblemCode::UnreadRows, None, message);
                 }
                 self.is_full = true;

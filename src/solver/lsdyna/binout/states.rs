@@ -72,7 +72,7 @@ fn order_of(section: &Section) -> Option<Problem> {
         let place = state.and_then(|&state| place_of(section, state));
         return Some(section.problem(ProblemCode::RepeatedState, &message).at_place(place));
     }
-    let message = "states are not in order of their numbers; they are returned in it";
+    let message = "states are not in the order of their numbers; they are returned in that order";
     (!section.states.is_sorted()).then(|| section.problem(ProblemCode::TimeGoesBack, message))
 }
 

@@ -81,7 +81,7 @@ impl BufRead for SizeLimited<'_> {
     fn fill_buf(&mut self) -> io::Result<&[u8]> {
         if self.left.get() == 0 {
             let message = format!(
-                "a deck is read up to {} GB with its includes; it has more",
+                "at most {} GB of a deck and its includes are read; this one is larger",
                 MAX_BYTES / 1_000_000_000
             );
             return Err(io::Error::new(io::ErrorKind::FileTooLarge, message));
