@@ -1325,12 +1325,12 @@ fn short_impacts_get_a_filter_that_leaves_their_work() {
     let filter = study(here, "s.toml")["recipe"]["filter"].as_str().unwrap().to_string();
     assert_ne!(filter, "CFC60");
     let text = fs::read_to_string(here.join("s.toml")).unwrap();
-    says(&text, "the impacts are short: CFC 60 would take");
+    says(&text, "the impacts are short: CFC 60 would");
     let said = warned(here, "build s.toml -o s.h5");
     assert!(!said.contains("filter:"), "{said}");
     let usual = text.replace(&format!("filter = \"{filter}\""), "filter = \"CFC60\"");
     fs::write(here.join("s.toml"), usual).unwrap();
-    says(&warned(here, "build s.toml -o s.h5"), "filter: CFC60 takes");
+    says(&warned(here, "build s.toml -o s.h5"), "filter: CFC60 removes");
 }
 
 /// Writes the run of one body that a wall stops.

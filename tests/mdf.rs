@@ -196,10 +196,7 @@ fn circles_of_blocks_end() {
         fs::write(here.join("circle.mf4"), bytes).unwrap();
         let read = read(&here.join("circle.mf4"), &ReadOptions::default());
         let error = read.unwrap_err().to_string();
-        assert!(
-            error.contains("the blocks of the file refer to each other in a loop"),
-            "{error}"
-        );
+        assert!(error.contains("the blocks of the file refer to each other in a loop"), "{error}");
     }
 }
 

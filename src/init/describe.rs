@@ -315,8 +315,9 @@ impl Facts<'_> {
             for source in [&run.sources.motion].into_iter().chain(force) {
                 if !source.others.is_empty() {
                     let (read, others) = (source.shown(), source.others.join(" and "));
-                    *chosen.entry(format!("{read} is read; {others} also holds it")).or_default() +=
-                        1;
+                    *chosen
+                        .entry(format!("{read} is read; {others} also holds it"))
+                        .or_default() += 1;
                 }
             }
         }

@@ -195,7 +195,7 @@ pub(super) fn differ(masses: &[Proposed<f64>]) -> Option<String> {
     (all.len() > 1).then(|| {
         let shown: Vec<String> = all.iter().map(|kg| digits(kg / 1e3)).collect();
         format!(
-            "mass: the runs' masses differ ({} t): do they belong to one vehicle? Models then take the mass as a parameter",
+            "mass: the runs' masses differ ({} t): do they belong to one vehicle? Models take a mass that differs as a parameter",
             shown.join(", ")
         )
     })

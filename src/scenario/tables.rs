@@ -305,7 +305,7 @@ impl CrushZone<'_> {
     }
 }
 
-/// A mass split off a vehicle: it is in front of the interface's spring, the body behind.
+/// A mass split off a vehicle's end: the spring of `curve` lies between it and the body.
 #[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CrushZoneTable {

@@ -30,9 +30,8 @@ pub struct PredictedCurve {
     /// Upper end of the band.
     #[serde(rename = "force_high_N", default, skip_serializing_if = "Option::is_none")]
     pub force_high_n: Option<Vec<f64>>,
-    /// The force that moves the body, where `force_N` is what the obstacle feels: mass that
-    /// the crush zone stops early is in the one and not in the other. It drives bodies of one
-    /// mass.
+    /// The force that moves the body, where `force_N` is what the obstacle feels, which also
+    /// stops mass in the crush zone ahead of the body. It drives bodies of one mass.
     #[serde(rename = "body_force_N", default, skip_serializing_if = "Option::is_none")]
     pub body_force_n: Option<Vec<f64>>,
     /// Band around the body force, where the model gives one.
