@@ -1248,7 +1248,8 @@ fn walls_that_act_one_after_the_other_are_added() {
     let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    for km_per_h in [20.0, 50.0, 60.0] {
+    // The second is not reached at 20 km/h, hardly loaded at 30.
+    for km_per_h in [20.0, 30.0, 50.0, 60.0] {
         let history = Crash { speed_m_per_s: km_per_h / 3.6, ..Crash::default() }.run();
         // The second takes over from the first.
         let crush = &history.bodies[0].displacement_m[4];
@@ -1265,16 +1266,24 @@ fn walls_that_act_one_after_the_other_are_added() {
     let found = study(here, "found.toml");
     assert_eq!(found["recipe"]["force"]["id"], toml::Value::from(vec![1, 2]));
     let runs = found["run"].as_array().unwrap();
-    assert_eq!(runs.len(), 3);
+    assert_eq!(runs.len(), 4);
     for run in runs {
         assert!((number(&run["mass"], "t") / 1.2 - 1.0).abs() < 1e-2, "{run}");
     }
     let text = fs::read_to_string(here.join("found.toml")).unwrap();
-    says(
-        &text,
-        "they act one after the other: the bodies follow their sum, but none of them alone",
-    );
+    says(&text, "they act together or one after the other: the bodies follow their");
     crumple_ok(here, "build found.toml -o found.h5 -q");
+    // Where the second takes so little that no run shows it, it is named.
+    for km_per_h in [40.0, 50.0] {
+        let history = Crash { speed_m_per_s: km_per_h / 3.6, ..Crash::default() }.run();
+        let first: Vec<f64> = history.contact_n.iter().map(|f| 0.97 * f).collect();
+        let second: Vec<f64> = history.contact_n.iter().map(|f| 0.03 * f).collect();
+        let run = here.join(format!("share/{km_per_h}kmh"));
+        layout.nodout(&run, &history, &car_nodes());
+        let wall = |id, along_n| Force { id, title: "", along_n, across_n: 0.0 };
+        layout.rwforc(&run, &history, &[wall(1, &first), wall(2, &second)]);
+    }
+    says(&warned(here, "init share -o share.toml"), "rwforc 2");
     // The user may ask for the sum.
     crumple_ok(here, "init walls --force rwforc:2+1 -o given.toml");
     let given = study(here, "given.toml");
@@ -1299,6 +1308,20 @@ fn a_coarse_record_is_named() {
     says(&warned(here, "init car -o all.toml"), coarse);
     let said = warned(here, "init car/40kmh car/50kmh -o fine.toml");
     assert!(!said.contains("a state every"), "{said}");
+}
+
+/// What a restart has written into files of its own is named.
+#[test]
+fn parts_of_a_restart_are_named() {
+    let history = Crash::default().run();
+    let folder = tempfile::tempdir().unwrap();
+    let run = folder.path().join("car/50kmh");
+    let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
+    write_car(layout, &run, &history, &car_nodes());
+    assert!(!warned(folder.path(), "init car -o whole.toml").contains("restart"));
+    fs::copy(run.join("nodout"), run.join("nodout01")).unwrap();
+    let said = warned(folder.path(), "init car -o parts.toml");
+    says(&said, "not read: nodout01 is named like the file of a restart");
 }
 
 /// CFC 60 would smooth away the pulse of a crash of some milliseconds.

@@ -775,6 +775,11 @@ fn energy_correction_has_bounds() {
     assert!((curve.provenance.energy_over_kinetic / scaled - 1.0).abs() < 1e-12);
     assert!((factor - 1.0).abs() > 0.01, "{factor}");
     assert!(curve.warnings.iter().any(|w| w.code.name() == "energy_corrected"));
+    // By the motion the body stops where its force has absorbed the energy.
+    let by_motion = Query { rule: Some(MaxCrushRule::Motion), ..ask(25e3) };
+    let by_motion = predict(&model, &by_motion).unwrap();
+    let said = by_motion.warnings.iter().find(|w| w.code.name() == "energy_corrected");
+    assert!(said.unwrap().message.starts_with("there was nothing to correct"), "{said:?}");
     // The crush by speed is that of 24 t: twice the mass is not a matter of scale.
     let error = predict(&model, &ask(48e3)).unwrap_err().to_string();
     assert!(error.contains("outside 0.8 to 1.25"), "{error}");

@@ -726,6 +726,31 @@ fn what_is_not_known_is_not_precise() {
     assert_eq!((rows, &until["is_reached"]), (300, &false.into()));
 }
 
+/// What a row's own numbers are in is the row's, whether or not the scenario as written has the like.
+#[test]
+fn rows_are_warned_of_whatever_the_scenario_says() {
+    let demo = demo_folder();
+    let here = demo.path();
+    let warned = |speed: &str| {
+        let text = format!(
+            "[run]\nduration = \"250ms\"\n[curves]\nnose = {{ database = \"curves.h5\", case = \"lead-car-wall/72kmh\" }}\n\
+             [[train]]\nname = \"A\"\nspeed = \"{speed}\"\nvehicles = [ {{ name = \"A1\", mass = \"24t\" }} ]\n\
+             [wall]\n[contact]\ncurve = \"nose\"\n[sweep]\n\
+             vary = [ {{ what = \"speed\", train = \"A\", values = [\"20km/h\", \"36km/h\"] }} ]\n"
+        );
+        std::fs::write(here.join("warned.toml"), text).unwrap();
+        let output = crumple_in(here, "sweep warned.toml -o warned.csv --json --restart");
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        assert_eq!(output.status.code(), Some(0), "{output:?}");
+        (report["warned"].as_u64().unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    let (rows, said) = warned("36km/h");
+    // At 36 km/h the row repeats what was said of the scenario.
+    assert_eq!(rows, 1, "{said}");
+    assert!(said.contains("the scenario as written: curve \"nose\": it is for 72 km/h"), "{said}");
+    assert_eq!(warned("72km/h").0, 2);
+}
+
 /// Warnings of many rows are counted by what they say, and a grid has no percentiles.
 #[test]
 fn reasons_are_counted_and_grids_have_no_percentiles() {

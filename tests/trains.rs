@@ -1023,3 +1023,25 @@ fn a_curve_of_another_impact_is_said() {
         }
     }
 }
+
+/// A1 is braked by 2 MN, A2 is not: their gap of 30 mm closes after √(2 · 0.03 m · 24 t / 2 MN), whatever the outputs.
+#[test]
+fn a_contact_has_its_own_time() {
+    let folder = tempfile::tempdir().unwrap();
+    for output in ["0.75ms", "10ms", "0.01ms"] {
+        let text = format!(
+            "[run]\nduration = \"60ms\"\noutput_interval = \"{output}\"\n[curves]\n\
+             nose = {{ stages = [ {{ stroke = \"1m\", from = \"2MN\" }} ], unloading = \"80MN/m\" }}\n\
+             [[train]]\nname = \"A\"\nspeed = \"10m/s\"\ninner = \"nose\"\ngap = \"30mm\"\n\
+             vehicles = [ {{ name = \"A1\", mass = \"24t\" }}, {{ name = \"A2\", mass = \"20t\" }} ]\n\
+             [wall]\n[contact]\ncurve = \"nose\"\n"
+        );
+        std::fs::write(folder.path().join("gap.toml"), text).unwrap();
+        let result = json(&crumple_ok(folder.path(), "simulate gap.toml --json -q"));
+        let events = result["summary"]["sequence"].as_array().unwrap();
+        let is_meant = |e: &&Value| e["event"] == "contact" && e["interface"] == "A1|A2";
+        let time_s = events.iter().find(is_meant).unwrap()["time_s"].as_f64().unwrap();
+        let expected_s = (2.0 * 0.03 * 24e3 / 2e6_f64).sqrt();
+        assert!((time_s - expected_s).abs() < 2e-6, "{output}: {time_s} for {expected_s}");
+    }
+}

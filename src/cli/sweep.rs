@@ -128,7 +128,7 @@ pub(super) fn run(args: &Args, global: GlobalOptions) -> CommandResult {
     }
     let begun = Instant::now();
     let mut sweep = Sweep::load(scenario, args.plan.as_deref())?;
-    global.warn_all(sweep.warnings());
+    global.warn_all(sweep.warnings().iter().map(|w| format!("the scenario as written: {w}")));
     let shard = args.shard.unwrap_or(Shard::WHOLE);
     let output = match &args.output {
         Some(output) if !args.dry_run => output,

@@ -20,6 +20,8 @@ use crate::unit::{SPEED, UnitSystem, km_per_h};
 
 /// Bodies whose speed lies along an axis by less than this share move obliquely.
 const ALONG: f64 = 0.99;
+/// A wall with more than this share of the chosen one's impulse is named.
+const ANOTHER: f64 = 0.01;
 /// A record with so many times the usual interval makes the study coarse.
 const COARSE: f64 = 2.0;
 /// Masses of a pair that differ by more, according to their velocities, are not equal.
@@ -169,8 +171,7 @@ impl Facts<'_> {
         if named.is_some() {
             Proposed::found(source, Given, "by --force")
         } else if force.ids.len() > 1 && self.recipe.beside.ids.is_empty() {
-            let from =
-                "they act one after the other: the bodies follow their sum, but none of them alone";
+            let from = "they act together or one after the other: the bodies follow their sum far more closely than any of them";
             Proposed::found(source, Computed, from)
         } else if force.ids.len() > 1 {
             let from = "they share the load: together they give the bodies their mass";
@@ -270,6 +271,25 @@ impl Facts<'_> {
                     "the bodies follow {file} {opposite} as they follow {file} {id}, on opposite sides: if these share the load, force and masses are those of a part, and a recipe cannot add them: let the deck's contacts name the bodies in one order"
                 ));
             }
+        }
+        // A wall acts on the bodies from outside, whatever they follow.
+        let walls = self.records.iter().flat_map(|record| &record.run.survey.forces);
+        let chosen = recipe.force.as_ref().filter(|f| f.file == "rwforc");
+        if let Some(chosen) = chosen
+            && let Some(wall) = walls
+                .filter(|wall| wall.file == "rwforc" && !chosen.ids.contains(&wall.ids[0]))
+                .filter(|wall| !recipe.beside.ids.contains(&wall.ids[0]))
+                .find(|wall| wall.size() > ANOTHER * chosen.size())
+        {
+            warnings.push(format!(
+                "{} also acts along the motion, with {} % of the impulse of {}: if it stops the body, use --force {}:{}+{}",
+                wall.label(),
+                percent(wall.size() / chosen.size()),
+                chosen.label(),
+                chosen.file,
+                chosen.ids.iter().map(i64::to_string).collect::<Vec<_>>().join("+"),
+                wall.ids[0]
+            ));
         }
         if self.force_is_of_section() {
             warnings.push(

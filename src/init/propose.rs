@@ -45,7 +45,8 @@ pub(crate) fn propose(
     let group = folders.group();
     let mut left_out = folders.left_out;
     let mut runs = survey(&folders.runs, hints, &mut left_out, &progress);
-    if let Some((file, ids)) = runs.iter().find_map(|run| sum_of_forces(&run.survey))
+    let sums = runs.iter().filter_map(|run| sum_of_forces(&run.survey));
+    if let Some((file, ids)) = sums.max_by_key(|(_, ids)| ids.len())
         && hints.force.is_none()
     {
         // What succeeded once succeeds again.

@@ -5,8 +5,8 @@
 use std::collections::BTreeMap;
 
 use super::UserHints;
-use super::sources::{Fit, largest};
-use super::survey::{Body, ForceCandidate, NodeCandidate, STOPPED, Survey};
+use super::sources::Fit;
+use super::survey::{Body, ForceCandidate, NodeCandidate, STOPPED, Survey, fit};
 use crate::curve::recipe::DisplacementComponent;
 use crate::study::StudyKind;
 
@@ -412,6 +412,8 @@ pub(super) const FOLLOWS: f64 = 0.1;
 pub(super) const RELATED: f64 = 0.3;
 /// A force joins a sum if the bodies follow that so much more closely.
 const WORTH: f64 = 0.8;
+/// A body that leaves less of an impulse follows it too closely for another interface's to show.
+const CLOSELY: f64 = 0.03;
 /// Impulses that differ by less are equal.
 const EQUAL: f64 = 0.02;
 
@@ -511,43 +513,64 @@ pub(super) fn without_force(survey: &Survey, kind: Option<StudyKind>) -> Option<
     chosen(kind, None, pair, (bodies > 0).then(|| (1.0, vec![0])))
 }
 
-/// Walls or interfaces of a file that act one after the other: a body follows none of the run's forces alone, but
-/// their sum.
+/// Walls or interfaces of a file that act together or one after the other: the bodies follow their sum far more closely
+/// than any of them. What acts between parts of a body is an interface, too, never a wall: walls are added as soon as it
+/// is worth it.
 pub(super) fn sum_of_forces(survey: &Survey) -> Option<(&'static str, Vec<i64>)> {
-    let least = best_of(survey, None).map_or(1.0, |best| best.residual);
-    if least <= FOLLOWS {
+    let pair = best_of(survey, None).filter(|best| best.kind == StudyKind::Pair);
+    let judged = match pair {
+        Some(pair) => vec![pair.bodies],
+        None => (0..survey.bodies.len()).map(|k| vec![k]).collect(),
+    };
+    let sums = judged.iter().filter_map(|bodies| sum_on(survey, bodies));
+    let (_, file, mut ids) = sums.min_by(|a, b| a.0.total_cmp(&b.0))?;
+    ids.sort_unstable();
+    Some((file, ids))
+}
+
+/// The sum that some bodies follow far more closely than any force, and what they leave of it.
+fn sum_on(survey: &Survey, bodies: &[usize]) -> Option<(f64, &'static str, Vec<i64>)> {
+    let changes: Vec<&[f64]> = bodies.iter().map(|&k| &survey.bodies[k].change[..]).collect();
+    if changes.iter().any(|change| change.is_empty()) {
         return None;
     }
-    let of_body = |change: &[f64], first: &ForceCandidate| {
-        let left = |impulse: &[f64]| {
-            let end = largest(impulse).min(change.len().saturating_sub(1));
-            Fit::of(&impulse[..=end], &change[..=end]).residual
-        };
-        let (mut ids, mut impulse) = (first.ids.clone(), first.impulse.clone());
+    let left = |of: &ForceCandidate| {
+        let each = changes.iter().map(|change| fit(&of.impulse, of.covers, change).residual);
+        each.fold(0.0, f64::max)
+    };
+    let contacts = || survey.forces.iter().filter(|f| ["rwforc", "rcforc"].contains(&f.file));
+    let least = contacts().map(left).fold(f64::INFINITY, f64::min);
+    let from = |first: &ForceCandidate| {
+        let mut sum = first.clone();
         loop {
-            let others = survey.forces.iter().filter(|other| {
-                (other.file, other.side) == (first.file, first.side) && !ids.contains(&other.ids[0])
+            let others = contacts().filter(|other| {
+                (other.file, other.side) == (sum.file, sum.side)
+                    && !sum.ids.contains(&other.ids[0])
+                    && other.size() > EQUAL * sum.size()
             });
             let sums = others.map(|other| {
-                let sum: Vec<f64> =
-                    impulse.iter().zip(&other.impulse).map(|(a, b)| a + b).collect();
-                (left(&sum), other.ids[0], sum)
+                let mut sum = sum.clone();
+                sum.impulse.iter_mut().zip(&other.impulse).for_each(|(a, b)| *a += b);
+                sum.covers = sum.covers.min(other.covers);
+                sum.ids.push(other.ids[0]);
+                (left(&sum), sum)
             });
             let next = sums.min_by(|a, b| a.0.total_cmp(&b.0));
-            match next.filter(|(residual, ..)| *residual < WORTH * left(&impulse)) {
-                Some((_, id, sum)) => (ids.push(id), impulse = sum),
-                None => return (left(&impulse), ids),
-            };
+            match next.filter(|(residual, _)| *residual < WORTH * left(&sum)) {
+                Some((_, next)) => sum = next,
+                None => return (left(&sum), sum.file, sum.ids),
+            }
         }
     };
-    let contacts = survey.forces.iter().filter(|force| ["rwforc", "rcforc"].contains(&force.file));
-    let sums = contacts.flat_map(|first| {
-        let moving = survey.bodies.iter().filter(|body| !body.change.is_empty());
-        moving.map(move |body| (first.file, of_body(&body.change, first)))
-    });
-    let (file, (residual, mut ids)) = sums.min_by(|a, b| a.1.0.total_cmp(&b.1.0))?;
-    ids.sort_unstable();
-    (ids.len() > 1 && residual <= FOLLOWS.min(0.5 * least)).then_some((file, ids))
+    let is_better = |(residual, file, ids): &(f64, &str, Vec<i64>)| {
+        let most = match *file {
+            "rwforc" => WORTH * least,
+            _ if least > CLOSELY => 0.5 * least,
+            _ => 0.0,
+        };
+        ids.len() > 1 && *residual <= most.min(FOLLOWS)
+    };
+    contacts().map(from).filter(is_better).min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 /// Whether the bodies of an explanation stop closing within the record: a run that died before says

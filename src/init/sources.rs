@@ -64,6 +64,7 @@ impl Sources {
                 Err(error) => unread.push(error.to_string()),
             }
         }
+        unread.extend(continued(folder));
         let deck = deck_of(folder);
         if let Some((_, deck)) = &deck {
             for section in listed.iter_mut().flat_map(|(_, sections)| sections) {
@@ -100,6 +101,25 @@ impl Sources {
     pub(super) fn force(&self, name: &str) -> Option<&Source> {
         self.forces.iter().find(|source| source.name == name)
     }
+}
+
+/// Files that a restart has written beside those of the first run, such as `nodout01`.
+fn continued(folder: &Path) -> Vec<String> {
+    let entries = folder.read_dir().into_iter().flatten().filter_map(Result::ok);
+    let mut names: Vec<String> = entries.map(|entry| shown_name(&entry.path())).collect();
+    names.sort();
+    let of_restart = |name: &&String| {
+        let own = without_job_id(name);
+        let first = own.trim_end_matches(|c: char| c.is_ascii_digit());
+        let is_known = FORCES.contains(&first) || [MOTION, ENERGY].contains(&first);
+        first.len() < own.len() && is_known && names.iter().any(|n| without_job_id(n) == first)
+    };
+    let words = |name: &String| {
+        format!(
+            "{name} is named like the file of a restart: append its states to the first file to have them read"
+        )
+    };
+    names.iter().filter(of_restart).map(words).collect()
 }
 
 /// A file of a folder without a nodout that is called nearly so, such as `nodout.txt`.

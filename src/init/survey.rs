@@ -27,6 +27,8 @@ const FEWEST_STATES: usize = 8;
 const SAME_VELOCITY: f64 = 0.05;
 /// A first speed below this share of the largest of the record is none.
 const STANDS: f64 = 0.02;
+/// A body's change of velocity is over with this share of its largest.
+const CHANGED: f64 = 0.95;
 /// Forces of a run that are kept, those with the largest impulse.
 const KEPT_FORCES: usize = 12;
 /// A wall's normal force is taken if its impulse differs from that along the motion by less.
@@ -360,11 +362,8 @@ fn fit_nodes(
                 continue;
             }
             candidate.roughness = roughness(&velocity);
-            candidate.fits = forces
-                .iter()
-                .zip(&ends)
-                .map(|(force, &end)| Fit::of(&force.impulse[..=end], &change[..=end]))
-                .collect();
+            candidate.fits =
+                forces.iter().map(|force| fit(&force.impulse, force.covers, &change)).collect();
             if candidate.roughness < smoothest[*body].0 {
                 smoothest[*body] = (candidate.roughness, change);
             }
@@ -377,6 +376,16 @@ fn fit_nodes(
         body.change = change;
     }
     Ok(())
+}
+
+/// How a body's change of velocity follows an impulse: until the impulse is largest, or the body has nearly its largest
+/// change, which a force that another one has taken over from does not explain.
+pub(super) fn fit(impulse: &[f64], covers: usize, change: &[f64]) -> Fit {
+    let most = CHANGED * change.get(largest(change)).map_or(0.0, |v| v.abs());
+    let changed = change.iter().position(|v| v.abs() >= most).unwrap_or(0);
+    let end = largest(impulse).max(changed.min(covers.saturating_sub(1)));
+    let states = (end + 1).min(impulse.len()).min(change.len());
+    Fit::of(&impulse[..states], &change[..states])
 }
 
 fn roughness(velocity: &[f64]) -> f64 {

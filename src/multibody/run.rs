@@ -181,6 +181,9 @@ pub struct InterfaceHistory {
     pub max_deflection_time_s: f64,
     /// When both sides first had the same velocity, in s.
     pub common_velocity_time_s: Option<f64>,
+    /// When contact began, in s. `None` without contact, and by the reference method.
+    #[serde(skip)]
+    pub contact_time_s: Option<f64>,
     /// Separation speed over speed of approach at the interface, once it has opened again.
     /// `None` below 0.1 m/s of approach, above 1 (where contacts repeat or neighbours push), and at the plate of an end.
     pub restitution: Option<f64>,

@@ -49,7 +49,7 @@ const LEAST_M: f64 = 1e-6;
 /// A contact is open again after so much time without force, in s: shorter ones are rattle.
 const OPEN_S: f64 = 0.01;
 
-/// In order of time; between outputs by linear interpolation.
+/// In order of time; between outputs by linear interpolation, but for contacts and the largest crush, which the run knows.
 pub(super) fn sequence<'a>(prepared: &'a Prepared, run: &Run) -> Vec<Event<'a>> {
     let mut events = Vec::new();
     let interfaces = prepared.chain.interfaces().iter().zip(&run.interfaces).zip(&prepared.used);
@@ -60,7 +60,8 @@ pub(super) fn sequence<'a>(prepared: &'a Prepared, run: &Run) -> Vec<Event<'a>> 
             events.push(Event { time_s, interface: &interface.name, what });
         };
         let crossing = |level_m| crossing_s(&run.time_s, &history.largest_deflection_m, level_m);
-        let Some(contact_s) = crossing(LEAST_M) else { continue };
+        let Some(crushed_s) = crossing(LEAST_M) else { continue };
+        let contact_s = history.contact_time_s.unwrap_or(crushed_s);
         add(contact_s, Happening::Contact);
         contacts(&run.time_s, history).into_iter().for_each(|(time_s, what)| add(time_s, what));
         if is_plates {

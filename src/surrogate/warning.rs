@@ -184,12 +184,14 @@ impl Warning {
     }
 
     pub(crate) fn energy_corrected(factor: f64) -> Self {
-        Self {
-            code: WarningCode::EnergyCorrected,
-            message: format!(
+        let message = if (factor - 1.0).abs() < 5e-5 {
+            "there was nothing to correct: the force that moves the body absorbs the impact's kinetic energy up to this maximum crush (by the rule motion always)".into()
+        } else {
+            format!(
                 "the forces were multiplied by {factor:.4}, so that the one that moves the body absorbs the impact's kinetic energy"
-            ),
-        }
+            )
+        };
+        Self { code: WarningCode::EnergyCorrected, message }
     }
 
     pub(crate) fn energy_mismatch(ratio: f64) -> Self {

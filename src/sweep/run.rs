@@ -146,10 +146,8 @@ impl<'a> Worker<'a> {
         let run = simulate(&prepared.chain, &settings)
             .map_err(|error| Error::below(ErrorCode::Simulation, error))?;
         push_results(&sweep.results, prepared, &run, values);
-        // Warnings on the scenario as written were given once; here it has other numbers.
-        let said = |w: &String| {
-            sweep.base.warnings.iter().any(|b| without_numbers(b).eq(without_numbers(w)))
-        };
+        // What nothing varies was said once; what the row's own numbers are in is the row's.
+        let said = |w: &&String| sweep.base.warnings.contains(w);
         let mut all: Vec<String> = Vec::new();
         for warning in prepared.warnings.iter().filter(|w| !said(w)) {
             if !all.contains(warning) {
@@ -182,10 +180,6 @@ impl<'a> Worker<'a> {
             }
         }
     }
-}
-
-fn without_numbers(text: &str) -> impl Iterator<Item = char> {
-    text.chars().filter(|c| !c.is_ascii_digit() && *c != '.')
 }
 
 fn push_results(results: &[ResultName], prepared: &Prepared, run: &Run, values: &mut Vec<f64>) {

@@ -166,7 +166,7 @@ impl Engine<'_> {
         if what.loads && start <= 0.0 && compresses {
             // What the contact has not yet braked.
             let before = closing - h * rate * end / (end - start);
-            self.events.interfaces[k].contact_began(before.max(closing));
+            self.events.interfaces[k].contact_began(time_of(0.0), before.max(closing));
         }
         if let Some(at_m) = what.pressed_m {
             self.record_sides(k, time_of(at_m));

@@ -253,7 +253,7 @@ impl<'a> Engine<'a> {
                 continue;
             }
             let closing = self.closing(k);
-            self.events.interfaces[k].contact_began(closing);
+            self.events.interfaces[k].contact_began(0.0, closing);
             if self.push.presses(k) {
                 for i in self.sides(k) {
                     self.events.touched(i, 0.0);

@@ -257,13 +257,15 @@ pub(in self::super) struct Extremes {
     max_deflection_time_s: f64,
     /// When the deflection first stopped growing.
     common_velocity_s: Option<f64>,
-    /// Rate of deflection when contact began, and when it ended for the first time.
+    /// When contact began for the first time, with the rate of deflection, and that when it ended.
+    contact_s: Option<f64>,
     approach_m_per_s: Option<f64>,
     separation_m_per_s: Option<f64>,
 }
 
 impl Extremes {
-    pub(crate) fn contact_began(&mut self, closing_m_per_s: f64) {
+    pub(crate) fn contact_began(&mut self, time_s: f64, closing_m_per_s: f64) {
+        self.contact_s = self.contact_s.or(Some(time_s));
         self.approach_m_per_s = self.approach_m_per_s.or(Some(closing_m_per_s));
     }
 
@@ -302,6 +304,7 @@ impl Extremes {
         history.max_deflection_m = self.max_deflection_m;
         history.max_deflection_time_s = self.max_deflection_time_s;
         history.common_velocity_time_s = self.common_velocity_s;
+        history.contact_time_s = self.contact_s;
         history.peak_tension_n = self.peak_tension_n;
         history.max_extension_m = self.max_extension_m;
         history.restitution = match (self.approach_m_per_s, self.separation_m_per_s) {
