@@ -346,6 +346,17 @@ fn ends_are_all_that_a_user_writes() {
     for interface in run["summary"]["interfaces"].as_array().unwrap() {
         assert!(interface["restitution"].is_null(), "{interface}");
     }
+    // Two vehicles that meet without plates have one, whatever stands at the other end of one of them.
+    let hard =
+        "hard = { stages = [ { stroke = \"1m\", from = \"2MN\" } ], unloading = \"50MN/m\" }\n";
+    let trains = "[[train]]\nname = \"A\"\nspeed = \"36km/h\"\nvehicles = [ { name = \"A1\", mass = \"20t\" } ]\n\
+         [[train]]\nname = \"B\"\nspeed = \"0km/h\"\ngap = \"3m\"\nvehicles = [\n\
+         { name = \"B1\", mass = \"20.24t\", rear = { curve = \"end\" } },\n\
+         { name = \"B2\", mass = \"20.24t\", ends = \"end\" },\n]\n[contact]\ncurve = \"hard\"\n";
+    let struck = simulate_text("one-sided.toml", &format!("{HEAD}{hard}{trains}"));
+    let interfaces = struck["summary"]["interfaces"].as_array().unwrap();
+    let nose = interfaces.iter().find(|i| i["name"] == "A1|B1").unwrap();
+    assert!(nose["restitution"].is_number(), "{nose}");
     let first = |name: &str| run[name].as_array().unwrap()[0].as_f64().unwrap();
     assert!((first("deflection_m[A1|A2]") + 0.032).abs() < 1e-12);
     let bodies = run["summary"]["bodies"].as_array().unwrap();

@@ -1276,14 +1276,21 @@ fn walls_that_act_one_after_the_other_are_added() {
     // Where the second takes so little that no run shows it, it is named.
     for km_per_h in [40.0, 50.0] {
         let history = Crash { speed_m_per_s: km_per_h / 3.6, ..Crash::default() }.run();
-        let first: Vec<f64> = history.contact_n.iter().map(|f| 0.97 * f).collect();
-        let second: Vec<f64> = history.contact_n.iter().map(|f| 0.03 * f).collect();
+        let beside = |x: f64| if x > 0.2 { 0.03 } else { 0.0 };
+        let crush = &history.bodies[0].displacement_m[4];
+        let second: Vec<f64> =
+            history.contact_n.iter().zip(crush).map(|(f, x)| f * beside(*x)).collect();
+        let first: Vec<f64> = history.contact_n.iter().zip(&second).map(|(f, s)| f - s).collect();
         let run = here.join(format!("share/{km_per_h}kmh"));
         layout.nodout(&run, &history, &car_nodes());
         let wall = |id, along_n| Force { id, title: "", along_n, across_n: 0.0 };
         layout.rwforc(&run, &history, &[wall(1, &first), wall(2, &second)]);
     }
-    says(&warned(here, "init share -o share.toml"), "rwforc 2");
+    let said = warned(here, "init share -o share.toml");
+    says(&said, "rwforc 2 also acts along the motion, in 40kmh with ");
+    says(&said, "if it stops the body, use --force rwforc:1+2");
+    let said = warned(here, "init share --force rwforc:1 -o one.toml");
+    assert!(!said.contains("also acts"), "{said}");
     // The user may ask for the sum.
     crumple_ok(here, "init walls --force rwforc:2+1 -o given.toml");
     let given = study(here, "given.toml");
@@ -1304,7 +1311,7 @@ fn a_coarse_record_is_named() {
         let crash = Crash { speed_m_per_s: km_per_h / 3.6, interval_s, ..Crash::default() };
         write_car(layout, &here.join(format!("car/{km_per_h}kmh")), &crash.run(), &car_nodes());
     }
-    let coarse = "run 30kmh: a state every 1 ms, the others every 0.2 ms";
+    let coarse = "states: 30kmh every 1 ms, most of the others every 0.2 ms";
     says(&warned(here, "init car -o all.toml"), coarse);
     let said = warned(here, "init car/40kmh car/50kmh -o fine.toml");
     assert!(!said.contains("a state every"), "{said}");
@@ -1321,7 +1328,7 @@ fn parts_of_a_restart_are_named() {
     assert!(!warned(folder.path(), "init car -o whole.toml").contains("restart"));
     fs::copy(run.join("nodout"), run.join("nodout01")).unwrap();
     let said = warned(folder.path(), "init car -o parts.toml");
-    says(&said, "not read: nodout01 is named like the file of a restart");
+    says(&said, "nodout01: it is named like the file of a restart");
 }
 
 /// CFC 60 would smooth away the pulse of a crash of some milliseconds.

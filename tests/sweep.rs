@@ -724,6 +724,25 @@ fn what_is_not_known_is_not_precise() {
         "{until}"
     );
     assert_eq!((rows, &until["is_reached"]), (300, &false.into()));
+    // The table says of how many rows its numbers are.
+    let printed = folder.ok("sweep s.toml -o table.csv");
+    let said = format!("numbers of some rows only: over_limits (known in {numbers} of 300)");
+    assert!(printed.contains(&said), "{printed}");
+    assert!(printed.contains("rank correlation; below 0."), "{printed}");
+}
+
+/// Values that are drawn at each point of a grid may follow one another by chance, too.
+#[test]
+fn correlations_of_drawn_values_on_a_grid_may_be_chance() {
+    let vary = "{ what = \"speed\", train = \"A\", from = \"10m/s\", to = \"12m/s\", steps = 2 }";
+    let mass = "{ what = \"mass\", vehicles = \"all\", factor = true, distribution = \"uniform\", from = 0.9, to = 1.1 }";
+    let folder = Folder::new(&format!("[sweep]\nsamples = 40\nvary = [ {vary}, {mass} ]\n"));
+    let printed = folder.ok("sweep s.toml -o out.csv");
+    assert!(printed.contains("rank correlation; below 0.22 it may be chance"), "{printed}");
+    let grid =
+        Folder::new(&format!("[sweep]\nvary = [ {} ]\n", vary.replace("steps = 2", "steps = 9")));
+    let printed = grid.ok("sweep s.toml -o out.csv");
+    assert!(!printed.contains("may be chance"), "{printed}");
 }
 
 /// What a row's own numbers are in is the row's, whether or not the scenario as written has the like.

@@ -63,8 +63,9 @@ impl Args {
             }
         };
         let output = self.output.clone().unwrap_or_else(|| study.with_file_name(DATABASE));
-        let ending = output.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-        if TEXTS.contains(&ending) {
+        let ending = output.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+        let ending = ending.unwrap_or_default();
+        if TEXTS.contains(&&*ending) {
             return usage(format!(
                 "{}: the database is an HDF5 file, not .{ending}: name it .h5 (crumple export and crumple db show write curves as text)",
                 output.display()

@@ -278,9 +278,10 @@ fn say(
     global.show(&document, |out| {
         output::table(out, statistics(report, is_grid))?;
         if let Some(least) = varied(report).and(report.sensitivities.iter().map(|s| s.rows).min()) {
-            let chance = match is_random {
-                true => format!("; below {:.2} it may be chance", 2.0 / (least as f64).sqrt()),
-                false => String::new(),
+            // Values drawn at the points of a grid are as random as those of a sample.
+            let chance = match is_grid {
+                false => format!("; below {:.2} it may be chance", 2.0 / (least as f64).sqrt()),
+                true => String::new(),
             };
             writeln!(out, "rank corr.: Spearman's rank correlation{chance}")?;
         } else if !report.sensitivities.is_empty() {
@@ -289,6 +290,7 @@ fn say(
                 "rank correlations of more than {MOST_VARIED} varied quantities: with --json"
             )?;
         }
+        print_unknown(out, report)?;
         print_share_over_limits(out, report, is_random)?;
         if let Some(reached) = reached {
             writeln!(out, "{}", reached.text(report.rows))?;
@@ -412,6 +414,22 @@ fn varied(report: &Report) -> Option<Vec<&str>> {
     varied.sort_unstable();
     varied.dedup();
     Some(varied).filter(|varied| (1..=MOST_VARIED).contains(&varied.len()))
+}
+
+/// Which columns' numbers are those of some rows only.
+fn print_unknown(out: &mut dyn Write, report: &Report) -> io::Result<()> {
+    let done = report.rows - report.failed;
+    let unknown: Vec<_> = report.columns.iter().filter(|c| c.count < done).collect();
+    if unknown.is_empty() {
+        return Ok(());
+    }
+    let shown = unknown.iter().take(MOST_VARIED);
+    let mut shown: Vec<String> =
+        shown.map(|c| format!("{} (known in {} of {done})", c.column, c.count)).collect();
+    if unknown.len() > MOST_VARIED {
+        shown.push(format!("{} further columns", unknown.len() - MOST_VARIED));
+    }
+    writeln!(out, "numbers of some rows only: {}", shown.join(", "))
 }
 
 fn print_share_over_limits(

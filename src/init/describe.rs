@@ -273,23 +273,26 @@ impl Facts<'_> {
             }
         }
         // A wall acts on the bodies from outside, whatever they follow.
-        let walls = self.records.iter().flat_map(|record| &record.run.survey.forces);
-        let chosen = recipe.force.as_ref().filter(|f| f.file == "rwforc");
-        if let Some(chosen) = chosen
-            && let Some(wall) = walls
-                .filter(|wall| wall.file == "rwforc" && !chosen.ids.contains(&wall.ids[0]))
-                .filter(|wall| !recipe.beside.ids.contains(&wall.ids[0]))
-                .find(|wall| wall.size() > ANOTHER * chosen.size())
+        if let Some(chosen) = recipe.force.as_ref().filter(|f| f.file == "rwforc")
+            && self.hints.force.is_none()
         {
-            warnings.push(format!(
-                "{} also acts along the motion, with {} % of the impulse of {}: if it stops the body, use --force {}:{}+{}",
-                wall.label(),
-                percent(wall.size() / chosen.size()),
-                chosen.label(),
-                chosen.file,
-                chosen.ids.iter().map(i64::to_string).collect::<Vec<_>>().join("+"),
-                wall.ids[0]
-            ));
+            let known = [&chosen.ids, &recipe.beside.ids, &recipe.beside.opposite];
+            let another = self.records.iter().find_map(|Record { run, .. }| {
+                let own = run.survey.force(chosen.file, &chosen.ids)?;
+                let size = run.survey.forces[own].size();
+                let walls = run.survey.forces.iter().filter(|wall| {
+                    wall.file == chosen.file && !known.iter().any(|ids| ids.contains(&wall.ids[0]))
+                });
+                let shares = walls.map(|wall| (&run.name, wall.ids[0], wall.size() / size));
+                shares.into_iter().find(|(.., share)| *share > ANOTHER)
+            });
+            if let Some((run, id, share)) = another {
+                let (label, percent) = (chosen.label(), percent(share));
+                let ids = chosen.ids.iter().map(i64::to_string).collect::<Vec<_>>().join("+");
+                warnings.push(format!(
+                    "rwforc {id} also acts along the motion, in {run} with {percent} % of the impulse of {label}: if it stops the body, use --force rwforc:{ids}+{id}"
+                ));
+            }
         }
         if self.force_is_of_section() {
             warnings.push(
@@ -297,18 +300,22 @@ impl Facts<'_> {
                     .into(),
             );
         }
-        let mut by_interval: Vec<(&Record, &Impact)> = self.impacts().collect();
-        by_interval.sort_by(|a, b| a.1.interval_s.total_cmp(&b.1.interval_s));
-        if let Some((_, usual)) = by_interval.get(by_interval.len().saturating_sub(1) / 2)
-            && let Some((record, coarsest)) = by_interval.last()
-            && coarsest.interval_s > COARSE * usual.interval_s
-        {
-            let ms = |impact: &Impact| digits(impact.interval_s * 1e3);
+        let mut intervals: Vec<f64> = self.impacts().map(|(_, impact)| impact.interval_s).collect();
+        intervals.sort_by(f64::total_cmp);
+        let usual = intervals.get(intervals.len().saturating_sub(1) / 2).copied();
+        let coarse = self
+            .impacts()
+            .filter(|(_, impact)| Some(impact.interval_s) > usual.map(|s| COARSE * s));
+        let coarse: Vec<String> = coarse
+            .map(|(record, impact)| {
+                format!("{} every {} ms", record.run.name, digits(impact.interval_s * 1e3))
+            })
+            .collect();
+        if let (false, Some(usual)) = (coarse.is_empty(), usual) {
             warnings.push(format!(
-                "run {}: a state every {} ms, the others every {} ms: sampling and filter of all runs follow the coarsest; leave this run out if the others matter more",
-                record.run.name,
-                ms(coarsest),
-                ms(usual)
+                "states: {}, most of the others every {} ms: sampling and filter of all runs follow the coarsest; leave such runs out if the others matter more",
+                coarse.join(", "),
+                digits(usual * 1e3)
             ));
         }
         let oblique = self.records.iter().find(|record| record.run.survey.aligned < ALONG);

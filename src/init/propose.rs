@@ -16,7 +16,7 @@ use super::measure::{Impact, SAME_MASS, is_near};
 use super::recipe::{CommonRecipe, sum_of_forces};
 use super::record::{Record, Run};
 use super::sources::Sources;
-use super::survey::{ForceCandidate, Survey};
+use super::survey::{ForceCandidate, Named, Survey};
 use super::write::{Proposal, Proposed};
 use super::{GivenForce, UserHints, units};
 use crate::curve::contact::milliseconds;
@@ -45,14 +45,17 @@ pub(crate) fn propose(
     let group = folders.group();
     let mut left_out = folders.left_out;
     let mut runs = survey(&folders.runs, hints, &mut left_out, &progress);
-    let sums = runs.iter().filter_map(|run| sum_of_forces(&run.survey));
-    if let Some((file, ids)) = sums.max_by_key(|(_, ids)| ids.len())
-        && hints.force.is_none()
-    {
-        // What succeeded once succeeds again.
-        runs.par_iter_mut().for_each(|Run { sources, survey, .. }| {
-            *survey = Survey::of(sources, Some((file, &ids))).unwrap_or_else(|_| survey.clone());
-        });
+    if hints.force.is_none() {
+        let mut sums: Vec<Named> =
+            runs.par_iter().filter_map(|run| sum_of_forces(&run.survey)).collect();
+        sums.sort();
+        sums.dedup();
+        if !sums.is_empty() {
+            // What succeeded once succeeds again.
+            runs.par_iter_mut().for_each(|Run { sources, survey, .. }| {
+                *survey = Survey::of(sources, &sums).unwrap_or_else(|_| survey.clone());
+            });
+        }
     }
     let surveys: Vec<&Survey> = runs.iter().map(|run| &run.survey).collect();
     let Some(recipe) = CommonRecipe::of(&surveys, hints) else {
@@ -115,10 +118,11 @@ fn survey(
             }
         }
     }
-    let named = hints.force.as_ref().map(|force| (&*force.file, &force.ids[..]));
+    let named: Vec<Named> =
+        hints.force.iter().map(|force| (force.file.clone(), force.ids.clone())).collect();
     let (runs, out): (Vec<Run>, Vec<LeftOut>) =
         unique.into_par_iter().partition_map(|(path, name, sources)| {
-            let survey = Survey::of(&sources, named);
+            let survey = Survey::of(&sources, &named);
             progress(&name);
             match survey {
                 Ok(survey) => Either::Left(Run { path, name, sources, survey }),

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use super::UserHints;
 use super::sources::Fit;
-use super::survey::{Body, ForceCandidate, NodeCandidate, STOPPED, Survey, fit};
+use super::survey::{Body, ForceCandidate, Named, NodeCandidate, STOPPED, Survey, fit};
 use crate::curve::recipe::DisplacementComponent;
 use crate::study::StudyKind;
 
@@ -346,7 +346,10 @@ fn chosen_force(views: &[RunView<'_>]) -> Option<(ForceCandidate, Vec<Alternativ
     let (first, force) = *of_members.first()?;
     let others = first.forces.iter().enumerate();
     let others: Vec<(&ForceCandidate, f64)> = others
-        .filter(|(_, other)| other.file != force.file || !force.ids.contains(&other.ids[0]))
+        .filter(|(_, other)| {
+            let is_part = other.file == force.file && force.ids.contains(&other.ids[0]);
+            other.ids.len() == 1 && !is_part
+        })
         .filter_map(|(k, other)| Some((other, of_force(first, k, None)?.residual)))
         .filter(|(_, residual)| *residual < RELATED)
         .collect();
@@ -412,6 +415,10 @@ pub(super) const FOLLOWS: f64 = 0.1;
 pub(super) const RELATED: f64 = 0.3;
 /// A force joins a sum if the bodies follow that so much more closely.
 const WORTH: f64 = 0.8;
+/// A sum leaves at most this much more than the part of it that the bodies follow best: as a factor and of the impulse.
+const NO_WORSE: (f64, f64) = (1.1, 0.002);
+/// What printed digits leave.
+const ROUNDED: f64 = 2e-3;
 /// A body that leaves less of an impulse follows it too closely for another interface's to show.
 const CLOSELY: f64 = 0.03;
 /// Impulses that differ by less are equal.
@@ -487,11 +494,20 @@ pub(super) fn best_of(survey: &Survey, kind: Option<StudyKind>) -> Option<Explan
         .filter(|(_, e)| e.residual < RELATED)
         .collect();
     let least = explained.iter().map(|(_, e)| e.residual).fold(f64::INFINITY, f64::min);
+    // A sum that another run needs is one here, too, unless the bodies follow a part of it more closely.
+    let is_sum = |(force, e): &(&ForceCandidate, Explanation)| {
+        let parts = explained.iter().filter(|(part, _)| part.file == force.file);
+        let parts =
+            parts.filter(|(part, _)| part.ids.len() == 1 && force.ids.contains(&part.ids[0]));
+        let part = parts.map(|(_, e)| e.residual).fold(f64::INFINITY, f64::min);
+        force.ids.len() == 1 || e.residual <= NO_WORSE.0 * part + NO_WORSE.1
+    };
+    let explained: Vec<_> = explained.iter().filter(|one| is_sum(one)).collect();
     let largest = |files: &[&str]| {
         let of_kind = || {
             let following =
                 explained.iter().filter(|(_, e)| e.residual <= FOLLOWS.max(2.0 * least));
-            following.filter(move |(force, _)| files.contains(&force.file))
+            following.filter(move |(force, _)| files.contains(&force.file)).copied()
         };
         let most = of_kind().map(|(force, _)| force.size()).fold(0.0, f64::max);
         // The survey has them by size: of equal ones a wall's comes before an interface's.
@@ -516,7 +532,7 @@ pub(super) fn without_force(survey: &Survey, kind: Option<StudyKind>) -> Option<
 /// Walls or interfaces of a file that act together or one after the other: the bodies follow their sum far more closely
 /// than any of them. What acts between parts of a body is an interface, too, never a wall: walls are added as soon as it
 /// is worth it.
-pub(super) fn sum_of_forces(survey: &Survey) -> Option<(&'static str, Vec<i64>)> {
+pub(super) fn sum_of_forces(survey: &Survey) -> Option<Named> {
     let pair = best_of(survey, None).filter(|best| best.kind == StudyKind::Pair);
     let judged = match pair {
         Some(pair) => vec![pair.bodies],
@@ -525,7 +541,7 @@ pub(super) fn sum_of_forces(survey: &Survey) -> Option<(&'static str, Vec<i64>)>
     let sums = judged.iter().filter_map(|bodies| sum_on(survey, bodies));
     let (_, file, mut ids) = sums.min_by(|a, b| a.0.total_cmp(&b.0))?;
     ids.sort_unstable();
-    Some((file, ids))
+    Some((file.into(), ids))
 }
 
 /// The sum that some bodies follow far more closely than any force, and what they leave of it.
@@ -540,6 +556,7 @@ fn sum_on(survey: &Survey, bodies: &[usize]) -> Option<(f64, &'static str, Vec<i
     };
     let contacts = || survey.forces.iter().filter(|f| ["rwforc", "rcforc"].contains(&f.file));
     let least = contacts().map(left).fold(f64::INFINITY, f64::min);
+    let followed = best_of(survey, None).map_or(1.0, |best| best.residual);
     let from = |first: &ForceCandidate| {
         let mut sum = first.clone();
         loop {
@@ -564,8 +581,8 @@ fn sum_on(survey: &Survey, bodies: &[usize]) -> Option<(f64, &'static str, Vec<i
     };
     let is_better = |(residual, file, ids): &(f64, &str, Vec<i64>)| {
         let most = match *file {
-            "rwforc" => WORTH * least,
-            _ if least > CLOSELY => 0.5 * least,
+            "rwforc" if least > ROUNDED => WORTH * least,
+            "rcforc" if least.min(followed) > CLOSELY => 0.5 * least,
             _ => 0.0,
         };
         ids.len() > 1 && *residual <= most.min(FOLLOWS)

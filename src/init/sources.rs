@@ -116,7 +116,8 @@ fn continued(folder: &Path) -> Vec<String> {
     };
     let words = |name: &String| {
         format!(
-            "{name} is named like the file of a restart: append its states to the first file to have them read"
+            "{}: it is named like the file of a restart: append its states to the first file to have them read",
+            folder.join(name).display()
         )
     };
     names.iter().filter(of_restart).map(words).collect()

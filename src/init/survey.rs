@@ -35,7 +35,7 @@ const KEPT_FORCES: usize = 12;
 const SAME_IMPULSE: f64 = 0.02;
 
 /// A file of forces and the numbers of those that are added.
-pub(super) type Named<'a> = (&'a str, &'a [i64]);
+pub(super) type Named = (String, Vec<i64>);
 
 /// What a run has to choose from.
 #[derive(Clone, Debug)]
@@ -94,7 +94,7 @@ pub(super) struct ForceCandidate {
 
 impl Survey {
     /// Looks over a run. A recipe's force may be named, which is then kept however small it is; several are added.
-    pub(super) fn of(sources: &Sources, named: Option<Named<'_>>) -> Result<Self, Reason> {
+    pub(super) fn of(sources: &Sources, named: &[Named]) -> Result<Self, Reason> {
         let source = &sources.motion;
         let components = if source.has("x_velocity") {
             DisplacementComponent::ALL.map(DisplacementComponent::velocity)
@@ -118,9 +118,8 @@ impl Survey {
             forces.extend(force_candidates(source, direction, &time, named)?);
         }
         keep_largest(&mut forces, named);
-        if let Some((file, ids @ [_, _, ..])) = named
-            && let Some(source) = sources.force(file)
-        {
+        for (file, ids) in named.iter().filter(|(_, ids)| ids.len() > 1) {
+            let Some(source) = sources.force(file) else { continue };
             let is_there = |id: &i64| source.titles.keys().any(|entity| entity.id == *id);
             let sum = ForceCandidate::sum(&forces, file, ids).filter(|_| ids.iter().all(is_there));
             forces.extend(sum);
@@ -257,7 +256,7 @@ fn force_candidates(
     source: &Source,
     direction: DisplacementComponent,
     time: &[f64],
-    named: Option<Named<'_>>,
+    named: &[Named],
 ) -> Result<Vec<ForceCandidate>, Reason> {
     let mut components = vec![direction.force()];
     if source.has("normal_force") {
@@ -287,13 +286,13 @@ fn force_candidates(
 }
 
 /// Keeps the forces with the largest impulses, so that thousands of contacts are not held.
-fn keep_largest(forces: &mut Vec<ForceCandidate>, named: Option<Named<'_>>) {
+fn keep_largest(forces: &mut Vec<ForceCandidate>, named: &[Named]) {
     forces.sort_by(|a, b| b.size().total_cmp(&a.size()).then(a.rank().cmp(&b.rank())));
     let mut rank = 0;
     forces.retain(|force| {
         rank += 1;
-        let is_named = |(file, ids): Named<'_>| file == force.file && ids.contains(&force.ids[0]);
-        rank <= KEPT_FORCES || named.is_some_and(is_named)
+        let is_named = |(file, ids): &Named| file == force.file && ids.contains(&force.ids[0]);
+        rank <= KEPT_FORCES || named.iter().any(is_named)
     });
 }
 

@@ -45,8 +45,8 @@ const MASS_KG: Range = Range { low: 1.0, high: 5e6, usual: 15e3, spread: 8.0 };
 
 /// Systems of inches and feet: in them the numbers of a usual impact are those of a slow one in millimetres or metres.
 const CUSTOMARY: [&str; 2] = ["in-slinch-s", "ft-slug-s"];
-/// By so much more usual an impact has to be in one of these to put the metric system in doubt.
-const DOUBT: f64 = 5.0;
+/// By so much more usual an impact has to be in each of these to put the metric system in doubt: a foot is not far from a metre.
+const DOUBT: [f64; 2] = [5.0, 2.0];
 /// A name may round a speed to this share of it.
 const NAMED: f64 = 0.1;
 
@@ -208,7 +208,11 @@ fn guessed(
     }
     possible.sort_by(|a, b| unusual(a).total_cmp(&unusual(b)));
     let (units, less) = possible.split_first()?;
-    customary.retain(|other| unusual(other) + DOUBT * (runs.len() as f64) < unusual(units));
+    let doubt = |other: &UnitSystem| {
+        let feet = usize::from(CUSTOMARY[0] != other.to_string());
+        DOUBT[feet] * runs.len() as f64
+    };
+    customary.retain(|other| unusual(other) + doubt(other) < unusual(units));
     if let Some(other) = customary.first() {
         let speed = |units: &UnitSystem| shown_speed(first.speed * units.speed());
         warnings.push(format!(

@@ -70,9 +70,10 @@ pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, Error> {
     run.warnings.extend(free_travel(chain, &run));
     // Contacts that repeat, and neighbours that push, would make a ratio of what is not one impact; the plate of an end is
     // stopped at once, whatever its vehicle does.
-    let stops = |k: usize| chain.interfaces().get(k).is_some_and(|i| i.stopping.is_some());
+    let stopping = chain.interfaces().iter().filter_map(|i| i.stopping.as_ref());
+    let plates: Vec<usize> = stopping.map(|stopping| stopping.zone).collect();
     for (k, history) in run.interfaces.iter_mut().enumerate() {
-        let is_of_plate = stops(k) || stops(k + 1) || k > 0 && stops(k - 1);
+        let is_of_plate = plates.contains(&k) || plates.contains(&(k + 1));
         let is_of_impact = |ratio: &f64| *ratio <= MOST_RESTITUTION && !is_of_plate;
         history.restitution = history.restitution.filter(is_of_impact);
     }

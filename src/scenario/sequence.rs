@@ -49,7 +49,8 @@ const LEAST_M: f64 = 1e-6;
 /// A contact is open again after so much time without force, in s: shorter ones are rattle.
 const OPEN_S: f64 = 0.01;
 
-/// In order of time; between outputs by linear interpolation, but for contacts and the largest crush, which the run knows.
+/// In order of time; between outputs by linear interpolation, but for the first contact and the largest crush, which the
+/// run knows.
 pub(super) fn sequence<'a>(prepared: &'a Prepared, run: &Run) -> Vec<Event<'a>> {
     let mut events = Vec::new();
     let interfaces = prepared.chain.interfaces().iter().zip(&run.interfaces).zip(&prepared.used);
@@ -70,11 +71,11 @@ pub(super) fn sequence<'a>(prepared: &'a Prepared, run: &Run) -> Vec<Event<'a>> 
         for (begin_m, name) in used.stages.iter() {
             let name = name.clone();
             if let Some(time_s) = crossing(*begin_m) {
-                add(time_s, Happening::Stage { name });
+                add(time_s.max(contact_s), Happening::Stage { name });
             }
         }
         if let Some(time_s) = crossing(history.data_end_m) {
-            add(time_s, Happening::BeyondData);
+            add(time_s.max(contact_s), Happening::BeyondData);
         }
         // At the end of the run it is still crushed.
         if run.time_s.last().is_some_and(|end_s| history.max_deflection_time_s < *end_s) {

@@ -291,8 +291,12 @@ impl<'a> Prediction<'a> {
             }
             () => None,
         };
-        let has_band = model.band(&at, model.force_kind).is_ok_and(|band| band.is_some());
-        warnings.extend(without_band.filter(|_| has_band).map(Warning::no_band));
+        if let Some(why) = without_band {
+            warnings.extend(match model.band(&at, model.force_kind) {
+                Ok(band) => band.map(|_| Warning::no_band(why)),
+                Err(warning) => Some(warning),
+            });
+        }
         let mut banded = |force, envelope| match without_band {
             None => self.banded(force, envelope, &mut warnings),
             Some(_) => Banded::default(),

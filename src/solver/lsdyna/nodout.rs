@@ -204,7 +204,7 @@ fn row(table: TableId, line: &Line<'_>, states: &mut StateReader<'_>) {
     let fields = [TRANSLATIONS.len(), ROTATIONS.len()][table.0];
     let is_filled = id_end == ID_WIDTH
         && text.len() == ID_WIDTH + fields * FIELD_WIDTH
-        && !text[ID_WIDTH + FIELD_WIDTH - EXPONENT].is_ascii_digit();
+        && b"Ee+-".contains(&text[ID_WIDTH + FIELD_WIDTH - EXPONENT]);
     let first = if is_filled { ID_WIDTH } else { id_end.max(ID_WIDTH - 1) + 1 };
     let width = first + fields * FIELD_WIDTH;
     let Some(id) = integer(&text[..id_end]).filter(|_| text.len() == width) else {
