@@ -340,6 +340,23 @@ impl UnitSystem {
     /// Systems that crash models are written in.
     pub(crate) const USUAL: [&'static str; 5] = ["mm-t-s", "mm-kg-ms", "SI", "mm-g-ms", "cm-g-us"];
 
+    /// Systems of inches and feet.
+    pub(crate) const CUSTOMARY: [&'static str; 2] = ["in-slinch-s", "ft-slug-s"];
+
+    /// The system in which a density and a Young's modulus are those of a metal: 1 600 to 9 000 kg/m³ and a speed of sound
+    /// √(E/ρ) of 4.3 to 5.7 km/s. Steel, aluminium, magnesium and titanium have 5.0 to 5.2 km/s; two systems differ by a
+    /// factor of more than 25 in one of the two.
+    pub(crate) fn of_metal(density: f64, modulus: f64) -> Option<Self> {
+        const OTHERS: [&str; 4] = ["m-t-s", "cm-g-s", "mm-kg-s", "mm-g-s"];
+        let names = Self::USUAL.iter().chain(&Self::CUSTOMARY).chain(&OTHERS);
+        let systems = names.filter_map(|name| Self::parse(name).ok());
+        systems.into_iter().find(|units| {
+            let density = density * units.mass_kg / units.length_m.powi(3);
+            let sound = (modulus * units.mass_kg / units.length_m).sqrt() / units.time_s;
+            (1.6e3..9e3).contains(&density) && (4.3e3..5.7e3).contains(&(sound / density.sqrt()))
+        })
+    }
+
     /// Reads `"SI"` or three units in any order, such as `"mm-t-s"` or `"kg-mm-ms"`.
     pub fn parse(text: &str) -> Result<Self, Error> {
         if text.eq_ignore_ascii_case("si") {
@@ -533,6 +550,34 @@ mod tests {
         t(&TIME, "0.75ms", 0.75e-3);
         t(&STIFFNESS, "80MN/m", 80e6);
         t(&LENGTH, "-3mm", -0.003);
+    }
+
+    /// Steel, aluminium and magnesium in each system; what is not a metal in any.
+    #[test]
+    fn metals_have_units() {
+        for name in
+            ["mm-t-s", "mm-kg-ms", "SI", "mm-g-ms", "cm-g-us", "in-slinch-s", "ft-slug-s", "cm-g-s"]
+        {
+            let units = UnitSystem::parse(name).unwrap();
+            for (density, modulus) in [(7850.0, 210e9), (2700.0, 68.9e9), (1770.0, 45e9)] {
+                let density = density / units.mass_kg * units.length_m.powi(3);
+                let modulus =
+                    modulus * units.length_m * units.time_s * units.time_s / units.mass_kg;
+                assert_eq!(UnitSystem::of_metal(density, modulus), Some(units), "{name}");
+            }
+        }
+        // Polyamide, water, foam, a rigid body of tenfold density; nothing, and less.
+        let others = [
+            (1140.0, 3e9),
+            (1000.0, 2.2e9),
+            (50.0, 5e6),
+            (78500.0, 210e9),
+            (0.0, 0.0),
+            (-1.0, 1.0),
+        ];
+        for (density, modulus) in others {
+            assert_eq!(UnitSystem::of_metal(density, modulus), None, "{density}, {modulus}");
+        }
     }
 
     #[test]

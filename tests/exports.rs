@@ -615,6 +615,94 @@ fn a_force_at_contact_keeps_its_energy() {
     assert!((energy / (0.9 * 2.47e6) - 1.0).abs() < 1e-3, "{energy}");
 }
 
+/// A recorded curve that begins with a force, as of crushed honeycomb, keeps it: in files that can begin so as it is, in others
+/// with its energy.
+#[test]
+fn a_recorded_force_at_contact_is_exported() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let points = [(0.0, 1000.0), (400.0, 1000.0), (401.0, 1200.0), (600.0, 1200.0)];
+    let rows: Vec<String> = points.iter().map(|(d, f)| format!("{d},{f}\n")).collect();
+    fs::write(here.join("honey.csv"), format!("d_mm,F_kN\n{}", rows.concat())).unwrap();
+    let of = "--speed 6.531m/s --kind wall --mass 30t --unloading 80MN/m";
+    crumple_ok(here, &format!("db add honey.h5 honey.csv --group g {of}"));
+    let work_j = 0.4 * 1e6 + 0.001 * 1.1e6 + 0.199 * 1.2e6;
+    let begins = |text: &str| {
+        let mut rows = text.lines().skip_while(|line| !line.starts_with("d_")).skip(1);
+        rows.next().unwrap().split_once(',').unwrap().1.parse::<f64>().unwrap()
+    };
+    for (k, input) in ["honey.csv", "honey.h5"].into_iter().enumerate() {
+        let asked: Vec<&str> = if k == 0 { of.split(' ').collect() } else { Vec::new() };
+        for output in ["a.csv", "a.json", "a.k", "a.rad", "a.txt", "a.mo", "a.mat"] {
+            let more: &[&str] = match output {
+                "a.json" => &[],
+                "a.rad" => &["--units", "SI", "--tail", "none"],
+                _ => &["--tail", "none"],
+            };
+            export(here, input, output, &[&asked[..], more].concat());
+            let (read, _) = read(&here.join(output), &ReadOptions::default()).unwrap();
+            let read = crumple::curve::Envelope::new(read.deflection_m, read.force_n).unwrap();
+            let off = read.work() / work_j - 1.0;
+            assert!(off.abs() < 1e-3, "{input} as {output}: {off}");
+        }
+        assert_eq!(begins(&fs::read_to_string(here.join("a.csv")).unwrap()), 1e6);
+    }
+    // Crumple's own run of the export is that of the curve.
+    let run = |file: &str| {
+        let text = format!(
+            "[run]\nduration = \"200ms\"\noutput_interval = \"0.75ms\"\n[curves]\nn = {{ file = \"{file}\", unloading = \"80MN/m\", force = \"body\" }}\n[[train]]\nname = \"A\"\nspeed = \"6m/s\"\nvehicles = [ {{ name = \"A1\", mass = \"30t\" }} ]\n[wall]\n[contact]\ncurve = \"n\"\n"
+        );
+        fs::write(here.join("s.toml"), text).unwrap();
+        let run: Value =
+            serde_json::from_str(&crumple_ok(here, "simulate s.toml --json -q")).unwrap();
+        run["summary"]["interfaces"][0]["max_deflection_m"].as_f64().unwrap()
+    };
+    let (own, exported) = (run("honey.csv"), run("a.csv"));
+    assert!((exported / own - 1.0).abs() < 1e-3, "{exported} m for {own} m");
+}
+
+/// An export says which mass and which parameters it is for.
+#[test]
+fn exports_state_their_conditions() {
+    let folder = demo_folder();
+    let here = folder.path();
+    for output in ["t.csv", "c.csv"] {
+        let to = if output == "t.csv" { "table" } else { "csv" };
+        let asked = ["--mass", "48t", "--speed", "50km/h", "--to", to];
+        export(here, "lead.model", output, &asked);
+        let text = fs::read_to_string(here.join(output)).unwrap();
+        says(&text, "\n# mass_kg: 48000\n");
+        assert_eq!(text.matches("mass_kg").count(), 1, "{output}");
+    }
+    let text = fs::read_to_string(here.join("fe/lead-car-wall/study.toml")).unwrap();
+    let mut runs = 0;
+    let text: Vec<String> = text
+        .lines()
+        .map(|line| {
+            let of_run = line.starts_with("path ");
+            runs += usize::from(of_run);
+            let obstacle = ["post", "wall"][runs % 2];
+            let given =
+                format!("\nparameters = {{ angle_deg = {runs}, obstacle = \"{obstacle}\" }}");
+            format!("{line}{}\n", if of_run { &given } else { "" })
+        })
+        .collect();
+    fs::write(here.join("fe/lead-car-wall/angles.toml"), text.concat()).unwrap();
+    crumple_ok(here, "build fe/lead-car-wall/angles.toml -o angles.h5 -q");
+    crumple_ok(here, "train angles.h5 --group lead-car-wall --model forest -o angles.model -q");
+    let given = ["--parameter", "angle_deg=2.5", "--parameter", "obstacle=post"];
+    for to in ["table", "csv"] {
+        export(
+            here,
+            "angles.model",
+            "o.csv",
+            &[&["--speed", "30km/h", "--to", to], &given[..]].concat(),
+        );
+        let text = fs::read_to_string(here.join("o.csv")).unwrap();
+        says(&text, "\n# parameters: angle_deg = 2.5, obstacle = post\n");
+    }
+}
+
 /// A table of force over deflection comes out of a database as it went in, also as the force that moves a body: its
 /// motion was made of it.
 #[test]

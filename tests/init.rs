@@ -904,6 +904,60 @@ fn inches_are_taken_where_the_folder_says_so() {
     let found = study(here, "unnamed.toml");
     assert_eq!(found["study"]["units"].as_str(), Some("mm-t-s"));
     assert_eq!(warned(here, "init unnamed --units in-slinch-s -o given.toml"), "");
+
+    // The steel of the deck settles them, also above a comment that was copied from elsewhere.
+    let steel =
+        "*MAT_PIECEWISE_LINEAR_PLASTICITY_TITLE\nsteel\n         17.324e-04    3.0e+07       0.3\n";
+    let deck = here.join("unnamed/a/car.k");
+    let metal = "density 0.0007324 and Young's modulus 30000000.0 of the deck car.k, line 4, are those of a metal in in-slinch-s";
+    fs::write(&deck, format!("*KEYWORD\n{steel}*END\n")).unwrap();
+    assert_eq!(warned(here, "init unnamed -o steel.toml"), "");
+    let text = fs::read_to_string(here.join("steel.toml")).unwrap();
+    says(&text.replace("\n#   ", " "), &format!("# computed: {metal}\nunits = \"in-slinch-s\""));
+    crumple_ok(here, "build steel.toml -o steel.h5 -q");
+    let none: String = text
+        .lines()
+        .filter(|line| !line.starts_with("units ="))
+        .map(|l| format!("{l}\n"))
+        .collect();
+    fs::write(here.join("none.toml"), none).unwrap();
+    crumple_ok(here, "build none.toml -o none.h5 -q");
+    let said = crumple_ok(here, "db show none.h5");
+    says(&said, &format!("units: {metal}, which is taken"));
+    let without_speed: Vec<&str> = text.lines().filter(|l| !l.starts_with("speed =")).collect();
+    let as_mm = without_speed.join("\n").replace("mass = \"1.2", "mass = \"6.7");
+    let as_mm = as_mm.replace("\"in-slinch-s\"", "\"mm-t-s\"");
+    fs::write(here.join("mm.toml"), as_mm).unwrap();
+    says(
+        &warned(here, "build mm.toml -o mm.h5"),
+        &format!("units: the manifest states mm-t-s, but {metal}"),
+    );
+    let said = warned(here, "init unnamed --units mm-t-s -o given-mm.toml");
+    says(&said, &format!("units: mm-t-s as given, but {metal}"));
+    fs::write(&deck, format!("*KEYWORD\n{steel}$ units: mm t s\n*END\n")).unwrap();
+    let said = warned(here, "init unnamed -o stated.toml");
+    says(
+        &said,
+        &format!(
+            "units: the deck car.k, line 5: \"mm t s\" states mm-t-s, but {metal}, which is taken"
+        ),
+    );
+    let found = study(here, "stated.toml");
+    assert_eq!(found["study"]["units"].as_str(), Some("in-slinch-s"));
+
+    // OpenRadioss' starter deck states those of the run.
+    fs::remove_file(&deck).unwrap();
+    let starter = here.join("unnamed/a/car_0000.rad");
+    let begin = "#RADIOSS STARTER\n/BEGIN\ncar\n 2022 0\n kg mm ms\n t mm s\n/TITLE\na car\n/END\n";
+    fs::write(&starter, begin).unwrap();
+    assert_eq!(warned(here, "init unnamed -o starter.toml"), "");
+    let text = fs::read_to_string(here.join("starter.toml")).unwrap();
+    says(&text, "# read: the deck car_0000.rad, line 6: \"t mm s\"; and ");
+    let shown = crumple_ok(here, "inspect unnamed/a/car_0000.rad");
+    says(
+        &shown,
+        "format      starter\n  solver      OpenRadioss\n  title       a car\n  units       t mm s\n",
+    );
 }
 
 #[test]

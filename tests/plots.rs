@@ -275,6 +275,17 @@ fn sweeps_are_drawn_from_csv_and_hdf5() {
         assert!(forces.len() > samples / 2, "{} different forces", forces.len());
         assert_eq!(a.contains("median") && a.contains("5 to 95 % of the runs"), has_range);
     }
+    // A choice of curves varies as well: rows of different curves have no common line, and the plan's names are known.
+    let plan = "[sweep]\nvary = [ { what = \"curve\", curve = \"nose\", values = [\"nose\", \"soft\"] }, { what = \"speed\", train = \"A\", values = [\"30km/h\", \"40km/h\"] } ]\nresults = [\"max_deflection\", \"final_speed\"]\n";
+    fs::write(folder.join("plan.toml"), plan).unwrap();
+    let own = fs::read_to_string(folder.join("own.toml")).unwrap();
+    let soft = "[curves]\nsoft = { stages = [ { stroke = \"1m\", from = \"1MN\" } ], unloading = \"80MN/m\" }";
+    fs::write(folder.join("own.toml"), own.replacen("[curves]", soft, 1)).unwrap();
+    crumple_ok(folder, "sweep own.toml --plan plan.toml -o curves.csv --restart -q");
+    crumple_ok(folder, "plot curves.csv --result final_speed -o c.svg");
+    crumple_ok(folder, "plot curves.csv -o c.svg");
+    let picture = fs::read_to_string(folder.join("c.svg")).unwrap();
+    says(&picture, "aria-label=\"Also varied: curve[nose].\"");
     // By its content, whatever its name; an item or a status that is none is found, and so are values without bytes.
     fs::copy(folder.join("same.h5"), folder.join("same.data")).unwrap();
     crumple_ok(folder, "plot same.data --result peak_force -o c.svg");

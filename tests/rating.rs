@@ -204,7 +204,12 @@ fn parts_and_units_are_said() {
     // A longer prediction covers its reference.
     let of = rate(here, &["short.csv:a_m_per_s2[A1]", "a.csv:a_m_per_s2[A1]"]);
     assert!(!of["warnings"].to_string().contains("is not rated"), "{of}");
-    for (header, unit) in [("time_s,acc_g", "g"), ("time_s,acc [mm/s^2]", "mm/s²")] {
+    let columns = [
+        ("time_s,acc_g", "g", "write the factor after the file's name: c.csv,scale=9.80665"),
+        ("time_s,acc [mm/s^2]", "mm/s²", "c.csv,scale=0.001"),
+        ("time_s,force_kN", "kN", "which are different quantities"),
+    ];
+    for (header, unit, remedy) in columns {
         write(here, "c.csv", header, 200, |t| format!("{t:?},{:?}", pulse(t)));
         let column = header.split_once(',').unwrap().1;
         let other = format!("c.csv:{column}");
@@ -213,6 +218,7 @@ fn parts_and_units_are_said() {
             "according to their names, the reference is in m/s² and the prediction in {unit}"
         );
         says(&of["warnings"].to_string(), &expected);
+        says(&of["warnings"].to_string(), remedy);
         let of = rate(here, &["a.csv:a_m_per_s2[A1]", &format!("{other},scale=0.5")]);
         assert!(!of["warnings"].to_string().contains("according to their names"), "{of}");
     }

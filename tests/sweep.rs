@@ -1167,6 +1167,8 @@ fn wrong_plans_are_named_by_file_and_key() {
         ("samples = 0\nvary = [ { what = \"force\", curve = \"nose\", distribution = \"uniform\", from = 1, to = 2 } ]", "sweep.samples is 0"),
         ("sampling = \"latin_hypercube\"\nvary = [ { what = \"force\", curve = \"nose\", values = [1] } ]", "sweep.sampling = \"latin_hypercube\" is given, but no variable has a distribution"),
         ("vary = [ { what = \"force\", curve = \"nose\", values = [1] }, { what = \"force\", curve = \"nose\", values = [2] } ]", "sweep.vary 2 (force): force_factor[nose] is varied twice"),
+        ("vary = [ { what = \"mass\", vehicle = \"A2\", values = [\"10t\", \"60t\"] }, { what = \"mass\", vehicles = \"all\", values = [\"20t\"] } ]", "sweep.vary 2 (mass): mass_kg[all] would replace what mass_kg[A2] has set"),
+        ("vary = [ { what = \"mass\", vehicles = \"all\", factor = true, values = [1.1] }, { what = \"mass\", vehicle = \"A2\", values = [\"10t\"] } ]", "sweep.vary 2 (mass): mass_kg[A2] would replace what mass_factor[all] has set"),
     ];
     cases.into_iter().for_each(|(plan, expected)| t(plan, expected));
     // Without a plan, with one elsewhere, with arguments that make no sense.

@@ -1045,3 +1045,61 @@ fn a_contact_has_its_own_time() {
         assert!((time_s - expected_s).abs() < 2e-6, "{output}: {time_s} for {expected_s}");
     }
 }
+
+/// A curve that bottoms does so from 1.5 times its end with the unloading stiffness that the scenario gives: by hand from
+/// the energies of its straight lines. Stages without a slope do, too.
+#[test]
+fn the_unloading_stiffness_bottoms() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let rows = "# force_kind: body\nd_mm,F_kN\n0,0\n50,500\n200,1000\n300,1200\n";
+    std::fs::write(here.join("lin.csv"), rows).unwrap();
+    let crush_m = |curve: &str, v: f64| {
+        let text = format!(
+            "[run]\nduration = \"200ms\"\noutput_interval = \"0.75ms\"\n[curves]\nn = {{ {curve}, end = \"bottom\" }}\n[[train]]\nname = \"A\"\nspeed = \"{v}m/s\"\nvehicles = [ {{ name = \"A1\", mass = \"30t\" }} ]\n[wall]\n[contact]\ncurve = \"n\"\n"
+        );
+        std::fs::write(here.join("s.toml"), text).unwrap();
+        let run = json(&crumple_ok(here, "simulate s.toml --json -q"));
+        run["summary"]["interfaces"][0]["max_deflection_m"].as_f64().unwrap()
+    };
+    // Beyond a level `f` held to `d`, the rest of the energy goes into f x + k x²/2.
+    let by_hand = |work_j: f64, f: f64, d: f64, v: f64| {
+        let (k, left_j) = (80e6, 0.5 * 30e3 * v * v - work_j);
+        d + (-f + (f * f + 2.0 * k * left_j).sqrt()) / k
+    };
+    let file = crush_m("file = \"lin.csv\", unloading = \"80MN/m\"", 8.0);
+    let to_300_mm = 0.05 * 0.25e6 + 0.15 * 0.75e6 + 0.1 * 1.1e6;
+    let expected = by_hand(to_300_mm + 0.15 * 1.2e6, 1.2e6, 0.45, 8.0);
+    assert!((file - expected).abs() < 1e-3, "{file} m for {expected} m");
+    let stages = "stages = [ { stroke = \"0.3m\", from = \"1.2MN\" } ]";
+    let found = crush_m(&format!("{stages}, unloading = \"80MN/m\""), 8.0);
+    let expected = by_hand(0.45 * 1.2e6, 1.2e6, 0.45, 8.0);
+    assert!((found - expected).abs() < 1e-3, "{found} m for {expected} m");
+    let text = std::fs::read_to_string(here.join("s.toml")).unwrap();
+    let without = text.replace("unloading = \"80MN/m\"", "law = \"elastic\"");
+    std::fs::write(here.join("s.toml"), without).unwrap();
+    says(
+        &crumple_fails(here, 1, "simulate s.toml"),
+        "it never rises and has no unloading stiffness, so it cannot bottom",
+    );
+}
+
+/// A body between a constant force and a lighter one chatters: its contact opens and closes all the time, and is one.
+#[test]
+fn a_contact_that_chatters_has_a_mean_deceleration() {
+    let text = "[run]\nduration = \"400ms\"\noutput_interval = \"0.75ms\"\n[curves]\n\
+        n = { stages = [ { stroke = \"0.5m\", from = \"1MN\" } ], unloading = \"80MN/m\" }\n\
+        [[train]]\nname = \"A\"\nspeed = \"36km/h\"\ninner = \"n\"\ngap = \"10mm\"\n\
+        vehicles = [ { name = \"A1\", mass = \"30t\" }, { name = \"A2\", mass = \"30t\" } ]\n\
+        [[train]]\nname = \"B\"\nspeed = \"5m/s\"\ninner = \"n\"\ngap = \"0mm\"\n\
+        vehicles = [ { name = \"B1\", mass = \"60t\" }, { name = \"B2\", mass = \"10t\" } ]\n\
+        [contact]\ncurve = \"n\"\n[limits]\nstandard = \"EN 15227\"\nedition = \"2020\"\nmean_deceleration_g = 1.2\n";
+    let run = run(text);
+    let bodies = run["summary"]["bodies"].as_array().unwrap();
+    let mean = |k: usize| bodies[k]["mean_deceleration_m_per_s2"].as_f64().unwrap();
+    let end = |name: &str| *column(&run, &format!("v_m_per_s[{name}]")).last().unwrap();
+    assert!((end("B1") - end("B2")).abs() < 0.01);
+    assert!((mean(3) / mean(2) - 1.0).abs() < 0.02, "{} and {}", mean(3), mean(2));
+    let over = run["summary"]["limits"].to_string();
+    assert!(over.contains("B2"), "{over}");
+}

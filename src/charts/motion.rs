@@ -398,14 +398,15 @@ fn axes(quantity: Quantity, lines: &[Line<'_>]) -> (Axis, Axis) {
     };
     let room = 0.04 * (high - low);
     let y = y.over((low - room).min(0.0), (high + room).max(0.0));
-    let (_, end) = largest(|line| &line.x);
-    let x = if quantity == Quantity::Crush { x.over(0.0, 1.02 * end) } else { x };
+    // Interfaces that pull do so at negative deflections.
+    let (start, end) = largest(|line| &line.x);
+    let x = if quantity == Quantity::Crush { x.over(1.02 * start.min(0.0), 1.02 * end) } else { x };
     (x, y)
 }
 
 /// A body's acceleration, filtered; as it is, and why, where the filter does not take it.
 fn filtered(run: &Motion, body: &BodyMotion, class: u32, notes: &mut Vec<String>) -> Vec<f64> {
-    match cfc::filter(class, &run.time_s, &body.a_m_per_s2) {
+    match cfc::filter_from_rest(class, &run.time_s, &body.a_m_per_s2) {
         Ok(filtered) => filtered.values,
         Err(error) => {
             let note = format!("Not filtered: {error}.");

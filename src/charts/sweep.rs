@@ -4,6 +4,7 @@ use super::motion::SMALL;
 use crate::error::{Error, error};
 use crate::guess::hint;
 use crate::multibody::STANDARD_GRAVITY_M_PER_S2;
+use crate::plan::ResultName;
 use crate::plot::{Axis, Band, Cell, Chart, Panel, Series, Shown};
 use crate::sweep::{ResultColumn, SweepColumns};
 
@@ -61,12 +62,16 @@ pub(crate) fn sweep(
         return Err(no_result(result));
     }
     let mut chart = match chosen[..] {
-        [x] => over_one(title, x, &results, is_grid(x), varied.len() > 1),
+        [x] => {
+            let others_vary = varied.len() > 1 || !columns.curves.is_empty();
+            over_one(title, x, &results, is_grid(x), others_vary)
+        }
         [x, y] => over_two(title, [x, y], &results, [is_grid(x), is_grid(y)])?,
         _ => return Err(error!(Plot, "results are drawn over one or two varied quantities")),
     };
     let others = varied.iter().filter(|column| !chosen.iter().any(|c| c.name == column.name));
-    let others: Vec<&str> = others.map(|column| &*column.name).collect();
+    let others = others.map(|column| &column.name).chain(&columns.curves);
+    let others: Vec<&str> = others.map(|name| &**name).collect();
     if !others.is_empty() {
         chart.notes.push(format!("Also varied: {}.", others.join(", ")));
     }
@@ -94,7 +99,14 @@ fn results<'a>(
     wanted: &[String],
 ) -> Result<Vec<&'a ResultColumn>, Error> {
     let named = |name: &str| {
-        let is = |column: &&ResultColumn| column.name == name || kind(&column.name) == name;
+        // As a plan names it.
+        let planned: Option<ResultName> = serde_json::from_value(name.into()).ok();
+        let planned = planned.map(ResultName::quantity);
+        let is = |column: &&ResultColumn| {
+            column.name == name
+                || kind(&column.name) == name
+                || planned.is_some_and(|quantity| quantity == bare(&column.name))
+        };
         columns.results.iter().filter(is).collect::<Vec<_>>()
     };
     if wanted.is_empty() {
@@ -207,9 +219,10 @@ fn over_one(
     others_vary: bool,
 ) -> Chart {
     let groups = groups(x, is_grid, FEW_ROWS);
+    let most = groups.iter().map(|(_, rows)| rows.len()).max().unwrap_or_default();
+    let has_range = (is_grid || others_vary && groups.len() > 2) && most >= LEAST_ROWS;
     // So few rows do not show what the other quantities do: each is drawn as a point.
-    let is_grouped = is_grid || others_vary && groups.len() > 2;
-    let has_range = is_grouped && groups.iter().any(|(_, rows)| rows.len() >= LEAST_ROWS);
+    let is_grouped = has_range || is_grid && (most == 1 || !others_vary);
     let mut panels: Vec<Panel> = Vec::new();
     let mut kinds: Vec<&str> = Vec::new();
     for result in results {

@@ -111,10 +111,12 @@ fn read(path: &Path, format: Option<&str>, selection: &Selection) -> Result<Vec<
         Ok(sections) => sections,
         Err(error) if error.is_about("deck") => {
             let deck = decks::read_deck(path)?;
+            let (format, solver) =
+                if deck.is_starter { ("starter", "OpenRadioss") } else { ("keyword", "LS-DYNA") };
             let file = SolverFile {
-                format: KEYWORD,
-                section: KEYWORD.into(),
-                solver: Some("LS-DYNA".into()),
+                format,
+                section: format.into(),
+                solver: Some(solver.into()),
                 title: deck.title.clone(),
                 problems: deck.problems.clone(),
                 ..SolverFile::default()
@@ -175,9 +177,6 @@ fn document(section: &Section) -> impl Serialize {
         deck if_any: deck_document(section.titles_from.as_ref(), section.deck.as_ref()),
     }
 }
-
-/// What a deck is called as a format.
-const KEYWORD: &str = "keyword";
 
 /// A run's files, a line for each section.
 fn table(sections: &[Section]) -> impl Into<Table> {

@@ -10,13 +10,14 @@ use super::{
 };
 use crate::charts::Motion;
 use crate::error::Error;
+use crate::multibody::STANDARD_GRAVITY_M_PER_S2;
 use crate::rating::acceptance::{ACCEPTANCE, RunAcceptance, STANDARD, StageAcceptance, accept};
 use crate::rating::differences::{Deceleration, MagnitudePhase};
 use crate::rating::iso18571::Iso18571;
 use crate::rating::{self, Quantity, Rating, RatingSettings, Signal};
 use crate::solver::{self, Selection, WantedId};
 use crate::table::Table;
-use crate::unit::{Shown, TIME};
+use crate::unit::{M_PER_S_PER_KM_PER_H, Shown, TIME};
 use crate::{file, formats};
 
 /// Maximum number of bytes of a table that is rated: some million rows.
@@ -201,27 +202,30 @@ struct LoadedSignal {
     column: String,
     is_table: bool,
     /// Of its values, where its name says it and they are not scaled.
-    unit: Option<&'static str>,
+    unit: Option<ValueUnit>,
     problems: usize,
 }
 
+/// A unit of values, its SI unit and its size in it.
+type ValueUnit = (&'static str, &'static str, f64);
+
 /// Units of values, and how the names of columns write them.
-const VALUE_UNITS: [(&str, &str); 11] = [
-    ("m/s²", "m_per_s2 m/s2 m/s^2 m/s**2 m/s²"),
-    ("mm/s²", "mm_per_s2 mm/s2 mm/s^2 mm/s**2 mm/s²"),
-    ("g", "g"),
-    ("m/s", "m_per_s m/s"),
-    ("mm/s", "mm_per_s mm/s"),
-    ("km/h", "km_per_h km/h"),
-    ("m", "m"),
-    ("mm", "mm"),
-    ("N", "n"),
-    ("kN", "kn"),
-    ("MN", "mn"),
+const VALUE_UNITS: [(ValueUnit, &str); 11] = [
+    (("m/s²", "m/s²", 1.0), "m_per_s2 m/s2 m/s^2 m/s**2 m/s²"),
+    (("mm/s²", "m/s²", 1e-3), "mm_per_s2 mm/s2 mm/s^2 mm/s**2 mm/s²"),
+    (("g", "m/s²", STANDARD_GRAVITY_M_PER_S2), "g"),
+    (("m/s", "m/s", 1.0), "m_per_s m/s"),
+    (("mm/s", "m/s", 1e-3), "mm_per_s mm/s"),
+    (("km/h", "m/s", M_PER_S_PER_KM_PER_H), "km_per_h km/h"),
+    (("m", "m", 1.0), "m"),
+    (("mm", "m", 1e-3), "mm"),
+    (("N", "N", 1.0), "n"),
+    (("kN", "N", 1e3), "kn"),
+    (("MN", "N", 1e6), "mn"),
 ];
 
 /// The unit at the end of a column's name: `acc_g`, `v_m_per_s[A1]`, `force [kN]`.
-fn value_unit(column: &str) -> Option<&'static str> {
+fn value_unit(column: &str) -> Option<ValueUnit> {
     let name = column.to_lowercase();
     let (head, inside) = name
         .strip_suffix([']', ')'])
@@ -252,12 +256,20 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     };
     let settings = RatingSettings { quantity, cfc: args.cfc, from_s: args.from, to_s: args.to };
     let mut rating = rating::rate(&reference.signal, &prediction.signal, &settings)?;
-    if let (Some(of_a), Some(of_b)) = (reference.unit, prediction.unit)
+    if let (Some((of_a, quantity_a, size_a)), Some((of_b, quantity_b, size_b))) =
+        (reference.unit, prediction.unit)
         && of_a != of_b
     {
+        let remedy = match quantity_a == quantity_b {
+            true => format!(
+                "write the factor after the file's name: {},scale={}",
+                b.path().display(),
+                size_b / size_a
+            ),
+            false => "which are different quantities".into(),
+        };
         rating.warnings.push(format!(
-            "according to their names, the reference is in {of_a} and the prediction in {of_b}, and they are compared as they stand: write the factor after a file's name, such as {},scale=0.001",
-            b.path().display()
+            "according to their names, the reference is in {of_a} and the prediction in {of_b}, and they are compared as they stand: {remedy}"
         ));
     }
     let outcome = options.warn_all(&rating.warnings);

@@ -154,8 +154,7 @@ impl ForceCurve {
         let (loading, beyond) = (&self.loading, self.beyond.take());
         let is_followed = beyond.is_none() && data_end_m < loading.end_m();
         self.loading = if is_followed && tail == Tail::Bottom {
-            let d = loading.deflection_m();
-            let interval_m = loading.end_m() - d[d.len() - 2];
+            let interval_m = grid_m(loading, data_end_m);
             bottomed(loading, loading.peak_force_n(), interval_m, stiffness_n_per_m)?
         } else if is_followed {
             return Ok(self);
@@ -219,13 +218,15 @@ const FULLY_CRUSHED: f64 = 1.5;
 const JOIN: f64 = 0.05;
 /// The bottoming ends at so many times the largest force.
 const HIGHEST: f64 = 3.0;
+/// Largest interval between points at which a tail may begin and end, as a share of the maximum crush.
+const COARSEST: f64 = 0.01;
 /// Share of the crush over which the level at the end is a mean.
 const LAST: f64 = 0.1;
 
 /// The curve with its tail. `beyond` is the same force along deflections of which some lie
 /// beyond the curve's end, where that is known.
 ///
-/// Points stand at multiples of the curve's last interval, so that a table of even deflections
+/// Points stand at multiples of the curve's last interval, so that a fine table of even deflections
 /// stays one.
 pub(crate) fn with_tail(
     curve: &Envelope,
@@ -238,7 +239,7 @@ pub(crate) fn with_tail(
     }
     let (mut d, mut f) = (curve.deflection_m().to_vec(), curve.force_n().to_vec());
     let (end_m, end_n) = (curve.end_m(), f[f.len() - 1]);
-    let interval_m = end_m - d[d.len() - 2];
+    let interval_m = grid_m(curve, end_m);
     // The first point of the grid at or beyond a deflection.
     let on_grid = |deflection_m: f64| {
         end_m + ((deflection_m - end_m) / interval_m - 1e-9).ceil().max(1.0) * interval_m
@@ -273,6 +274,12 @@ pub(crate) fn with_tail(
         Tail::Bottom => bottomed(&held, curve.peak_force_n(), interval_m, stiffness_n_per_m),
         Tail::None | Tail::Hold => Ok(held),
     }
+}
+
+/// Interval of the points of a tail: the curve's last, if it is as fine as a rule in per cent of the maximum crush needs.
+fn grid_m(curve: &Envelope, max_crush_m: f64) -> f64 {
+    let d = curve.deflection_m();
+    (d[d.len() - 1] - d[d.len() - 2]).min(COARSEST * max_crush_m)
 }
 
 /// Step 3: the rise from the end of a curve, over a whole number of intervals.
@@ -343,8 +350,8 @@ mod tests {
         assert_eq!(held.loading.force_n(), [0.0, 1e6, 2e6, 2e6, 6e6]);
         assert_eq!(held.data_end_m, Some(1.0));
         // 6 MN are three times the peak already: one interval more, at the steepest rise.
-        assert_eq!(bottoms.loading.deflection_m(), [0.0, 0.5, 1.0, 1.5, 2.0, 2.5]);
-        assert_eq!(bottoms.loading.force_at(2.5), 7e6);
+        assert_eq!(bottoms.loading.deflection_m(), [0.0, 0.5, 1.0, 1.5, 2.0, 2.01]);
+        assert_eq!(bottoms.loading.force_at(2.01), 6.02e6);
         // What has been continued before can only bottom.
         assert_eq!(held.clone().continued(Tail::Hold).unwrap(), held);
         let again = held.continued(Tail::Bottom).unwrap();
@@ -379,6 +386,17 @@ mod tests {
             let steps = d / 0.01;
             assert!((steps - steps.round()).abs() < 1e-6, "{d}");
         }
+    }
+
+    /// Where the points are far apart, the rule still counts from the maximum crush, not in their intervals.
+    #[test]
+    fn a_coarse_table_bottoms_where_a_fine_one_does() {
+        let d = vec![0.0, 0.02, 0.04, 0.06, 0.4];
+        let coarse = Envelope::new(d, vec![0.0, 0.9e6, 1e6, 1.2e6, 1.2e6]).unwrap();
+        let with = with_tail(&coarse, None, 80e6, Tail::Bottom).unwrap();
+        assert!((with.force_at(0.6) - 1.2e6).abs() < 1e-3);
+        assert!((with.force_at(0.61) - 2e6).abs() < 1.0);
+        assert!((3.6e6..3.6e6 + 80e6 * 0.004).contains(&with.peak_force_n()));
     }
 
     #[test]

@@ -17,6 +17,7 @@ pub(crate) mod retrace;
 pub(crate) mod stopped_mass;
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -195,6 +196,15 @@ pub enum Parameter {
     Number(f64),
     /// One of some names.
     Category(String),
+}
+
+impl fmt::Display for Parameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(number) => write!(f, "{number}"),
+            Self::Category(name) => f.write_str(name),
+        }
+    }
 }
 
 /// Energy of the loading branch against the kinetic energy it stopped.

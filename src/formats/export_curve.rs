@@ -5,6 +5,7 @@ use super::text::nine_digits;
 use super::thin::{Softened, from_origin, softened};
 use crate::curve::force_curve::with_tail;
 use crate::curve::{Envelope, ForceCurve, ForceKind, Tail};
+use crate::dataset::{MASS, OTHER_MASS};
 use crate::error::{Error, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw};
 use crate::surrogate::PredictedCurve;
@@ -198,7 +199,11 @@ impl ExportCurve {
     pub(crate) fn restitution(&self, unloading: TargetUnloading) -> f64 {
         let stored_j = match unloading {
             TargetUnloading::Line(stiffness) => 0.5 * self.end_n() * self.end_n() / stiffness,
-            TargetUnloading::Elastic => self.loading.work_to(self.max_crush_m()),
+            // A body stops where the curve has taken up its energy.
+            TargetUnloading::Elastic => {
+                let work_j = self.loading.work_to(self.max_crush_m());
+                work_j.min(self.predicted.provenance.kinetic_energy_j)
+            }
         };
         self.restitution_of(stored_j)
     }
@@ -215,9 +220,11 @@ impl ExportCurve {
 
     /// Separation speed over impact speed in crumple's own runs, whose curve is not softened.
     pub fn own_restitution(&self) -> f64 {
-        let end_n = self.predicted.force_n.last().copied().unwrap_or_default();
-        let stored_j = 0.5 * end_n * end_n / self.stiffness_n_per_m();
-        self.restitution_of(stored_j)
+        let own = self.predicted.envelope().map(ForceCurve::bare);
+        let own = own.map(|curve| curve.unloading_with(self.stiffness_n_per_m()));
+        let law = own.map(|curve| ForceLaw::of_curve(&curve, None, EnvelopeEnd::Hold));
+        let end_m = self.predicted.max_deflection_m;
+        self.restitution_of(law.unwrap_or_else(|_| self.law()).energies_j(end_m, end_m).0)
     }
 
     /// Separation speed over impact speed, from the energy in J that is returned.
@@ -287,6 +294,20 @@ impl ExportCurve {
         facts
     }
 
+    /// The masses of its impact, and the values of the model's or the run's further parameters.
+    pub(crate) fn conditions(&self) -> Vec<(&'static str, String)> {
+        let curve = &self.predicted;
+        let mut facts = vec![("mass_kg", curve.mass_kg.to_string())];
+        facts.extend(self.other_mass_kg().map(|other| ("other_mass_kg", other.to_string())));
+        let others = curve.provenance.parameters.iter();
+        let others = others.filter(|(name, _)| *name != MASS && *name != OTHER_MASS);
+        let others: Vec<String> = others.map(|(name, value)| format!("{name} = {value}")).collect();
+        if !others.is_empty() {
+            facts.push(("parameters", others.join(", ").replace(char::is_control, " ")));
+        }
+        facts
+    }
+
     /// Description of a curve and its use, as keys and values of a file's header; SI.
     pub fn facts(&self) -> Vec<(&'static str, String)> {
         let curve = &self.predicted;
@@ -299,7 +320,6 @@ impl ExportCurve {
             ("sign", "deflection and force positive in compression".into()),
             ("speed_m_per_s", curve.speed_m_per_s.to_string()),
             ("speed_kind", curve.speed_kind.name().into()),
-            ("mass_kg", curve.mass_kg.to_string()),
             ("impact", self.impact()),
             ("energy_J", nine_digits(curve.energy_j)),
             ("max_deflection_m", nine_digits(self.max_crush_m())),
@@ -311,9 +331,7 @@ impl ExportCurve {
             ("training_hash", curve.provenance.training_hash.clone()),
             ("written_by", curve.provenance.written_by.clone()),
         ];
-        if let Some(other) = self.other_mass_kg() {
-            facts.insert(7, ("other_mass_kg", other.to_string()));
-        }
+        facts.splice(6..6, self.conditions());
         if curve.data_end_m() != curve.max_deflection_m {
             facts.push(("data_end_m", nine_digits(curve.data_end_m())));
         }

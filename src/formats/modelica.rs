@@ -26,7 +26,7 @@ const PER_LINE: usize = 6;
 pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {
     let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
     if options.extension.as_deref() == Some("txt") {
-        return Ok(combi_table(curves, &stem));
+        return combi_table(curves, &stem);
     }
     let mut exported = Exported::default();
     for curve in curves {
@@ -56,11 +56,12 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
 }
 
 /// One table of loading and one of unloading per curve.
-fn combi_table(curves: &[ExportCurve], stem: &str) -> Exported {
+fn combi_table(curves: &[ExportCurve], stem: &str) -> Result<Exported, Error> {
     let mut lines = String::new();
     let mut notes = Vec::new();
     line!(lines, "#1");
     for (k, curve) in curves.iter().enumerate() {
+        let curve = &curve.begun_at_origin()?;
         let suffix = if k == 0 { String::new() } else { format!("_{}", k + 1) };
         for (key, value) in curve.facts() {
             line!(lines, "# {key}: {}", title(&value, COMMENT_WIDTH));
@@ -84,11 +85,11 @@ fn combi_table(curves: &[ExportCurve], stem: &str) -> Exported {
         }
         notes.push(curve.restitution_note("a table without memory", TargetUnloading::Elastic));
     }
-    Exported {
+    Ok(Exported {
         files: vec![(format!("{stem}.txt"), lines.into_bytes())],
         notes,
         ..Exported::default()
-    }
+    })
 }
 
 /// A constant array.

@@ -31,6 +31,8 @@ struct Table {
     /// Lower and upper edge of the band, likewise; NaN at a speed without one.
     band: Option<[Vec<f64>; 2]>,
     band_meaning: Option<String>,
+    /// What its curves have in common: mass, other mass, parameters.
+    of_curves: Vec<(&'static str, String)>,
     max_deflection_m: Vec<f64>,
     unloading_stiffness_n_per_m: Vec<f64>,
     warnings: Vec<String>,
@@ -104,6 +106,7 @@ impl Table {
                 .iter()
                 .map(ExportCurve::stiffness_n_per_m)
                 .collect(),
+            of_curves: curves.first().map_or_else(Vec::new, |curve| curve.conditions()),
             notes: no_band_note(&curves).into_iter().collect(),
             speed_m_per_s,
             deflection_m,
@@ -204,6 +207,7 @@ impl Table {
     /// Description of the table, as keys and values.
     fn facts(&self, model: &Model, force: ForceKind) -> Vec<(&'static str, String)> {
         let mut facts = facts(model, force);
+        facts.splice(4..4, self.of_curves.iter().cloned());
         facts.extend(self.band_meaning.clone().map(|meaning| ("band", meaning)));
         facts
     }
@@ -216,7 +220,6 @@ fn facts(model: &Model, force: ForceKind) -> Vec<(&'static str, String)> {
         ("force_kind", force.name().into()),
         ("drives", force.drives().into()),
         ("speed_kind", model.speed_kind.name().into()),
-        ("mass_kg", model.mass_kg.to_string()),
         ("fitted_between", format!("{low} and {high} m/s")),
         ("beyond", "each curve goes on beyond its maximum crush, along faster runs".into()),
         ("model", model.name().into()),

@@ -14,6 +14,7 @@ use super::write::Evidence::{Computed, Given, Guessed, Read};
 use super::write::{Proposal, Proposed, ProposedRun};
 use crate::curve::recipe::{DeflectionSource, Filter, ForceSource, RecordedMotion};
 use crate::signal::cfc;
+use crate::solver::lsdyna::deck::Deck;
 use crate::study::StudyKind;
 use crate::study::files::shown_name;
 use crate::unit::{SPEED, UnitSystem, km_per_h};
@@ -546,22 +547,29 @@ fn doubts_of_speed(record: &Record, impact: &Impact) -> Vec<String> {
     notes
 }
 
-/// The units that the runs' decks state, with the place; warns where they contradict each other.
-pub(super) fn stated_units(
+/// The units that the runs' decks state, and those in which their materials are metals, each with the place; warns where
+/// decks contradict each other.
+pub(super) fn units_of_decks(
     runs: &[Record],
     warnings: &mut Vec<String>,
-) -> Option<(UnitSystem, String)> {
-    let mut stated = runs.iter().filter_map(|Record { run, .. }| {
-        let (path, deck) = run.sources.deck.as_ref()?;
+) -> [Option<(UnitSystem, String)>; 2] {
+    let stated = |deck: &Deck, name: &str| {
         let units = deck.units.as_ref()?;
-        let above = if path.parent() == Some(&run.path) { "" } else { " above the runs" };
-        let place = format!("the deck {}{above}, line {}", shown_name(path), units.at.line);
+        let place = format!("the deck {name}, {}", deck.line(units.at));
         Some((units.system?, format!("{place}: \"{}\"", units.text.trim())))
-    });
-    let first = stated.next()?;
-    if let Some(other) = stated.find(|(system, _)| *system != first.0) {
-        warnings.push(format!("units: {} and {} differ", first.1, other.1));
-        return None;
-    }
-    Some(first)
+    };
+    let mut first = |of: fn(&Deck, &str) -> Option<(UnitSystem, String)>| {
+        let mut found = runs.iter().filter_map(|Record { run, .. }| {
+            let (path, deck) = run.sources.deck.as_ref()?;
+            let above = if path.parent() == Some(&run.path) { "" } else { " above the runs" };
+            of(deck, &(shown_name(path) + above))
+        });
+        let first = found.next()?;
+        if let Some(other) = found.find(|(system, _)| *system != first.0) {
+            warnings.push(format!("units differ: {}; {}", first.1, other.1));
+            return None;
+        }
+        Some(first)
+    };
+    [first(stated), first(Deck::units_of_metals)]
 }

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use rayon::iter::Either;
 use rayon::prelude::*;
 
-use super::describe::{Facts, stated_units};
+use super::describe::{Facts, units_of_decks};
 use super::folders::{Folders, LeftOut, Reason, names, no_usable_run, seen_from};
 use super::measure::{Impact, SAME_MASS, is_near};
 use super::recipe::{CommonRecipe, sum_of_forces};
@@ -246,11 +246,11 @@ fn agree_on_units(
     let (whole, ended): (Vec<Record>, Vec<Record>) =
         records.into_iter().partition(|record| record.loading_end().is_ok());
     let of: Vec<units::Magnitudes> = whole.iter().map(Record::magnitudes).collect();
-    let stated = stated_units(&whole, &mut warnings);
+    let [stated, metals] = units_of_decks(&whole, &mut warnings);
     let most = units::most_agree(&of);
     let agreeing: Vec<units::Magnitudes> =
         of.iter().zip(&most).filter(|(_, agrees)| **agrees).map(|(m, _)| *m).collect();
-    let units = units::choose(&agreeing, hints.units, stated, &mut warnings);
+    let units = units::choose(&agreeing, hints.units, stated, metals, &mut warnings);
     let mut kept = Vec::new();
     for ((record, magnitudes), agrees) in whole.into_iter().zip(of).zip(most) {
         let refused = units.value().and_then(|units| magnitudes.impossible(units));

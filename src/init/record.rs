@@ -301,7 +301,8 @@ impl Record {
 }
 
 /// Slope of the line of least squares through values over time, less what values that scatter about it so widely may show
-/// by chance.
+/// by chance: the standard deviation of the slope of n independent values is √12 s / (T √n), and independent ones cross
+/// their line n/2 times; of vibrations that cross it as often less is left.
 fn trend(time: &[f64], values: &[f64]) -> f64 {
     let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
     let (t0, v0) = (mean(time), mean(values));
@@ -310,13 +311,47 @@ fn trend(time: &[f64], values: &[f64]) -> f64 {
         .zip(values)
         .fold((0.0, 0.0), |(of, by), (t, v)| (of + (t - t0) * (v - v0), by + (t - t0).powi(2)));
     let slope = of / by;
-    let left = time.iter().zip(values).map(|(t, v)| (v - v0 - slope * (t - t0)).powi(2));
-    let scatter = (left.sum::<f64>() / time.len() as f64).sqrt();
-    (slope.abs() - CHANCE * scatter / (time[time.len() - 1] - time[0])).max(0.0)
+    let left = time.iter().zip(values).map(|(t, v)| v - v0 - slope * (t - t0));
+    let left: Vec<f64> = left.collect();
+    let scatter = (left.iter().map(|r| r * r).sum::<f64>() / time.len() as f64).sqrt();
+    let crossings = left.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
+    let by_chance = CHANCE * scatter * (6.0 / crossings as f64).sqrt().min(1.0);
+    (slope.abs() - by_chance / (time[time.len() - 1] - time[0])).max(0.0)
 }
 
 /// The first damage of a source, found when it was listed or when it was read.
 fn damage(source: &Source, read: Option<&impl ToString>) -> Vec<String> {
     let found = read.map(ToString::to_string).or_else(|| source.damage.clone());
     found.map(|problem| format!("{}: {problem}", source.shown())).into_iter().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Neither vibrations of any period and phase nor noise are a drift; a drift beneath them is found.
+    #[test]
+    fn a_drift_is_told_from_vibrations() {
+        let time: Vec<f64> = (0..120).map(|i| f64::from(i) * 0.75e-3).collect();
+        let of = |value: &dyn Fn(f64) -> f64| {
+            let values: Vec<f64> = time.iter().map(|&t| value(t)).collect();
+            trend(&time, &values)
+        };
+        let span = 119.0 * 0.75e-3;
+        for periods in [2.3, 5.0, 11.7, 30.0] {
+            for phase in [0.0, 0.8, 1.6, 2.4, 3.1] {
+                let wave = |t: f64| (std::f64::consts::TAU * periods * t / span + phase).sin();
+                assert_eq!(of(&wave), 0.0, "{periods} periods from {phase}");
+                if periods > 4.0 {
+                    let found = of(&|t| wave(t) - 30.0 * t) / 30.0;
+                    assert!(
+                        (0.2..1.0).contains(&found),
+                        "{found} of the drift: {periods}, {phase}"
+                    );
+                }
+            }
+        }
+        let noise = |t: f64| ((t * 1e5).sin() * 43758.5453).fract();
+        assert_eq!(of(&noise), 0.0);
+    }
 }

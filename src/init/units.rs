@@ -43,9 +43,7 @@ const DECELERATION_M_PER_S2: Range = Range { low: 0.2, high: 5e3, usual: 100.0, 
 /// From a test body to a train.
 const MASS_KG: Range = Range { low: 1.0, high: 5e6, usual: 15e3, spread: 8.0 };
 
-/// Systems of inches and feet: in them the numbers of a usual impact are those of a slow one in millimetres or metres.
-const CUSTOMARY: [&str; 2] = ["in-slinch-s", "ft-slug-s"];
-/// By so much more usual an impact has to be in each of these to put the metric system in doubt: a foot is not far from a metre.
+/// In [`UnitSystem::CUSTOMARY`] the numbers of a usual impact are those of a slow one in millimetres or metres. By so much more usual an impact has to be in each of these to put the metric system in doubt: a foot is not far from a metre.
 const DOUBT: [f64; 2] = [5.0, 2.0];
 /// A name may round a speed to this share of it.
 const NAMED: f64 = 0.1;
@@ -109,11 +107,13 @@ impl Magnitudes {
 
 /// The units of all runs, as far as they can be determined.
 ///
-/// `stated`: what a deck says, with its place.
+/// `stated`: what a deck says, with its place; `metals`: in which units its materials are metals, likewise. The solver
+/// computes with the materials, so they count more.
 pub(super) fn choose(
     runs: &[Magnitudes],
     given: Option<UnitSystem>,
     stated: Option<(UnitSystem, String)>,
+    metals: Option<(UnitSystem, String)>,
     warnings: &mut Vec<String>,
 ) -> Proposed<UnitSystem> {
     let refused = |units: &UnitSystem| runs.iter().find_map(|run| run.impossible(units));
@@ -126,8 +126,19 @@ pub(super) fn choose(
             warnings.push(format!(
                 "units: {units} as given would imply {why}, which is not a crash; {better}"
             ));
+        } else if let Some((_, said)) = metals.filter(|(metals, _)| *metals != units) {
+            warnings.push(format!("units: {units} as given, but {said}"));
         }
         return Proposed::found(units, Given, "by --units");
+    }
+    let metals = metals.filter(|(units, _)| refused(units).is_none());
+    if let Some((units, said)) = metals
+        && stated.as_ref().is_none_or(|(stated, _)| *stated != units)
+    {
+        if let Some((stated, by)) = stated {
+            warnings.push(format!("units: {by} states {stated}, but {said}, which is taken"));
+        }
+        return Proposed::found(units, Computed, said);
     }
     if let Some((units, place)) = stated {
         let Some(why) = refused(&units) else {
@@ -172,7 +183,7 @@ pub(super) fn most_agree(runs: &[Magnitudes]) -> Vec<bool> {
             .reduce(|a, b| if b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).is_gt() { b } else { a });
         most.filter(|(count, ..)| *count > 0).map(|(.., agree)| agree)
     };
-    let best = best(&UnitSystem::USUAL).or_else(|| best(&CUSTOMARY));
+    let best = best(&UnitSystem::USUAL).or_else(|| best(&UnitSystem::CUSTOMARY));
     best.unwrap_or_else(|| vec![true; runs.len()])
 }
 
@@ -194,7 +205,7 @@ fn guessed(
             None => possible.push(units),
         }
     }
-    let mut customary = systems(&CUSTOMARY);
+    let mut customary = systems(&UnitSystem::CUSTOMARY);
     customary.retain(|units| runs.iter().all(|run| run.impossible(units).is_none()));
     let misnamed = |units: &UnitSystem| refused(units, &|run| run.is_not_as_named(units));
     let is_named = runs.iter().any(|run| run.named_m_per_s.is_some());
@@ -209,7 +220,7 @@ fn guessed(
     possible.sort_by(|a, b| unusual(a).total_cmp(&unusual(b)));
     let (units, less) = possible.split_first()?;
     let doubt = |other: &UnitSystem| {
-        let feet = usize::from(CUSTOMARY[0] != other.to_string());
+        let feet = usize::from(UnitSystem::CUSTOMARY[0] != other.to_string());
         DOUBT[feet] * runs.len() as f64
     };
     customary.retain(|other| unusual(other) + doubt(other) < unusual(units));
@@ -296,7 +307,7 @@ mod tests {
     fn units_are_told_by_what_is_possible() {
         for name in UnitSystem::USUAL {
             let units = UnitSystem::parse(name).unwrap();
-            let found = choose(&[car(&units)], None, None, &mut Vec::new());
+            let found = choose(&[car(&units)], None, None, None, &mut Vec::new());
             assert_eq!(found.value(), Some(&units), "{found}");
         }
     }
@@ -322,14 +333,14 @@ mod tests {
                 [(shunting(km_per_h), "guessed: ", 1), (named, "computed: ", 0)]
             {
                 let mut warnings = Vec::new();
-                let found = choose(&[run], None, None, &mut warnings);
+                let found = choose(&[run], None, None, None, &mut warnings);
                 let units = found.value().map(ToString::to_string);
                 assert_eq!(units.as_deref(), Some("mm-t-s"), "{km_per_h} km/h: {found}");
                 assert!(found.to_string().starts_with(evidence), "{found}");
                 assert_eq!(warnings.len(), warned, "{warnings:?}");
             }
         }
-        let found = choose(&[shunting(0.5)], None, None, &mut Vec::new()).to_string();
+        let found = choose(&[shunting(0.5)], None, None, None, &mut Vec::new()).to_string();
         assert!(found.contains("SI would give a mean deceleration of 6944 m/s²"), "{found}");
     }
 
@@ -339,7 +350,7 @@ mod tests {
         let inches = UnitSystem::parse("in-slinch-s").unwrap();
         let run = car(&inches);
         let mut warnings = Vec::new();
-        let found = choose(&[run], None, None, &mut warnings);
+        let found = choose(&[run], None, None, None, &mut warnings);
         assert_eq!(found.value().unwrap().to_string(), "mm-t-s");
         assert!(found.to_string().starts_with("guessed: "), "{found}");
         let warned = "units: mm-t-s is assumed, which gives an impact at 1.97 km/h; if the model is in inches or feet, such as in-slinch-s with 50.04 km/h, use --units";
@@ -347,14 +358,14 @@ mod tests {
         for half in [1.0, 2.0] {
             let named = Magnitudes { named_m_per_s: Some(half * 13.9), ..run };
             let mut warnings = Vec::new();
-            let found = choose(&[named], None, None, &mut warnings);
+            let found = choose(&[named], None, None, None, &mut warnings);
             assert_eq!(found.value(), Some(&inches), "{found}");
             assert!(found.to_string().starts_with("computed: "), "{found}");
             assert!(warnings.is_empty(), "{warnings:?}");
         }
         // A name that fits nothing decides nothing.
         let named = Magnitudes { named_m_per_s: Some(3.0), ..car(&UnitSystem::SI) };
-        let found = choose(&[named], None, None, &mut Vec::new());
+        let found = choose(&[named], None, None, None, &mut Vec::new());
         assert_eq!(found.value(), Some(&UnitSystem::SI), "{found}");
     }
 
@@ -362,7 +373,7 @@ mod tests {
     fn a_light_body_in_kilogrammes_may_be_a_heavy_one_in_grammes() {
         let units = UnitSystem::parse("mm-kg-ms").unwrap();
         let train = Magnitudes { mass: Some(24e3), ..car(&units) };
-        let found = choose(&[train], None, None, &mut Vec::new());
+        let found = choose(&[train], None, None, None, &mut Vec::new());
         assert_eq!(found.value(), Some(&units));
         assert!(found.to_string().starts_with("guessed: "), "{found}");
         assert!(found.to_string().contains("mm-g-ms (a body of 24 kg)"), "{found}");
@@ -373,7 +384,7 @@ mod tests {
         let units = UnitSystem::parse("mm-t-s").unwrap();
         let mut warnings = Vec::new();
         let stated = Some((UnitSystem::SI, "main.k, line 3".to_string()));
-        let found = choose(&[car(&units)], None, stated.clone(), &mut warnings);
+        let found = choose(&[car(&units)], None, stated.clone(), None, &mut warnings);
         assert_eq!(found.value(), Some(&units));
         assert_eq!(
             warnings,
@@ -381,9 +392,29 @@ mod tests {
                 "units: main.k, line 3 states SI, which would give an impact at 13900 m/s; it is not used"
             ]
         );
-        let found = choose(&[car(&UnitSystem::SI)], None, stated, &mut Vec::new());
+        let found = choose(&[car(&UnitSystem::SI)], None, stated, None, &mut Vec::new());
         let said = found.to_string();
         assert!(said.starts_with("read: main.k, line 3; and the only usual system"), "{said}");
+    }
+
+    /// What the materials are in counts more than what is written above them, unless the impact is impossible in it.
+    #[test]
+    fn the_solver_computes_with_the_materials() {
+        let [mm, si] = ["mm-t-s", "SI"].map(|name| UnitSystem::parse(name).unwrap());
+        let said = |units: UnitSystem, what: &str| Some((units, what.to_string()));
+        let t =
+            |runs: UnitSystem, stated, metals, units: UnitSystem, evidence: &str, warned: usize| {
+                let mut warnings = Vec::new();
+                let found = choose(&[car(&runs)], None, stated, metals, &mut warnings);
+                assert_eq!(found.value(), Some(&units), "{found}");
+                assert!(found.to_string().starts_with(evidence), "{found}");
+                assert_eq!(warnings.len(), warned, "{warnings:?}");
+            };
+        t(mm, None, said(mm, "steel"), mm, "computed: steel", 0);
+        t(mm, said(mm, "line 1"), said(mm, "steel"), mm, "read: line 1", 0);
+        t(mm, said(si, "line 1"), said(mm, "steel"), mm, "computed: steel", 1);
+        t(mm, said(mm, "line 1"), said(si, "steel"), mm, "read: line 1", 0);
+        t(mm, None, said(si, "steel"), mm, "computed: the only usual", 0);
     }
 
     #[test]
@@ -395,7 +426,7 @@ mod tests {
             mass: None,
             named_m_per_s: None,
         };
-        let found = choose(&[slow], None, None, &mut Vec::new());
+        let found = choose(&[slow], None, None, None, &mut Vec::new());
         assert!(found.value().is_none());
         let said = "fill in: this is not an impact in any of the usual systems";
         assert!(found.to_string().starts_with(said), "{found}");

@@ -289,6 +289,12 @@ impl<'a> Builder<'a> {
         let gap_m = slot.gap_m.or(table.gap.map(|g| g.0)).unwrap_or(0.0);
         let mut interface = Interface::new(slot.name.clone(), made.law, gap_m);
         if let Some(name) = &table.tension {
+            if matches!(slot.role, Role::Wall | Role::Noses) {
+                self.warnings.push(format!(
+                    "curve \"{curve}\": its tension acts at the first contact {}, too, and pulls what rebounds, as couplers that have engaged do; if nothing engages, name a curve without tension in [contact]",
+                    slot.name
+                ));
+            }
             let slack_m = self.scenario.curves[name].gap.map_or(0.0, |g| g.0);
             interface.tension = Some(Tension { law: self.law(slot, name, speed)?.law, slack_m });
         }

@@ -190,7 +190,18 @@ impl Spring {
             EnvelopeEnd::Slope if self.curve.beyond.is_none() => Tail::None,
             EnvelopeEnd::Hold | EnvelopeEnd::Slope | EnvelopeEnd::Error => Tail::Hold,
         };
-        let curve = self.curve.continued(tail).map_err(envelope_error)?;
+        let curve = match &table.unloading {
+            Some(stiffness) => self.curve.unloading_with(stiffness.0),
+            None => self.curve,
+        };
+        let rises = curve.unloading.stiffness_n_per_m().unwrap_or(curve.loading.max_slope()) > 0.0;
+        if table.end == Some(EnvelopeEnd::Bottom) && !rises {
+            return Err(error!(
+                Scenario at "end",
+                "it never rises and has no unloading stiffness, so it cannot bottom with one: give unloading = \"…MN/m\", or end = \"hold\""
+            ));
+        }
+        let curve = curve.continued(tail).map_err(envelope_error)?;
         Ok(Self { curve, end, ..self })
     }
 

@@ -290,7 +290,7 @@ const CLASS: u32 = 60;
 
 /// Time in s, and largest filtered deceleration in m/s², in magnitude.
 fn peak_deceleration(time_s: &[f64], a_m_per_s2: &[f64]) -> Option<(f64, f64)> {
-    let filtered = cfc::filter(CLASS, time_s, a_m_per_s2).ok()?.values;
+    let filtered = cfc::filter_from_rest(CLASS, time_s, a_m_per_s2).ok()?.values;
     let pairs = time_s.iter().zip(&filtered);
     pairs.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).map(|(time_s, a)| (*time_s, -a))
 }

@@ -133,6 +133,27 @@ pub(crate) fn filter(class: u32, time_s: &[f64], values: &[f64]) -> Result<Filte
     Ok(Filtered { values, resampled, spread })
 }
 
+/// The same for what was 0 before the first time, such as the acceleration of a body before its first contact: a step there
+/// is filtered like any other, where padding by reflection would keep its first value as it is.
+pub(crate) fn filter_from_rest(
+    class: u32,
+    time_s: &[f64],
+    values: &[f64],
+) -> Result<Filtered, CfcError> {
+    let n = values.len();
+    if n < 2 {
+        return filter(class, time_s, values);
+    }
+    let interval_s = (time_s[n - 1] - time_s[0]) / (n - 1) as f64;
+    let pad = ((PAD_S / interval_s).round() as usize).max(PAD_SAMPLES);
+    let before = (1..=pad).rev().map(|j| time_s[0] - interval_s * j as f64);
+    let time_s: Vec<f64> = before.chain(time_s.iter().copied()).collect();
+    let rested: Vec<f64> = [&vec![0.0; pad][..], values].concat();
+    let mut filtered = filter(class, &time_s, &rested)?;
+    filtered.values.drain(..pad);
+    Ok(filtered)
+}
+
 /// The filter proper, over the padded history.
 fn at_equal_intervals(class: u32, interval_s: f64, values: &[f64]) -> Vec<f64> {
     let n = values.len();
@@ -167,6 +188,17 @@ mod tests {
         let wave: Vec<f64> = time_s.iter().map(|t| (2.0 * PI * frequency_hz * t).sin()).collect();
         let filtered = filter(60, &time_s, &wave).unwrap().values;
         filtered[5_000..15_000].iter().fold(0.0, |m: f64, v| m.max(v.abs()))
+    }
+
+    /// A step from rest is halved where it is, as by any filter without phase shift; padding by reflection keeps it.
+    #[test]
+    fn a_step_from_rest_is_filtered() {
+        let time_s: Vec<f64> = (0..400).map(|i| f64::from(i) * 0.25e-3).collect();
+        let step = vec![100.0; 400];
+        let from_rest = filter_from_rest(60, &time_s, &step).unwrap().values;
+        assert!((from_rest[0] / 50.0 - 1.0).abs() < 0.1, "{}", from_rest[0]);
+        assert!((from_rest[200] - 100.0).abs() < 0.1);
+        assert_eq!(filter(60, &time_s, &step).unwrap().values[0], 100.0);
     }
 
     #[test]

@@ -6,12 +6,14 @@ use std::path::{Path, PathBuf};
 
 use super::lsdyna::deck::{self, Deck};
 use super::lsdyna::line::Lines;
+use super::openradioss::starter;
 use super::{Entity, SolverFile, source};
 use crate::error::Error;
 use crate::file;
 
-/// Endings of keyword decks.
-const ENDINGS: [&str; 5] = ["k", "key", "dyn", "dyna", "kwd"];
+/// Endings of keyword decks, and of OpenRadioss' starter decks.
+const ENDINGS: [&str; 6] = ["k", "key", "dyn", "dyna", "kwd", STARTER];
+const STARTER: &str = "rad";
 /// Names of a folder that are examined, and decks among them that are read.
 const MAX_NAMES: usize = 10_000;
 const MAX_DECKS: usize = 20;
@@ -62,7 +64,12 @@ pub(crate) fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), Er
     if let Some(what) = source::encoded(&head[..head.len().min(HEAD)]) {
         return Err(io(std::io::Error::other(what)));
     }
-    let deck = deck::parse_deck(&mut file, &mut open).map_err(io)?;
+    let is_starter = head.split(|b| *b == b'\n').any(starter::signature);
+    let deck = match is_starter {
+        true => starter::read(&mut file),
+        false => deck::parse_deck(&mut file, &mut open),
+    };
+    let deck = deck.map_err(io)?;
     fault.map_or(Ok((deck, included)), Err)
 }
 
@@ -82,9 +89,13 @@ pub(crate) fn find(folder: &Path) -> io::Result<Search> {
     let mut candidates = Vec::new();
     for entry in folder.read_dir()?.take(MAX_NAMES) {
         let path = entry?.path();
-        if has_ending(&path) && is_deck(&path).map_err(of(&path))? {
+        if has_ending_of(&path, &ENDINGS) && is_deck(&path).map_err(of(&path))? {
             candidates.push(path);
         }
+    }
+    // OpenRadioss reads keyword decks as well.
+    if candidates.iter().any(|path| !has_ending_of(path, &[STARTER])) {
+        candidates.retain(|path| !has_ending_of(path, &[STARTER]));
     }
     candidates.sort();
     if candidates.len() > 1 && candidates.len() <= MAX_DECKS {
@@ -114,9 +125,9 @@ pub(crate) fn deck_next_to(path: &Path) -> Option<(PathBuf, Deck)> {
     }
 }
 
-fn has_ending(path: &Path) -> bool {
+fn has_ending_of(path: &Path, endings: &[&str]) -> bool {
     let ending = path.extension().and_then(|e| e.to_str()).map(str::to_ascii_lowercase);
-    ending.is_some_and(|ending| ENDINGS.contains(&ending.as_str()))
+    ending.is_some_and(|ending| endings.contains(&ending.as_str()))
 }
 
 /// Whether the first keyword of a file is one of a deck.
@@ -126,6 +137,7 @@ fn is_deck(path: &Path) -> io::Result<bool> {
     for _ in 0..HEAD_LINES {
         match file::if_there(lines.next_line())?.flatten() {
             Some(line) if line.text.starts_with(b"*") => return Ok(deck::signature(line.text)),
+            Some(line) if starter::signature(line.text) => return Ok(true),
             Some(_) => {}
             None => break,
         }

@@ -209,10 +209,10 @@ fn look_at(
                 None => return Err(unknown(NOT_RECOGNISED)),
             }
         }
-        if lsdyna::deck::signature(line.text) {
+        if lsdyna::deck::signature(line.text) || openradioss::starter::signature(line.text) {
             let path = path.display();
             return Err(
-                error!(SolverFile at "deck", "{path}: this is a keyword deck, which holds no histories; crumple inspect shows what it says of its run"),
+                error!(SolverFile at "deck", "{path}: this is a deck, which holds no histories; crumple inspect shows what it says of its run"),
             );
         }
         is_lsdyna |= line.number == 2 && lsdyna::line::version(line.text).is_some();

@@ -39,12 +39,30 @@ impl LocatedRun<'_> {
             let units = deck.deck.units.as_ref()?;
             Some((shown_name(&deck.file.path), units, units.system?))
         });
+        let metals = self
+            .deck
+            .as_ref()
+            .and_then(|RunDeck { file, deck }| deck.units_of_metals(&shown_name(&file.path)));
         if let Some(units) = self.study.manifest.study.units {
             if let Some((name, stated, _)) = stated.filter(|(.., system)| *system != units) {
                 remarks.warn(format!(
                     "units: the deck {name} states \"{}\", the manifest states others; those of the manifest are used",
                     stated.text.trim()
                 ));
+            }
+            if let Some((_, said)) = metals.filter(|(metals, _)| *metals != units) {
+                remarks.warn(format!("units: the manifest states {units}, but {said}"));
+            }
+            return Ok(units);
+        }
+        let others = metals.filter(|(metals, _)| stated.as_ref().is_none_or(|s| s.2 != *metals));
+        if let Some((units, said)) = others {
+            match stated {
+                Some((name, stated, _)) => remarks.warn(format!(
+                    "units: the deck {name} states \"{}\", but {said}, which is taken",
+                    stated.text.trim()
+                )),
+                None => remarks.note(format!("units: {said}, which is taken")),
             }
             return Ok(units);
         }

@@ -36,8 +36,7 @@ impl PredictedCurve {
         };
         let deflection_m = union(&declared.loading, body.as_ref().map(|b| &b.loading));
         let at = |e: &Envelope| -> Vec<f64> {
-            let force = deflection_m.iter().map(|&d| e.force_at(d).max(0.0));
-            std::iter::once(0.0).chain(force.skip(1)).collect()
+            deflection_m.iter().map(|&d| e.force_at(d).max(0.0)).collect()
         };
         let force_n = at(&declared.loading);
         let steepest = declared.loading.max_slope();

@@ -22,6 +22,8 @@ pub(crate) struct ResultColumn {
 pub(crate) struct SweepColumns {
     /// What was varied, but for choices of curves.
     pub(crate) varied: Vec<ResultColumn>,
+    /// Names of the columns of these choices, such as `curve[nose]`.
+    pub(crate) curves: Vec<String>,
     pub(crate) results: Vec<ResultColumn>,
     /// Rows of the file.
     pub(crate) rows: u64,
@@ -66,7 +68,8 @@ impl SweepColumns {
     fn none(head: &ShardHeader) -> Self {
         let column = |k: usize| ResultColumn { name: head.columns[k].clone(), values: Vec::new() };
         let results = head.number_columns().map(column).collect();
-        Self { varied: Vec::new(), results, rows: head.count() }
+        let curves = head.columns.iter().filter(|name| name.starts_with("curve[")).cloned();
+        Self { varied: Vec::new(), curves: curves.collect(), results, rows: head.count() }
     }
 
     fn take(&mut self, numbers: &[f64]) {

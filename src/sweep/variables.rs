@@ -18,6 +18,22 @@ pub(crate) struct Variable {
     pub names: Vec<String>,
 }
 
+impl Variable {
+    /// Whether its values stand in place of those of one before it.
+    fn replaces(&self, before: &Self) -> bool {
+        !self.factor
+            && match (&self.target, &before.target) {
+                (Target::Speed(one), Target::Speed(other)) => one == other,
+                (Target::Mass(some), Target::Mass(others)) => {
+                    some.iter().any(|place| others.contains(place))
+                }
+                (Target::ContactGap, Target::ContactGap) => true,
+                (Target::CurveGap(one), Target::CurveGap(other)) => one == other,
+                _ => false,
+            }
+    }
+}
+
 enum Target {
     /// Train by number.
     Speed(usize),
@@ -56,6 +72,14 @@ pub(crate) fn bind(plan: &Plan, scenario: &Scenario) -> Result<(Vec<Variable>, D
         for variable in bound {
             if variables.iter().any(|v: &Variable| v.column == variable.column) {
                 return Err(named(error!(Sweep, "{} is varied twice", variable.column)));
+            }
+            if let Some(before) = variables.iter().find(|v| variable.replaces(v)) {
+                return Err(named(error!(
+                    Sweep,
+                    "{} would replace what {} has set: vary each quantity once, or by a factor behind its values",
+                    variable.column,
+                    before.column
+                )));
             }
             variables.push(variable);
             spreads.push(spread.clone());

@@ -101,11 +101,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
 
 /// A parameter's value; `-` where the case has none.
 fn shown(value: &Option<&Parameter>) -> String {
-    match value {
-        None => "-".into(),
-        Some(Parameter::Number(number)) => number.to_string(),
-        Some(Parameter::Category(text)) => text.clone(),
-    }
+    value.map_or("-".into(), Parameter::to_string)
 }
 
 /// The case of the same group and name.

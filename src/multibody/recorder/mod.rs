@@ -188,6 +188,7 @@ impl EventRecorder {
             if let Some(span) = phase.at_end_of_run(end) {
                 spans.close(span);
             }
+            let spans = spans.ended();
             history.final_v_m_per_s = final_v_m_per_s;
             if record != Record::Closing && interval_s <= COARSEST_S {
                 let speeds = &history.v_m_per_s;

@@ -169,6 +169,12 @@ impl Span {
         (self.begin.time_s, self.end.time_s)
     }
 
+    fn goes_on_from(&self, before: &Self) -> bool {
+        let gained = |span: &Self| span.end.v_m_per_s - span.begin.v_m_per_s;
+        let apart_s = self.begin.time_s - before.end.time_s;
+        apart_s < LOOK_S && gained(self) * gained(before) > 0.0
+    }
+
     /// Magnitude of the change of speed.
     fn change(&self) -> f64 {
         (self.begin.v_m_per_s - self.end.v_m_per_s).abs()
@@ -182,6 +188,8 @@ impl Span {
 /// Spans of a body that may count.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Spans {
+    /// The last one, which goes on if a push in its direction follows within a look: a contact that chatters is one.
+    last: Option<Span>,
     closed: Vec<Span>,
     /// The one with the largest change of speed so far.
     largest: Option<Span>,
@@ -190,6 +198,27 @@ pub(super) struct Spans {
 impl Spans {
     /// Keeps a span that may count: before it there may be many that do not.
     pub(crate) fn close(&mut self, span: Span) {
+        match &mut self.last {
+            Some(last) if span.goes_on_from(last) => {
+                (last.end, last.is_cut) = (span.end, span.is_cut);
+            }
+            last => {
+                if let Some(before) = last.replace(span) {
+                    self.keep(before);
+                }
+            }
+        }
+    }
+
+    /// All have been closed.
+    pub(crate) fn ended(mut self) -> Self {
+        if let Some(last) = self.last.take() {
+            self.keep(last);
+        }
+        self
+    }
+
+    fn keep(&mut self, span: Span) {
         if self.largest.is_none_or(|largest| span.change() > largest.change()) {
             self.largest = Some(span);
         }
@@ -274,6 +303,29 @@ mod tests {
         assert_eq!(is_cut(fading), Some(false));
     }
 
+    /// Hundreds of short pushes within a look of each other are one contact; others are not.
+    #[test]
+    fn a_contact_that_chatters_is_one() {
+        let moment = |k: i32, since_s: f64, v_m_per_s: f64| Moment {
+            time_s: f64::from(k) * 0.15e-3 + since_s,
+            v_m_per_s,
+        };
+        let v = |k: i32| 5.0 + 2e-3 * f64::from(k);
+        let mut spans = Spans::default();
+        for k in 0..500 {
+            let (begin, end) = (moment(k, 0.0, v(k)), moment(k, 0.05e-3, v(k + 1)));
+            spans.close(Span { begin, end, is_cut: false });
+        }
+        let (begin, end) = (moment(502, 0.0, v(500)), moment(600, 0.0, v(100)));
+        let other = Span { begin, end, is_cut: false };
+        spans.close(other);
+        let spans = spans.ended();
+        let first = spans.first().unwrap();
+        assert_eq!(first.times_s(), (0.0, moment(499, 0.05e-3, 0.0).time_s));
+        assert!((first.mean_deceleration() * first.end.time_s + 1.0).abs() < 1e-12);
+        assert_eq!((spans.closed.len(), spans.main()), (2, None));
+    }
+
     #[test]
     fn spans_of_small_changes_do_not_count() {
         let span = |from: f64, to: f64| Span {
@@ -281,14 +333,16 @@ mod tests {
             end: Moment { time_s: from + 0.01, v_m_per_s: to },
             is_cut: false,
         };
-        let mut spans = Spans::default();
-        spans.close(span(0.0, 9.99));
-        assert_eq!(spans.first(), Some(&span(0.0, 9.99)));
-        spans.close(span(0.1, 5.0));
-        assert_eq!((spans.first(), spans.main()), (Some(&span(0.1, 5.0)), None));
-        spans.close(span(0.2, 1.0));
-        spans.close(span(0.3, 2.0));
-        assert_eq!(spans.first(), Some(&span(0.1, 5.0)));
-        assert_eq!(spans.main(), Some(&span(0.2, 1.0)));
+        let of = |all: &[Span]| {
+            let mut spans = Spans::default();
+            all.iter().for_each(|span| spans.close(*span));
+            spans.ended()
+        };
+        let all = [span(0.0, 9.99), span(0.1, 5.0), span(0.2, 1.0), span(0.3, 2.0)];
+        assert_eq!(of(&all[..1]).first(), Some(&all[0]));
+        let two = of(&all[..2]);
+        assert_eq!((two.first(), two.main()), (Some(&all[1]), None));
+        assert_eq!(of(&all).first(), Some(&all[1]));
+        assert_eq!(of(&all).main(), Some(&all[2]));
     }
 }

@@ -10,6 +10,7 @@
 //! All states of a T01 have one length, so a damaged state is skipped and the next one is found. The file has no
 //! checksums. A restart continues in `T02`, with the impulses of `T01`: both are one record.
 
+pub(crate) mod starter;
 mod states;
 mod variables;
 

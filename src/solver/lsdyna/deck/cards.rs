@@ -2,7 +2,7 @@
 
 use super::context::{Block, Context, Defined, MAX_ENTRIES, Missing, Value};
 use super::keyword::{Card, Field, Kind, start, text};
-use super::{DeckEntity, DeckPlace, InitialVelocity, Output, Scope, StatedUnits};
+use super::{DeckEntity, DeckPlace, InitialVelocity, Material, Output, Scope, StatedUnits};
 use crate::solver::lsdyna::line::shown;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::unit::UnitSystem;
@@ -40,6 +40,15 @@ impl Context {
         if let Some(id) = self.required_id(field) {
             let node = self.entity(id, title, card);
             self.keep(|deck| &mut deck.history_nodes, node, "history nodes");
+        }
+    }
+
+    /// MID RO E …: most materials begin so. What is not a number there belongs to others, or to none, and is not missed.
+    pub(super) fn material(&mut self, card: &Card<'_>) {
+        let [density, modulus] = [1, 2].map(|k| self.parameters.real(card.field(k)).ok().flatten());
+        if let (Some(density), Some(modulus)) = (density, modulus) {
+            let material = Material { density, modulus, at: self.at(card.place) };
+            self.keep(|deck| &mut deck.materials, material, "materials");
         }
     }
 
@@ -279,7 +288,7 @@ pub(super) fn on_card(card: &Card<'_>) -> String {
 }
 
 /// The system that a text names, whatever other units it names.
-pub(super) fn system(text: &str) -> Option<UnitSystem> {
+pub(crate) fn system(text: &str) -> Option<UnitSystem> {
     let separators = [' ', '/', ',', ';', '(', ')', '\t'];
     // `kN-mm` is an energy but `mm-t-s` is a system: hyphens part the second only.
     from_words(text.split(separators)).or_else(|| {

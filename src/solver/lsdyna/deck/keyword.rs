@@ -119,6 +119,10 @@ pub(super) enum Kind {
     },
     /// A part whose further cards are of any number.
     OnePart,
+    /// Its first card, below a title or not.
+    Material {
+        titled: bool,
+    },
     Parameters,
     Expressions,
     Include,
@@ -163,6 +167,7 @@ pub(super) fn kind(keyword: &Keyword) -> Kind {
         ["CONTACT", _, ..] => Kind::Contact,
         ["RIGIDWALL", "PLANAR" | "GEOMETRIC", ..] => Kind::Wall,
         ["PART", options @ ..] => part_kind(options),
+        ["MAT", options @ ..] => Kind::Material { titled: options.contains(&"TITLE") },
         ["PARAMETER"] | ["PARAMETER", "LOCAL" | "GLOBAL"] => Kind::Parameters,
         ["PARAMETER", "EXPRESSION", ..] => Kind::Expressions,
         ["PARAMETER", "DUPLICATION"] => Kind::Skipped,

@@ -15,6 +15,7 @@ use serde::Serialize;
 
 use crate::solver::problem::Problem;
 use crate::unit::UnitSystem;
+pub(crate) use cards::system as unit_system;
 use context::Value;
 pub(crate) use keyword::signature;
 
@@ -40,10 +41,14 @@ pub fn parse_deck(
 /// Each list ends at 100,000 entries; a problem says when there were more.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Deck {
+    /// Of OpenRadioss, of which title and units are read; else a keyword deck.
+    pub(crate) is_starter: bool,
     /// The first `*TITLE` that is not blank.
     pub title: Option<String>,
     /// As a comment or `*CONTROL_UNITS` states them.
     pub units: Option<StatedUnits>,
+    /// Of each `*MAT_…` that gives both, in order.
+    pub(crate) materials: Vec<Material>,
     /// In the order of the deck.
     pub(crate) initial_velocities: Vec<InitialVelocity>,
     /// `*DATABASE_…` of the ASCII files, in order.
@@ -84,6 +89,14 @@ pub struct StatedUnits {
     pub at: DeckPlace,
     /// When length, mass and time are all recognised and nothing contradicts them.
     pub system: Option<UnitSystem>,
+}
+
+/// Density and Young's modulus of a material, in the deck's units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Material {
+    pub density: f64,
+    pub modulus: f64,
+    pub at: DeckPlace,
 }
 
 /// One velocity given at the start: `*INITIAL_VELOCITY`, `_NODE`, `_RIGID_BODY`,
@@ -168,6 +181,35 @@ pub struct Include {
 }
 
 impl Deck {
+    /// `line 12`, of an included file with its name.
+    pub(crate) fn line(&self, at: DeckPlace) -> String {
+        match at.include.and_then(|index| self.includes.get(index)) {
+            Some(include) => format!("line {} of {}", at.line, include.name),
+            None => format!("line {}", at.line),
+        }
+    }
+
+    /// The units in which most of its materials that can be metals are such, with what says so of the first of them. `None`
+    /// if there is none, or as many are metals in other units.
+    pub(crate) fn units_of_metals(&self, name: &str) -> Option<(UnitSystem, String)> {
+        let of = |material: &Material| UnitSystem::of_metal(material.density, material.modulus);
+        let mut found: Vec<(UnitSystem, Material, usize)> = Vec::new();
+        for (units, material) in self.materials.iter().filter_map(|m| Some((of(m)?, *m))) {
+            match found.iter_mut().find(|(known, ..)| *known == units) {
+                Some((.., count)) => *count += 1,
+                None => found.push((units, material, 1)),
+            }
+        }
+        let most = found.iter().map(|(.., count)| *count).max()?;
+        let mut most = found.into_iter().filter(|(.., count)| *count == most);
+        let (units, Material { density, modulus, at }, _) = most.next()?;
+        let said = format!(
+            "density {density:?} and Young's modulus {modulus:?} of the deck {name}, {}, are those of a metal in {units}",
+            self.line(at)
+        );
+        most.next().is_none().then_some((units, said))
+    }
+
     /// The speed at which the model starts to move, in the deck's units, and where the first velocity
     /// is given: that of all initial velocities that are not zero, when they agree in size and
     /// direction (to 1e-6, since decks write seven digits). `None` when there is none, when they differ, when one turns or is
@@ -206,6 +248,38 @@ fn norm([x, y, z]: [f64; 3]) -> f64 {
 mod tests {
     use super::Scope;
     use super::*;
+
+    #[test]
+    fn most_metals_tell_the_units() {
+        fn t(cards: &str, expected: Option<(&str, &str)>) {
+            let deck = parse_deck(&mut cards.as_bytes(), &mut |_| None).unwrap();
+            let found = deck.units_of_metals("a.k");
+            let found = found.as_ref().map(|(units, said)| (units.to_string(), &**said));
+            let expected = expected.map(|(units, of)| {
+                (units.into(), format!("density {of}, are those of a metal in {units}"))
+            });
+            assert_eq!(
+                found,
+                expected.as_ref().map(|(u, s): &(String, String)| (u.clone(), &**s)),
+                "{cards}"
+            );
+            assert!(deck.problems.is_empty(), "{:?}", deck.problems);
+        }
+        let steel = "*MAT_024_TITLE\nsteel\n1,7.85e-6,210.,0.3\n";
+        let of_steel =
+            |line: u64| format!("7.85e-6 and Young's modulus 210.0 of the deck a.k, line {line}");
+        let other = "*PARAMETER\nR e,70000.\n*MAT_003\n$ aluminium\n2,2.7e-9,&e,0.33\n";
+        let alone = "2.7e-9 and Young's modulus 70000.0 of the deck a.k, line 5";
+        t(steel, Some(("mm-kg-ms", &of_steel(3))));
+        t(other, Some(("mm-t-s", alone)));
+        t(&format!("{steel}{other}"), None);
+        t(
+            &format!("*MAT_RIGID\n3,1.,210.\n{steel}{steel}{other}"),
+            Some(("mm-kg-ms", &of_steel(5))),
+        );
+        let none = "*MAT_SPRING_ELASTIC\n1,500.\n*MAT_ADD_EROSION\n2,none,0.\n*MAT_NULL\n3,&no,1.\n*MAT_024\n";
+        t(none, None);
+    }
 
     #[test]
     fn reads_velocities_of_all_cards() {

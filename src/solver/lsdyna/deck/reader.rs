@@ -207,6 +207,9 @@ impl Reader<'_, '_> {
                 self.context.interface(block.kind, name, self.context.at(block.place), id, title);
             }
             Kind::Parts { .. } | Kind::OnePart => self.context.part(block, &card),
+            Kind::Material { titled } if block.cards == 1 + usize::from(titled) => {
+                self.context.material(&card);
+            }
             Kind::Parameters => self.context.parameters(&card),
             Kind::Expressions => self.context.expression(&card),
             Kind::Include | Kind::IncludePath => {
