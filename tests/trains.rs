@@ -124,6 +124,10 @@ fn couplings_pull() {
     let least = |run: &Value| column(run, "force_N[A1|A2]").into_iter().fold(0.0, f64::min);
     assert_eq!(least(&free), 0.0);
     assert!(least(&coupled) < -1e4, "{}", least(&coupled));
+    let pulls = |run: &Value| run["summary"]["sequence"].to_string().contains("\"pull\"");
+    let slack = format!("{}{pull}", inner(", tension = \"pull\"")).replace("10mm", "60mm");
+    let slack = long(scenario(&slack, vehicles, "[wall]"));
+    assert!(pulls(&slack) && !pulls(&free), "{}", slack["summary"]["sequence"]);
     let apart = |run: &Value| {
         let last = |name: &str| *column(run, name).last().unwrap();
         last("x_m[A1]") - last("x_m[A2]")

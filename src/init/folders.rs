@@ -274,8 +274,8 @@ pub(crate) enum Reason {
 
 /// The error of folders without a usable run, and what may be the cause.
 pub(super) fn no_usable_run(left_out: &[LeftOut], doubts: &[String]) -> Error {
-    let doubts: String = doubts.iter().map(|d| format!("\n{d}")).collect();
-    error!(Study, "no run can be used:\n{}{doubts}", listed(left_out))
+    let doubts: String = doubts.iter().map(|d| format!("  {d}\n")).collect();
+    error!(Study, "no run can be used:\n{doubts}{}", listed(left_out))
 }
 
 /// Folders with their reasons, a line each.

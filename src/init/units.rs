@@ -131,8 +131,11 @@ pub(super) fn choose(
         }
         return Proposed::found(units, Given, "by --units");
     }
-    let metals = metals.filter(|(units, _)| refused(units).is_none());
-    if let Some((units, said)) = metals
+    let impossible = |(units, said): &(UnitSystem, String)| {
+        Some(format!("units: {said}, which would give {}; it is not used", refused(units)?))
+    };
+    warnings.extend(metals.as_ref().and_then(impossible));
+    if let Some((units, said)) = metals.filter(|(units, _)| refused(units).is_none())
         && stated.as_ref().is_none_or(|(stated, _)| *stated != units)
     {
         if let Some((stated, by)) = stated {
@@ -413,8 +416,8 @@ mod tests {
         t(mm, None, said(mm, "steel"), mm, "computed: steel", 0);
         t(mm, said(mm, "line 1"), said(mm, "steel"), mm, "read: line 1", 0);
         t(mm, said(si, "line 1"), said(mm, "steel"), mm, "computed: steel", 1);
-        t(mm, said(mm, "line 1"), said(si, "steel"), mm, "read: line 1", 0);
-        t(mm, None, said(si, "steel"), mm, "computed: the only usual", 0);
+        t(mm, said(mm, "line 1"), said(si, "steel"), mm, "read: line 1", 1);
+        t(mm, None, said(si, "steel"), mm, "computed: the only usual", 1);
     }
 
     #[test]

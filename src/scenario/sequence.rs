@@ -28,6 +28,8 @@ pub(crate) enum Happening {
     Opened,
     /// After it had opened.
     ContactAgain,
+    /// A coupling that has opened begins to pull.
+    Pull,
 }
 
 impl Happening {
@@ -40,6 +42,7 @@ impl Happening {
             Self::LargestCrush => "largest crush".into(),
             Self::Opened => "separation".into(),
             Self::ContactAgain => "contact again".into(),
+            Self::Pull => "pull".into(),
         }
     }
 }
@@ -104,7 +107,12 @@ fn contacts(time_s: &[f64], history: &InterfaceHistory) -> Vec<(f64, Happening)>
         let end = again.unwrap_or(time_s.len() - 1);
         if time_s[end] - time_s[open] >= OPEN_S {
             events.push((opened_s(time_s, &history.force_n, open), Happening::Opened));
-            events.extend(again.map(|k| (time_s[k - 1], Happening::ContactAgain)));
+            let begun = |k: usize| {
+                let pulls = history.force_n[k] < 0.0;
+                let what = if pulls { Happening::Pull } else { Happening::ContactAgain };
+                (begun_s(time_s, &history.force_n, k), what)
+            };
+            events.extend(again.map(begun));
         }
         let Some(again) = again else { break };
         at = again;
@@ -119,6 +127,13 @@ fn opened_s(time_s: &[f64], force_n: &[f64], open: usize) -> f64 {
     let fall = before - force_n[last];
     let share = if fall * force_n[last] > 0.0 { force_n[last] / fall } else { 1.0 };
     time_s[last] + share.min(1.0) * (time_s[open] - time_s[last])
+}
+
+/// When a force that is not 0 at output `k` and was before began: along the line through its first two values.
+fn begun_s(time_s: &[f64], force_n: &[f64], k: usize) -> f64 {
+    let rise = force_n.get(k + 1).map_or(0.0, |next| next - force_n[k]);
+    let share = if rise * force_n[k] > 0.0 { force_n[k] / rise } else { 1.0 };
+    time_s[k] - share.min(1.0) * (time_s[k] - time_s[k - 1])
 }
 
 /// When the mean speed of the first train no longer exceeds that of the second, or 0 against a wall.
@@ -136,4 +151,27 @@ pub(super) fn common_speed_time_s(prepared: &Prepared, run: &Run) -> Option<f64>
         (0..run.time_s.len()).map(|t| mean(first.len(), second, t) - mean(0, first, t)).collect();
     let is_closing = closing.first().is_some_and(|first| *first < 0.0);
     is_closing.then(|| crossing_s(&run.time_s, &closing, 0.0)).flatten()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A force that rises evenly begins where its line does, one that jumps at the output before.
+    #[test]
+    fn a_contact_begins_again_between_outputs() {
+        let time_s: Vec<f64> = (0..60).map(|k| f64::from(k) * 1e-3).collect();
+        let force_n = |rise: &dyn Fn(f64) -> f64| -> Vec<f64> {
+            let of = |t: f64| if t < 0.0105 { 5e5 } else { rise(t - 0.0304) };
+            time_s.iter().map(|t| of(*t)).collect()
+        };
+        let again = |force_n: Vec<f64>| {
+            let history = InterfaceHistory { force_n, ..InterfaceHistory::default() };
+            let events = contacts(&time_s, &history);
+            assert_eq!(events[1].1, Happening::ContactAgain);
+            events[1].0
+        };
+        assert!((again(force_n(&|since| (1e8 * since).max(0.0))) - 0.0304).abs() < 1e-9);
+        assert_eq!(again(force_n(&|since| if since > 0.0 { 2e6 } else { 0.0 })), 0.030);
+    }
 }

@@ -222,6 +222,11 @@ impl Spans {
         if self.largest.is_none_or(|largest| span.change() > largest.change()) {
             self.largest = Some(span);
         }
+        if self.closed.len() == MOST_SPANS {
+            let mut closed = std::mem::take(&mut self.closed);
+            closed.retain(|span| self.counts(span));
+            self.closed = closed;
+        }
         if self.counts(&span) && self.closed.len() < MOST_SPANS {
             self.closed.push(span);
         }
@@ -344,5 +349,9 @@ mod tests {
         assert_eq!((two.first(), two.main()), (Some(&all[1]), None));
         assert_eq!(of(&all).first(), Some(&all[1]));
         assert_eq!(of(&all).main(), Some(&all[2]));
+        // However many small ones come before it, those that count are kept.
+        let small = |k: i32| span(f64::from(k), if k % 2 == 0 { 9.999 } else { 10.001 });
+        let many: Vec<Span> = (0..200).map(small).chain([span(200.0, 5.0)]).collect();
+        assert_eq!(of(&many).first(), many.last());
     }
 }
