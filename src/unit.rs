@@ -179,13 +179,16 @@ pub(crate) const SPEED: Dimension = Dimension {
     ],
 };
 /// Masses, in kg inside.
-pub(crate) const MASS: Dimension =
-    Dimension { what: "mass", example_unit: "t", units: &[("t", 1e3), ("kg", 1.0), ("g", 1e-3)] };
+pub(crate) const MASS: Dimension = Dimension {
+    what: "mass",
+    example_unit: "t",
+    units: &[("t", 1e3), ("kg", 1.0), ("g", 1e-3), ("lb", LB_KG)],
+};
 /// Lengths, in metres.
 pub(crate) const LENGTH: Dimension = Dimension {
     what: "length",
     example_unit: "mm",
-    units: &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)],
+    units: &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254), ("ft", 0.3048)],
 };
 /// Times, in s inside.
 pub(crate) const TIME: Dimension = Dimension {
@@ -207,8 +210,11 @@ pub(crate) const STIFFNESS: Dimension = Dimension {
     ],
 };
 /// Forces, in newtons.
-pub(crate) const FORCE: Dimension =
-    Dimension { what: "force", example_unit: "kN", units: &[("N", 1.0), ("kN", 1e3), ("MN", 1e6)] };
+pub(crate) const FORCE: Dimension = Dimension {
+    what: "force",
+    example_unit: "kN",
+    units: &[("N", 1.0), ("kN", 1e3), ("MN", 1e6), ("lbf", LBF_N)],
+};
 
 impl Dimension {
     /// SI value of a number with a unit, such as `"36 km/h"`.
@@ -320,15 +326,16 @@ pub struct UnitSystem {
 
 const LENGTHS: &[(&str, f64)] =
     &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254), ("ft", 0.3048)];
-/// One pound-force, in N.
-const LBF_N: f64 = 0.45359237 * 9.80665;
+/// One pound in kg, and one pound-force in N.
+const LB_KG: f64 = 0.45359237;
+const LBF_N: f64 = LB_KG * 9.80665;
 /// `slinch` and `slug` are those that a pound-force accelerates by 1 in/s² and 1 ft/s².
 const MASSES: &[(&str, f64)] = &[
     ("kg", 1.0),
     ("t", 1e3),
     ("Mg", 1e3),
     ("g", 1e-3),
-    ("lb", 0.45359237),
+    ("lb", LB_KG),
     ("slug", LBF_N / 0.3048),
     ("slinch", LBF_N / 0.0254),
 ];

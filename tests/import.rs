@@ -319,7 +319,7 @@ fn iso_mme_tests() {
     let good = channel("12FRONT00000FOXP", "kN", &f);
     #[rustfmt::skip]
     let cases = [
-        (good.replace("kN", "lbf"), "T1.004: line 4: the unit \"lbf\" of the force is not known: use one of N, kN, MN"),
+        (good.replace("kN", "kgf"), "T1.004: line 4: the unit \"kgf\" of the force is not known: use one of N, kN, MN, lbf"),
         (good.replace("implicit", "explicit"), "T1.004: line 5: the times are those of another channel: expected \"Reference channel :implicit\" with an interval, or \"Reference channel name :\""),
         (good.replace("samples         :5", "samples         :9"), "T1.004: line 8: number of samples declares 9, but the file has 5 values"),
         (good.replace("\n2\n", "\nNOVALUE\n"), "T1.004: line 11: expected a number, found \"NOVALUE\""),
@@ -373,8 +373,8 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         ("a.csv", csv("-1,-2\n0,0\n1,2\n2,3\n").into(), &["line 2: the force is -2 N on the other side"]),
         ("a.csv", "d,force\n0,0\n1,2\n2,3\n3,4\n".into(), &["line 1: the deflection has no unit (\"d\")", "write it as d_m or d_mm", "give the file's units with --units (of crumple export: --input-units), such as mm-t-s or SI"]),
         ("a.csv", "0,0\n1,2\n2,3\n3,4\n".into(), &["line 1: the header (the names of the columns)", "--units"]),
-        ("a.csv", "d [inch],force_N\n0,0\n1,2\n2,3\n3,4\n".into(), &["line 1: the unit \"inch\" of the deflection is not known: use one of mm, cm, m"]),
-        ("a.csv", "d_m,force [kn]\n0,0\n1,2\n2,3\n3,4\n".into(), &["the unit \"kn\" of the force is not known: use one of N, kN, MN"]),
+        ("a.csv", "d [inch],force_N\n0,0\n1,2\n2,3\n3,4\n".into(), &["line 1: the unit \"inch\" of the deflection is not known: use one of mm, cm, m, in, ft"]),
+        ("a.csv", "d_m,force [kn]\n0,0\n1,2\n2,3\n3,4\n".into(), &["the unit \"kn\" of the force is not known: use one of N, kN, MN, lbf"]),
         ("a.csv", "date,note\n0,0\n1,2\n2,3\n3,4\n".into(), &["line 1: expected a column deflection with its unit, such as d_m or d_mm, found \"date\""]),
         ("a.csv", "d_m,note\n0,0\n1,2\n2,3\n3,4\n".into(), &["expected a column force with its unit, such as force_N or force_kN, found \"note\""]),
         ("a.csv", "# force_kind: big\nd_m,force_N\n0,0\n".into(), &["line 1: \"# force_kind: big\": expected \"body\" or \"contact\""]),

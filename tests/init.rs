@@ -464,6 +464,40 @@ fn pairs_have_both_bodies() {
         let found: f64 = line.unwrap().parse().unwrap();
         assert!((found / kg - 1.0).abs() < 1e-2, "{name}: {found}");
     }
+    // A body force is the mass of its node's body times its acceleration, also of the other body.
+    let recipe = fs::read_to_string(here.join("study.toml")).unwrap();
+    let line = recipe.lines().find(|line| line.starts_with("force =")).unwrap();
+    let contact = line.replacen("force", "contact", 1);
+    let work_over_energy = |node: i64| {
+        let force = format!(
+            "force = {{ file = \"nodout\", node = {node}, times = \"mass\", component = \"x_velocity\" }}\n{contact}"
+        );
+        fs::write(here.join("body.toml"), recipe.replace(line, &force)).unwrap();
+        crumple_ok(&here, "build body.toml -o body.h5 -q");
+        let shown: Value = json(&crumple_ok(&here, "db ls body.h5 --json"));
+        fs::remove_file(here.join("body.h5")).unwrap();
+        let groups = shown["groups"].as_object().unwrap();
+        groups.values().next().unwrap()[0]["work_over_energy"].as_f64().unwrap()
+    };
+    let [own, others] = [6, 8].map(work_over_energy);
+    assert!((others / own - 1.0).abs() < 0.05, "{others} for {own}");
+
+    // Where the truck is the faster one in another run, its nodes are still those of the truck.
+    let crash = Crash { speed_m_per_s: 3.0, other_speed_m_per_s: 12.0, ..crash };
+    let history = crash.run();
+    let b = folder.path().join("pair/b");
+    layout.nodout(&b, &history, &nodes);
+    let truck =
+        Force { id: 2, title: "car to truck", along_n: &history.contact_n, across_n: 300.0 };
+    layout.rcforc(&b, &history, &[truck]);
+    assert!(!warned(&here, "init -o both.toml").contains("left out"));
+    let both = study(&here, "both.toml");
+    assert_eq!(both["run"].as_array().unwrap().len(), 2, "{both}");
+    for run in both["run"].as_array().unwrap() {
+        assert!((number(&run["mass"], "t") / 1.2 - 1.0).abs() < 1e-2, "{run}");
+        let closing = if run["path"].as_str() == Some("a") { 16.0 } else { 15.0 };
+        assert!((number(&run["speed"], "km/h") / (closing * 3.6) - 1.0).abs() < 1e-3, "{run}");
+    }
 }
 
 /// Bodies that meet each other and of which nothing but their motion is recorded.

@@ -76,7 +76,7 @@ fn titles_above_the_header_are_skipped() {
     let cases = [
         ("\n50;3000", "\n50;drei", "line 8, field 2: expected a number, found \"drei\""),
         ("\n0;0", "\n0;null", "line 7, field 2: expected a number, found \"null\""),
-        ("[kN]", "[lbf]", "line 6: the unit \"lbf\" of the force is not known"),
+        ("[kN]", "[kgf]", "line 6: the unit \"kgf\" of the force is not known"),
         ("Weg;", "Weg [cm];", "line 6, field 1: expected the unit of the header, cm, found \"mm\""),
         ("Weg;Kraft", "Hub;Last", "line 5: expected a column deflection with its unit, such as d_m or d_mm, found \"Hub\"; or choose the column with --deflection-column"),
         ("\n[mm];[kN]", "", "line 5: the deflection has no unit (\"Weg\")"),

@@ -166,6 +166,7 @@ fn designs_and_trains_stand_side_by_side() {
     let folder = demo_folder();
     let folder = folder.path();
     fs::copy(folder.join("curves.h5"), folder.join("other.h5")).unwrap();
+    crumple_ok(folder, "db rm other.h5 --case lead-car-wall/48kmh");
     let slower =
         fs::read_to_string(folder.join("two-sets.toml")).unwrap().replace("36km/h", "30km/h");
     fs::write(folder.join("slower.toml"), slower).unwrap();
@@ -196,6 +197,9 @@ fn designs_and_trains_stand_side_by_side() {
     ] {
         assert!(page.contains(text), "{text}");
     }
+    // Both at one speed, though each has its widest interval elsewhere.
+    let at: Vec<&str> = page.split("Predicted curve at ").skip(1).map(|text| &text[..7]).collect();
+    assert!(at.len() == 2 && at[0] == at[1], "{at:?}");
     // The third scenario has one vehicle of eight in common: it is not a variant.
     let side_by_side = page
         .split("Scenarios side by side</h2>")

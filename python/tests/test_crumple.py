@@ -302,7 +302,7 @@ def test_the_blend_of_curves_is_the_model_linear(tmp_path):
     assert np.allclose(CurveRegressor().fit(angle, force).predict(angle), force)
 
 
-def test_progress_is_shown_and_ctrl_c_ends_a_command(tmp_path, monkeypatch):
+def test_progress_is_shown_and_ctrl_c_ends_a_command(tmp_path, monkeypatch, request):
     import tqdm.auto
 
     seen = []
@@ -326,6 +326,9 @@ def test_progress_is_shown_and_ctrl_c_ends_a_command(tmp_path, monkeypatch):
             seen.append("closed")
 
     monkeypatch.setattr(tqdm.auto, "tqdm", Bar)
+    # What runs in the background begins with Ctrl-C ignored.
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, before))
     shutil.copytree(DEMO, tmp_path / "demo")
     monkeypatch.chdir(tmp_path / "demo")
     crumple.sweep("scenario.toml", "sweep.csv")

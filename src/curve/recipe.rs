@@ -356,7 +356,7 @@ struct SamplingTable {
 }
 
 /// Guards memory against a mistyped number; real outputs have hundreds of states.
-const MAX_STATES: usize = 1_000_000;
+pub(super) const MAX_STATES: usize = 1_000_000;
 
 impl TryFrom<SamplingTable> for Sampling {
     type Error = String;

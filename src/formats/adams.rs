@@ -115,14 +115,16 @@ impl<'a> Spline<'a> {
     fn property_file(&self) -> Result<Vec<u8>, Error> {
         let names = LENGTH.name_of(self.units.length_m).zip(FORCE.name_of(self.units.force()));
         let words = |(length, force)| {
-            let length = if length == "m" { "meter" } else { length };
-            Some((length, *[("N", "newton"), ("kN", "knewton")].iter().find(|f| f.0 == force)?))
+            let lengths = [("m", "meter"), ("in", "inch"), ("ft", "foot")];
+            let length = lengths.iter().find(|l| l.0 == length).map_or(length, |l| l.1);
+            let forces = [("N", "newton"), ("kN", "knewton"), ("lbf", "pound_force")];
+            Some((length, forces.iter().find(|f| f.0 == force)?.1))
         };
-        let (length, (_, force)) = names.and_then(words).ok_or_else(|| {
+        let (length, force) = names.and_then(words).ok_or_else(|| {
             error!(
                 Export,
                 "columns need units that have a name: lengths in {lengths}, forces in {forces}; choose others with --units, such as mm-t-s",
-                forces = "N, kN",
+                forces = "N, kN, lbf",
                 lengths = LENGTH.known_units()
             )
         })?;

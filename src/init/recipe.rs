@@ -2,7 +2,7 @@
 //! one are distinguished, never merged. Which force of a run moved which of its bodies; without one,
 //! which bodies pushed each other.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 
 use super::UserHints;
 use super::sources::Fit;
@@ -105,6 +105,7 @@ impl CommonRecipe {
         for view in &mut views {
             view.explained = view.takes(&key, kind, hints);
         }
+        in_one_order(&mut views);
         let (kind, direction, force) = key;
         let (force, other_forces, beside) = match force.and_then(|_| chosen_force(&views)) {
             Some((force, others, beside)) => (Some(force), others, beside),
@@ -256,6 +257,27 @@ impl<'a> RunView<'a> {
             }
         }
         Ok(())
+    }
+}
+
+/// Puts the two bodies of each run in the order of the first run's: the faster one, which comes first, may be the other.
+fn in_one_order(views: &mut [RunView<'_>]) {
+    let ids = |view: &RunView<'_>, slot: usize| -> HashSet<i64> {
+        view.nodes_of(slot).iter().map(|(node, _)| node.id).collect()
+    };
+    let mut first: Option<HashSet<i64>> = None;
+    for view in views {
+        if !matches!(&view.explained, Ok(Some(explained)) if explained.bodies.len() == 2) {
+            continue;
+        }
+        let first = first.get_or_insert_with(|| ids(view, 0));
+        let shares = |slot: usize| !first.is_disjoint(&ids(view, slot));
+        let is_other = !shares(0) && shares(1);
+        if let Ok(Some(explained)) = &mut view.explained
+            && is_other
+        {
+            explained.bodies.swap(0, 1);
+        }
     }
 }
 

@@ -383,6 +383,19 @@ fn methods_explained(nsdm_seeds: u64) -> String {
     )
 }
 
+/// Speed at which designs, groups of one name, can be compared: the middle of the first's widest interval, or what of all their
+/// ranges is next to it. `None` for one design, and if no speed is within all ranges.
+pub(super) fn common_speed<'a>(
+    mut designs: impl Iterator<Item = &'a [Case]> + Clone,
+) -> Option<f64> {
+    let speeds = |cases: &'a [Case]| cases.iter().map(|case| case.conditions.speed.m_per_s);
+    let low = designs.clone().map(|of| speeds(of).fold(f64::INFINITY, f64::min));
+    let high = designs.clone().map(|of| speeds(of).fold(0.0, f64::max));
+    let (low, high) = (low.fold(0.0, f64::max), high.fold(f64::INFINITY, f64::min));
+    let middle = middle_of_widest_gap(designs.next()?)?;
+    (designs.next().is_some() && low <= high).then(|| middle.clamp(low, high))
+}
+
 /// The middle between the two neighbouring speeds that lie farthest apart.
 fn middle_of_widest_gap(cases: &[Case]) -> Option<f64> {
     let mut speeds: Vec<f64> = cases.iter().map(|case| case.conditions.speed.m_per_s).collect();

@@ -213,7 +213,12 @@ pub(crate) fn report(
     let mut designs = Vec::new();
     for (title, group, cases) in &groups {
         step(&format!("reporting {title}"));
-        designs.extend(group::add(&mut content, title, group, cases, models, settings)?);
+        let kind = |cases: &[Case]| cases.first().map(|case| case.conditions.speed.kind);
+        let same = groups.iter().filter(|(_, name, of)| name == group && kind(of) == kind(cases));
+        let same = same.map(|(.., cases)| *cases);
+        let speed_m_per_s = settings.speed_m_per_s.or_else(|| group::common_speed(same));
+        let settings = ReportSettings { speed_m_per_s, ..settings.clone() };
+        designs.extend(group::add(&mut content, title, group, cases, models, &settings)?);
     }
     let mut ran = Vec::new();
     for scenario in scenarios {

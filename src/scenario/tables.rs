@@ -140,7 +140,8 @@ pub(crate) struct CurveTable {
     /// Free distance before contact: between the surfaces that meet, so between mid-surfaces of
     /// meshed plates less half of both thicknesses.
     pub(crate) gap: Option<LengthText>,
-    /// Name of the curve of the extension, for coupled vehicles; its gap is the slack.
+    /// Name of the curve of the extension, for coupled vehicles; its gap is the slack. It counts from the initial distance, also
+    /// after a crush.
     pub(crate) tension: Option<String>,
     /// Damper in parallel with the curve. It acts while the curve has contact, also on a stretch
     /// without force, but not where memory has left a gap; then it only pushes. With a tension

@@ -168,7 +168,7 @@ pub(crate) fn energy(curve: &Envelope, kinetic_j: f64) -> Option<f64> {
     curve.deflection_for_work(kinetic_j)
 }
 
-/// The maximum crush by every rule.
+/// The maximum crush by every rule; `v` is the speed at which the training mass has this energy.
 pub(super) fn by_all_rules(
     model: &Model,
     v: f64,

@@ -15,7 +15,7 @@ use super::models::{MODELS, ModelKind};
 use super::{CaseCurve, QueryPoint, Surrogate, Warning, WarningCode};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{ForceKind, Masses};
-use crate::dataset::{Feature, MASS, TrainingSet, nearest};
+use crate::dataset::{Feature, MASS, OTHER_MASS, TrainingSet, nearest};
 use crate::error::{Error, error};
 use crate::forest::RegressionForest;
 use crate::unit::{SpeedKind, UnitSystem};
@@ -24,8 +24,8 @@ use crate::unit::{SpeedKind, UnitSystem};
 const MOST_NAMED: usize = 8;
 /// A nearest training speed further away than this share of the speed causes a warning.
 const FAR_OUTSIDE_SHARE: f64 = 0.25;
-/// 21.6 km/h and 6 m/s are one speed.
-const ROUNDING: f64 = 1e-9;
+/// Speeds that differ by this share are one: records have five or six digits, so 13.3333 m/s is 48 km/h.
+pub(super) const ROUNDING: f64 = 1e-4;
 
 /// A surrogate fitted to a group, for the declared force and for the body's.
 #[derive(Clone, Debug)]
@@ -192,6 +192,26 @@ impl Model {
     pub(super) fn contains(&self, speed_m_per_s: f64) -> bool {
         let (low, high) = self.range_m_per_s();
         (low * (1.0 - ROUNDING)..=high * (1.0 + ROUNDING)).contains(&speed_m_per_s)
+    }
+
+    /// Speed in m/s at which the training mass (that of the first run, where they differ) has the energy of `mass_kg` at a
+    /// speed: the structure is crushed as far, and gives as much back.
+    pub(super) fn speed_of_equal_energy(&self, speed_m_per_s: f64, mass_kg: f64) -> f64 {
+        speed_m_per_s * (mass_kg / self.masses().effective_kg()).sqrt()
+    }
+
+    /// The same of a run.
+    pub(super) fn energy_speed(&self, case: &ModelCase) -> f64 {
+        let of = |name: &str| {
+            let at = self.features.iter().position(|feature| feature.parameter == name)?;
+            case.features.get(at).copied()
+        };
+        let Masses { body_kg, other_kg } = self.masses();
+        let masses = Masses {
+            body_kg: of(MASS).unwrap_or(body_kg),
+            other_kg: other_kg.map(|other_kg| of(OTHER_MASS).unwrap_or(other_kg)),
+        };
+        self.speed_of_equal_energy(case.speed_m_per_s, masses.effective_kg())
     }
 
     /// Whether the mass is among its parameters.

@@ -18,7 +18,7 @@
 use super::band::{self, Band};
 use super::max_crush::{MaxCrush, MaxCrushRule, chosen};
 use super::predicted::{Beyond, ForestQuantiles, PredictedCurve, Provenance, envelope};
-use super::query::{Query, ResolvedQuery, over_speed};
+use super::query::{Query, ResolvedQuery};
 use super::spikes::without_spikes;
 use super::warning::is_unlike;
 use super::{Model, QueryPoint, Warning};
@@ -116,7 +116,7 @@ impl<'a> Motion<'a> {
         let deflection_m = evenly(chosen(&crush, self.rule())?);
         let force_n = deflection_m.iter().map(|&d| beyond.force_at(d)).collect();
         let loading = envelope(deflection_m, force_n)?;
-        let unloading = over_speed(model, asked.v, |c| c.unloading_stiffness_n_per_m);
+        let unloading = asked.unloading_n_per_m();
         let mut warnings = model.warnings(&asked.at());
         warnings.extend(asked.warnings(unloading, loading.work() / asked.kinetic_energy_j));
         let stiffness_n_per_m = match asked.rebound(&loading) {
@@ -273,7 +273,7 @@ impl<'a> Prediction<'a> {
         // corrected.
         let is_moving = model.crush_law.is_some() || self.motion.query.energy_correct;
         let is_worse = |other: &f64| is_moving || (other - 1.0).abs() > (energy - 1.0).abs();
-        let unloading = over_speed(model, v, |c| c.unloading_stiffness_n_per_m);
+        let unloading = asked.unloading_n_per_m();
         warnings.extend(asked.warnings(unloading, body_energy.filter(is_worse).unwrap_or(energy)));
         let (crush_m, data_end_m) = (declared.end_m(), model.largest_crush_m());
         if crush_m > CRUSH_BEYOND * data_end_m {

@@ -165,23 +165,38 @@ impl<'a> ResolvedQuery<'a> {
         })
     }
 
+    /// Speed at which the training mass has the same energy.
+    fn energy_speed(&self) -> f64 {
+        self.model.speed_of_equal_energy(self.v, self.mass_kg)
+    }
+
     /// The rebound from where the body force has stopped the body.
     pub(crate) fn rebound(&self, body: &Envelope) -> Option<Rebound> {
-        // Another mass gets the same energy back: the structure's, not the car's.
+        // Another mass of the same energy crushes the structure as far and gets the same energy back: the structure's, not
+        // the car's.
         let trained_kg = self.model.masses().effective_kg();
         let top_n = stopping_force_n(body, self.kinetic_energy_j);
-        let per_mass = (trained_kg / self.mass_kg).sqrt();
+        let equal_v = self.energy_speed();
         // No body leaves faster than it came.
-        let speed = rebound_speed(self.model, self.v, last_force_n(body))?.min(self.v / per_mass);
+        let speed = rebound_speed(self.model, equal_v, last_force_n(body))?.min(equal_v);
         Some(Rebound {
-            speed_m_per_s: speed * per_mass,
+            speed_m_per_s: speed * (self.v / equal_v),
             stiffness_n_per_m: rebound_stiffness_n_per_m(top_n, trained_kg, speed)?,
         })
     }
 
     /// The maximum crush by every rule.
     pub(crate) fn max_crush(&self, declared: &Envelope, body: &Envelope) -> MaxCrush {
-        max_crush::by_all_rules(self.model, self.v, declared, body, self.kinetic_energy_j)
+        let equal_v = self.energy_speed();
+        max_crush::by_all_rules(self.model, equal_v, declared, body, self.kinetic_energy_j)
+    }
+
+    /// The unloading stiffness of the runs in N/m, interpolated in speed.
+    pub(crate) fn unloading_n_per_m(&self) -> Option<f64> {
+        let of = |case: &ModelCase| {
+            Some((self.model.energy_speed(case), case.unloading_stiffness_n_per_m?))
+        };
+        interpolate_held(&means(self.model.cases.iter().filter_map(of)), self.energy_speed())
     }
 
     /// Warnings on unloading, mass, and energy over kinetic energy.
@@ -216,10 +231,10 @@ fn mass_among(parameters: &BTreeMap<String, Parameter>, name: &str) -> Result<Op
     }
 }
 
-/// The separation speed: `F^¼ (a + b v)` with the mean force `F` before the maximum crush, `a` and `b` by
+/// The separation speed of the training mass: `F^¼ (a + b v)` with the mean force `F` before the maximum crush, `a` and `b` by
 /// least squares of the runs' ratios to it. A structure behind one fold returns the same energy whatever
 /// the force of that fold, the fold itself in proportion to it; the runs cannot separate the two, and
-/// the root lies between. The residual of a run fades with the square of the proximity in speed. Beyond the
+/// the root lies between. Runs of other masses count at the speed of equal energy. The residual of a run fades with the square of the proximity in speed. Beyond the
 /// runs the line goes on from the outermost, neither falling with the speed nor rising faster than in proportion.
 fn rebound_speed(model: &Model, v: f64, last_n: f64) -> Option<f64> {
     let (declared, body) = model.curves();
@@ -227,8 +242,10 @@ fn rebound_speed(model: &Model, v: f64, last_n: f64) -> Option<f64> {
     let of_force =
         |force_n: f64| if force_n > 0.0 { force_n.powf(SEPARATION_SPEED_EXPONENT) } else { 0.0 };
     let known = |(case, curve): (&ModelCase, &CaseCurve)| {
-        let per_force = case.rebound_speed_m_per_s? / of_force(last_force_n(curve.envelope()));
-        per_force.is_finite().then_some((case.speed_m_per_s, per_force))
+        let equal_v = model.energy_speed(case);
+        let separates = case.rebound_speed_m_per_s? * (equal_v / case.speed_m_per_s);
+        let per_force = separates / of_force(last_force_n(curve.envelope()));
+        per_force.is_finite().then_some((equal_v, per_force))
     };
     let known: Vec<(f64, f64)> = model.cases.iter().zip(curves).filter_map(known).collect();
     let line = relative_line(&known)?;
@@ -268,23 +285,10 @@ fn last_force_n(curve: &Envelope) -> f64 {
     (curve.work() - curve.work_to(from_m)) / (curve.end_m() - from_m)
 }
 
-/// A value of the cases interpolated linearly in speed, held at both ends; the mean of
-/// cases of equal speed.
-pub(super) fn over_speed(
-    model: &Model,
-    v: f64,
-    value: impl Fn(&ModelCase) -> Option<f64>,
-) -> Option<f64> {
-    over(model.cases.iter().filter_map(|c| Some((c.speed_m_per_s, value(c)?))), v)
-}
-
-/// The same for points in order of x.
-fn over(points: impl Iterator<Item = (f64, f64)>, x: f64) -> Option<f64> {
-    interpolate_held(&means(points), x)
-}
-
-/// Points in order of x with one mean of those of equal x.
+/// Points in order of x, with one mean of those of equal x.
 fn means(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+    let mut points: Vec<(f64, f64)> = points.collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut known: Vec<(f64, f64, f64)> = Vec::new();
     for (x, y) in points {
         match known.last_mut() {

@@ -162,10 +162,14 @@ fn with_ends(scenario: &Scenario) -> Scenario {
     for train in &mut changed.train {
         let inner = train.inner.take();
         let mut ahead = nose.clone();
-        for vehicle in &mut train.vehicles {
+        let last = train.vehicles.len() - 1;
+        for (k, vehicle) in train.vehicles.iter_mut().enumerate() {
             let behind = vehicle.behind.take().or(inner.clone());
             (vehicle.front, vehicle.rear) = (end(&ahead), end(&behind));
-            vehicle.gap = vehicle.gap.or(train.gap).or(gap(&behind));
+            // Nothing is behind the last one.
+            if k < last {
+                vehicle.gap = vehicle.gap.or(train.gap).or(gap(&behind));
+            }
             ahead = behind;
         }
     }

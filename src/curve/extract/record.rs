@@ -3,7 +3,7 @@
 use super::error::{ExtractError, Origin};
 use super::{Measured, MeasuredForce, Notes, Setup};
 use crate::curve::contact::milliseconds;
-use crate::curve::recipe::RecordedMotion;
+use crate::curve::recipe::{MAX_STATES, RecordedMotion};
 use crate::curve::{Curve, ForceKind, loading};
 use crate::error::error;
 use crate::history::History;
@@ -321,7 +321,16 @@ fn relative(
 /// The force in N, in the direction of the file, at its own rate.
 fn force(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<(Signal, Notes), ExtractError> {
     let units = measured.units;
-    let mass = setup.masses.body_kg;
+    let others = measured.minus_displacement.and_then(|history| history.entity);
+    let mass = match (&measured.force, setup.masses.other_kg) {
+        // The node of the other body.
+        (MeasuredForce::Body(history, _), Some(other_kg))
+            if others.is_some() && history.entity == others =>
+        {
+            other_kg
+        }
+        _ => setup.masses.body_kg,
+    };
     let of = |history, factor, what| Signal::of(history, units, factor, what, Origin::Force);
     match measured.force {
         MeasuredForce::Contact(history) => of(history, units.force(), "force"),
@@ -379,12 +388,16 @@ pub(super) fn sample(
     }
     let (end_s, window_s) = (at[loading::loading_end(original)], times[times.len() - 1]);
     if window_s < end_s && times.len() == sampling.states && setup.stated.truncate_s.is_none() {
+        let states = (end_s / sampling.interval_s).ceil() + 1.0;
+        let remedy = match states <= MAX_STATES as f64 {
+            true => format!("raise states to {states:.0} or more"),
+            false => "lengthen interval_ms".into(),
+        };
         return Err(error!(
             Run at "sampling",
-            "recipe.sampling has {sampling}, which ends {} after contact, before the maximum crush at {}: raise states to {:.0} or more, or set truncate in the run",
+            "recipe.sampling has {sampling}, which ends {} after contact, before the maximum crush at {}: {remedy}, or set truncate in the run",
             milliseconds(window_s),
-            milliseconds(end_s),
-            (end_s / sampling.interval_s).ceil() + 1.0
+            milliseconds(end_s)
         )
         .into());
     }
