@@ -351,8 +351,8 @@ impl UnitSystem {
     pub(crate) const CUSTOMARY: [&'static str; 2] = ["in-slinch-s", "ft-slug-s"];
 
     /// The system in which a density and a Young's modulus are those of a metal: 1 600 to 9 000 kg/m³ and a speed of sound
-    /// √(E/ρ) of 4.3 to 5.7 km/s. Steel, aluminium, magnesium and titanium have 5.0 to 5.2 km/s; two systems differ by a
-    /// factor of more than 25 in one of the two.
+    /// √(E/ρ) of 4.3 to 5.7 km/s. Steel, aluminium, magnesium and titanium have 5.0 to 5.2 km/s. No two of these
+    /// systems differ by less than both windows are wide.
     pub(crate) fn of_metal(density: f64, modulus: f64) -> Option<Self> {
         const OTHERS: [&str; 4] = ["m-t-s", "cm-g-s", "mm-kg-s", "mm-g-s"];
         let names = Self::USUAL.iter().chain(&Self::CUSTOMARY).chain(&OTHERS);

@@ -647,6 +647,16 @@ fn a_recorded_force_at_contact_is_exported() {
         }
         assert_eq!(begins(&fs::read_to_string(here.join("a.csv")).unwrap()), 1e6);
     }
+    // What unloads with the steepest rise rebounds all the same.
+    for case in ["36kmh", "48kmh", "60kmh"] {
+        let of = ["--group", "lead-car-wall", "--case", case, "--force", "contact"];
+        let notes = export_notes(here, "curves.h5", &[&of[..], &["-o", "case.k"]].concat());
+        let said = notes.split("restitution ").nth(1).unwrap();
+        let (theirs, rest) = said.split_once(" in LS-DYNA").unwrap();
+        let ours = rest.split_once("), ").unwrap().1.split_once(' ').unwrap().0;
+        let [theirs, ours] = [theirs, ours].map(|number| number.parse::<f64>().unwrap());
+        assert!((theirs / ours - 1.0).abs() < 0.03, "{case}: {notes}");
+    }
     // Crumple's own run of the export is that of the curve.
     let run = |file: &str| {
         let text = format!(

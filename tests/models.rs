@@ -766,24 +766,22 @@ fn energy_correction_has_bounds() {
         energy_correct: true,
         ..Query::at(11.0)
     };
-    let curve = predict(&model, &ask(25e3)).unwrap();
+    let curve = predict(&model, &ask(48e3)).unwrap();
     assert!((curve.provenance.body_energy_over_kinetic.unwrap() - 1.0).abs() < 1e-12);
     // The contact force also stops the crush zone, so its work is another: both are scaled alike.
-    let plain = predict(&model, &Query { energy_correct: false, ..ask(25e3) }).unwrap().provenance;
+    let plain = predict(&model, &Query { energy_correct: false, ..ask(48e3) }).unwrap().provenance;
     let factor = 1.0 / plain.body_energy_over_kinetic.unwrap();
     let scaled = factor * plain.energy_over_kinetic;
     assert!((curve.provenance.energy_over_kinetic / scaled - 1.0).abs() < 1e-12);
-    assert!((factor - 1.0).abs() > 0.005, "{factor}");
+    assert!((factor - 1.0).abs() > 0.01, "{factor}");
     assert!(curve.warnings.iter().any(|w| w.code.name() == "energy_corrected"));
     // By the motion the body stops where its force has absorbed the energy.
-    let by_motion = Query { rule: Some(MaxCrushRule::Motion), ..ask(25e3) };
+    let by_motion = Query { rule: Some(MaxCrushRule::Motion), ..ask(48e3) };
     let by_motion = predict(&model, &by_motion).unwrap();
     let said = by_motion.warnings.iter().find(|w| w.code.name() == "energy_corrected");
     assert!(said.unwrap().message.starts_with("there was nothing to correct"), "{said:?}");
     // The crush of twice the mass is that of 24 t at the same energy; that of twenty times it, far beyond the runs, is
     // not a matter of scale.
-    let twice = predict(&model, &ask(48e3)).unwrap().provenance;
-    assert!((twice.body_energy_over_kinetic.unwrap() - 1.0).abs() < 1e-12);
     let error = predict(&model, &ask(480e3)).map(|_| ()).unwrap_err().to_string();
     assert!(error.contains("outside 0.8 to 1.25"), "{error}");
 }

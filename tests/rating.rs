@@ -207,7 +207,7 @@ fn parts_and_units_are_said() {
     let columns = [
         ("time_s,acc_g", "g", "write the factor after the file's name: c.csv,scale=9.80665"),
         ("time_s,acc [mm/s^2]", "mm/s²", "c.csv,scale=0.001"),
-        ("time_s,force_kN", "kN", "which are different quantities"),
+        ("time_s,force_kN", "kN", "they are different quantities"),
     ];
     for (header, unit, remedy) in columns {
         write(here, "c.csv", header, 200, |t| format!("{t:?},{:?}", pulse(t)));

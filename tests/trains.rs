@@ -1084,8 +1084,20 @@ fn the_unloading_stiffness_bottoms() {
     std::fs::write(here.join("s.toml"), without).unwrap();
     says(
         &crumple_fails(here, 1, "simulate s.toml"),
-        "it never rises and has no unloading stiffness, so it cannot bottom",
+        "it never rises, so it cannot bottom: write end = \"hold\"",
     );
+    let held = std::fs::read_to_string(here.join("s.toml")).unwrap().replace("bottom", "hold");
+    std::fs::write(here.join("s.toml"), held).unwrap();
+    crumple_ok(here, "simulate s.toml -q");
+    // A model's curve bottoms with what is asked for, and nothing is softer than that.
+    let demo = demo_folder();
+    for stiffness in ["150MN/m", "200MN/m", "311.7MN/m"] {
+        let text = format!(
+            "[run]\nduration = \"200ms\"\noutput_interval = \"0.75ms\"\n[curves]\nn = {{ model = \"lead.model\", force = \"body\", unloading = \"{stiffness}\" }}\n[[train]]\nname = \"A\"\nspeed = \"48km/h\"\nvehicles = [ {{ name = \"A1\", mass = \"24t\" }} ]\n[wall]\n[contact]\ncurve = \"n\"\n"
+        );
+        std::fs::write(demo.path().join("s.toml"), text).unwrap();
+        crumple_ok(demo.path(), "simulate s.toml -q --strict");
+    }
 }
 
 /// A body between a constant force and a lighter one chatters: its contact opens and closes all the time, and is one.

@@ -266,7 +266,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
                 b.path().display(),
                 size_b / size_a
             ),
-            false => "which are different quantities".into(),
+            false => "they are different quantities".into(),
         };
         rating.warnings.push(format!(
             "according to their names, the reference is in {of_a} and the prediction in {of_b}, and they are compared as they stand: {remedy}"

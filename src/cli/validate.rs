@@ -367,11 +367,9 @@ fn print_summary(out: &mut dyn Write, validation: &Validation) -> io::Result<()>
             Some(share) => format!("covers {:.0} % of the left-out points", share * 100.0),
             None => "not checked".into(),
         };
-        writeln!(
-            out,
-            "band of the {force} {place}: ±{:.0} %, {coverage}",
-            band.pointwise_share * 100.0
-        )?;
+        let width = band.pointwise_share * 100.0;
+        let digits = usize::from(width < 1.0);
+        writeln!(out, "band of the {force} {place}: ±{width:.digits$} %, {coverage}")?;
     }
     Ok(())
 }

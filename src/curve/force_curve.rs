@@ -21,7 +21,7 @@ use crate::unit::SpeedKind;
 /// A force–deflection curve that can drive an interface, with what its source knows of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ForceCurve {
-    /// Loading branch from (0, 0) to the maximum crush.
+    /// Loading branch to the maximum crush, from 0 on; of a recorded curve the first force need not be 0.
     pub loading: Envelope,
     /// The same force along deflections of which some lie beyond the maximum crush: neighbours
     /// in a train keep pushing where a body by itself would have stopped.

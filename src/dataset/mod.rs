@@ -252,7 +252,7 @@ pub enum TableKind {
 pub(crate) const GRID_M: f64 = 2e-3;
 
 /// Speeds within this share of each other count as one.
-const SAME_SPEED: f64 = 1e-3;
+pub(crate) const SAME_SPEED: f64 = 1e-3;
 
 pub(crate) fn is_same_speed(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() <= SAME_SPEED

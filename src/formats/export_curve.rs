@@ -119,13 +119,13 @@ impl ExportCurve {
         Self { loading, end, band: None, ..self }
     }
 
-    /// The same curve for tools that need the origin: a force at contact is reached over a
-    /// thousandth of the maximum crush, with the same energy.
+    /// The same curve for tools that need the origin: a force at contact is reached as steeply as the curve rises or unloads,
+    /// with the same energy.
     ///
     /// # Errors
     /// If the result is not a valid curve.
     pub(crate) fn begun_at_origin(&self) -> Result<Self, Error> {
-        Ok(match from_origin(&self.loading, self.end)? {
+        Ok(match from_origin(&self.loading, self.end, self.stiffness_n_per_m())? {
             Some((loading, end)) => self.clone().through(loading, end),
             None => self.clone(),
         })
@@ -197,13 +197,12 @@ impl ExportCurve {
 
     /// Separation speed over impact speed, as the target unloads from the maximum crush.
     pub(crate) fn restitution(&self, unloading: TargetUnloading) -> f64 {
+        let stop_m = self.stop_m(&self.loading);
         let stored_j = match unloading {
-            TargetUnloading::Line(stiffness) => 0.5 * self.end_n() * self.end_n() / stiffness,
-            // A body stops where the curve has taken up its energy.
-            TargetUnloading::Elastic => {
-                let work_j = self.loading.work_to(self.max_crush_m());
-                work_j.min(self.predicted.provenance.kinetic_energy_j)
+            TargetUnloading::Line(stiffness) => {
+                0.5 * self.loading.force_at(stop_m).powi(2) / stiffness
             }
+            TargetUnloading::Elastic => self.loading.work_to(stop_m),
         };
         self.restitution_of(stored_j)
     }
@@ -222,9 +221,18 @@ impl ExportCurve {
     pub fn own_restitution(&self) -> f64 {
         let own = self.predicted.envelope().map(ForceCurve::bare);
         let own = own.map(|curve| curve.unloading_with(self.stiffness_n_per_m()));
-        let law = own.map(|curve| ForceLaw::of_curve(&curve, None, EnvelopeEnd::Hold));
-        let end_m = self.predicted.max_deflection_m;
-        self.restitution_of(law.unwrap_or_else(|_| self.law()).energies_j(end_m, end_m).0)
+        let curve = own.unwrap_or_else(|_| self.driving());
+        let stop_m = self.stop_m(&curve.loading);
+        let law = ForceLaw::of_curve(&curve, None, EnvelopeEnd::Hold);
+        self.restitution_of(law.energies_j(stop_m, stop_m).0)
+    }
+
+    /// Where a curve has taken up the energy of its own impact, in m: at its maximum crush at the latest.
+    fn stop_m(&self, curve: &Envelope) -> f64 {
+        let kinetic_j = self.predicted.provenance.kinetic_energy_j;
+        curve
+            .deflection_for_work(kinetic_j)
+            .map_or(self.max_crush_m(), |d| d.min(self.max_crush_m()))
     }
 
     /// Separation speed over impact speed, from the energy in J that is returned.

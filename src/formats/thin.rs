@@ -216,31 +216,37 @@ const REACH: f64 = 0.95;
 /// Forces are raised by at most this factor.
 const MOST_RAISED: f64 = 1.25;
 
-/// The curve from the origin: a force at zero deflection is reached within a thousandth of the deflection of
-/// `end`, at the same energy to there. The second value is the index of `end` among the points. `None` for a
-/// curve that begins at the origin already.
+/// The curve from the origin: a force at zero deflection is reached on a line as steep as the curve's steepest rise, or its
+/// `unloading_n_per_m` if that is more, at the same energy to the deflection of `end`; so no rise is new to a tool that
+/// unloads with the steepest one. The second value is the index of `end` among the points. `None` for a curve that begins
+/// at the origin already.
 pub(crate) fn from_origin(
     curve: &Envelope,
     end: usize,
+    unloading_n_per_m: f64,
 ) -> Result<Option<(Envelope, usize)>, Error> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
     if f[0] <= 0.0 {
         return Ok(None);
     }
-    let ramp_m = (RAMP * d[end]).min(0.5 * d[1]);
-    let mut deflection_m = d.to_vec();
-    let mut force_n = f.to_vec();
-    deflection_m.insert(1, ramp_m);
-    force_n.insert(1, curve.force_at(ramp_m));
-    force_n[0] = 0.0;
+    // No softer than a line to half of the maximum crush, which the curve goes on from.
+    let slope = unloading_n_per_m.max(curve.max_slope()).max(f[0] / (0.5 * d[end]));
+    let meets = (1..=end).find(|&i| slope * d[i] >= f[i]).unwrap_or(end);
+    let (d0, f0, d1, f1) = (d[meets - 1], f[meets - 1], d[meets], f[meets]);
+    // Where the line from the origin crosses the segment.
+    let along = (f1 - f0) / (d1 - d0);
+    let ramp_m = ((f0 - along * d0) / (slope - along)).clamp(d0, d1);
+    let mut deflection_m = vec![0.0, ramp_m];
+    let mut force_n = vec![0.0, curve.force_at(ramp_m)];
+    let rest = if ramp_m < d1 { meets } else { meets + 1 };
+    deflection_m.extend_from_slice(&d[rest..]);
+    force_n.extend_from_slice(&f[rest..]);
+    let end = end + 2 - rest;
     let plain = Envelope::new(deflection_m.clone(), force_n.clone())?;
-    let scale = curve.work_to(d[end]) / plain.work_to(d[end]);
-    force_n[..=end + 1].iter_mut().for_each(|f| *f *= scale);
-    Ok(Some((Envelope::new(deflection_m, force_n)?, end + 1)))
+    let scale = curve.work_to(deflection_m[end]) / plain.work_to(deflection_m[end]);
+    force_n[..=end].iter_mut().for_each(|f| *f *= scale);
+    Ok(Some((Envelope::new(deflection_m, force_n)?, end)))
 }
-
-/// A force at contact is reached over this share of the maximum crush.
-const RAMP: f64 = 1e-3;
 
 #[cfg(test)]
 mod tests {
@@ -309,11 +315,19 @@ mod tests {
     #[test]
     fn a_force_at_contact_begins_at_the_origin_with_the_same_energy() {
         let constant = Envelope::new(vec![0.0, 0.2, 1.0], vec![2e6; 3]).unwrap();
-        let (ramped, end) = from_origin(&constant, 2).unwrap().unwrap();
+        let (ramped, end) = from_origin(&constant, 2, 400e6).unwrap().unwrap();
         assert_eq!((ramped.force_n()[0], ramped.deflection_m()[end]), (0.0, 1.0));
         assert!((ramped.work() / constant.work() - 1.0).abs() < 1e-12);
-        assert!((ramped.force_at(0.5) / 2e6 - 1.0).abs() < 1e-3);
-        assert_eq!(from_origin(&ramped, end).unwrap(), None);
+        assert!((ramped.force_at(0.5) / 2e6 - 1.0).abs() < 3e-3);
+        assert!((ramped.max_slope() / 400e6 - 1.0).abs() < 3e-3);
+        assert_eq!(from_origin(&ramped, end, 400e6).unwrap(), None);
+        // A curve that rises from its first force: the line meets it further on, and nothing is steeper.
+        let d = vec![0.0, 0.001, 0.002, 0.1, 1.0];
+        let rising = Envelope::new(d, vec![1e6, 1.2e6, 2e6, 1e6, 1e6]).unwrap();
+        let (ramped, end) = from_origin(&rising, 4, 100e6).unwrap().unwrap();
+        assert_eq!(ramped.deflection_m()[end], 1.0);
+        assert!((ramped.work() / rising.work() - 1.0).abs() < 1e-12);
+        assert!((ramped.max_slope() / 800e6 - 1.0).abs() < 3e-3, "{}", ramped.max_slope());
     }
 
     #[test]

@@ -43,7 +43,8 @@ const DECELERATION_M_PER_S2: Range = Range { low: 0.2, high: 5e3, usual: 100.0, 
 /// From a test body to a train.
 const MASS_KG: Range = Range { low: 1.0, high: 5e6, usual: 15e3, spread: 8.0 };
 
-/// In [`UnitSystem::CUSTOMARY`] the numbers of a usual impact are those of a slow one in millimetres or metres. By so much more usual an impact has to be in each of these to put the metric system in doubt: a foot is not far from a metre.
+/// In [`UnitSystem::CUSTOMARY`] the numbers of a usual impact are those of a slow one in millimetres or metres. By so much
+/// more usual an impact has to be in each of these to put the metric system in doubt: a foot is not far from a metre.
 const DOUBT: [f64; 2] = [5.0, 2.0];
 /// A name may round a speed to this share of it.
 const NAMED: f64 = 0.1;

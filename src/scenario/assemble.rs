@@ -316,7 +316,7 @@ impl<'a> Builder<'a> {
         speed: f64,
     ) -> Result<(Interface, CurveInUse), Error> {
         let (model, scale) = self.model(end.curve)?;
-        let crush = crush_end(model, end, speed, scale)
+        let crush = crush_end(model, end, slot.mass_kg, speed, scale)
             .map_err(|source| self.no_spring(end.curve, source))?;
         let (stopping, (interface, used)) =
             (crush.stopping.clone(), self.crushed(slot, end.curve, crush)?);

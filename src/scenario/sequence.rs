@@ -30,6 +30,8 @@ pub(crate) enum Happening {
     ContactAgain,
     /// A coupling that has opened begins to pull.
     Pull,
+    /// It no longer pulls.
+    Slack,
 }
 
 impl Happening {
@@ -43,6 +45,7 @@ impl Happening {
             Self::Opened => "separation".into(),
             Self::ContactAgain => "contact again".into(),
             Self::Pull => "pull".into(),
+            Self::Slack => "slack".into(),
         }
     }
 }
@@ -106,7 +109,9 @@ fn contacts(time_s: &[f64], history: &InterfaceHistory) -> Vec<(f64, Happening)>
         let again = (open..time_s.len()).find(|k| is_loaded(*k));
         let end = again.unwrap_or(time_s.len() - 1);
         if time_s[end] - time_s[open] >= OPEN_S {
-            events.push((opened_s(time_s, &history.force_n, open), Happening::Opened));
+            let pulled = history.force_n[open - 1] < 0.0;
+            let what = if pulled { Happening::Slack } else { Happening::Opened };
+            events.push((opened_s(time_s, &history.force_n, open), what));
             let begun = |k: usize| {
                 let pulls = history.force_n[k] < 0.0;
                 let what = if pulls { Happening::Pull } else { Happening::ContactAgain };

@@ -195,11 +195,11 @@ impl Spring {
             None => self.curve,
         };
         let rises = curve.unloading.stiffness_n_per_m().unwrap_or(curve.loading.max_slope()) > 0.0;
-        if table.end == Some(EnvelopeEnd::Bottom) && !rises {
-            return Err(error!(
-                Scenario at "end",
-                "it never rises and has no unloading stiffness, so it cannot bottom with one: give unloading = \"…MN/m\", or end = \"hold\""
-            ));
+        let is_elastic = table.law == LawName::Elastic;
+        if table.end == Some(EnvelopeEnd::Bottom) && is_elastic && !rises {
+            return Err(
+                error!(Scenario at "end", "it never rises, so it cannot bottom: write end = \"hold\""),
+            );
         }
         let curve = curve.continued(tail).map_err(envelope_error)?;
         Ok(Self { curve, end, ..self })
@@ -230,7 +230,8 @@ impl Spring {
             ));
         }
         if let Some(asked) = asked
-            && asked < steepest
+            // The tail of the curve rises with it, but for rounding.
+            && asked < steepest * (1.0 - 1e-9)
             && table.stages.is_none()
         {
             warnings.push(format!(
@@ -324,6 +325,7 @@ const MIN_END_COMPLIANCE_SHARE: f64 = 0.1;
 pub(super) fn crush_end(
     model: &Model,
     end: &End<'_>,
+    vehicle_kg: f64,
     closing_m_per_s: f64,
     scale: f64,
 ) -> Result<Crush, Error> {
@@ -332,7 +334,7 @@ pub(super) fn crush_end(
     let (law, at) = crush_curve(model, speed_m_per_s)?;
     let loading = coordinates.per_end(&at.standing_n, scale)?;
     let stopped_kg = coordinates.per_end(&at.stopped_kg, coordinates.deflection)?;
-    let stiffness = model.unloading_n_per_m(speed_m_per_s);
+    let stiffness = model.unloading_n_per_m(speed_m_per_s, vehicle_kg);
     // The plates give way, too: half as much for each of two ends.
     let plates_m_per_n = if end.at == Role::Wall { 1.0 } else { 0.5 } / PLATES_N_PER_M;
     let of_end = |k: f64| {
@@ -384,7 +386,7 @@ pub(super) fn crush_between(
     let deflection_m = at.standing_n.deflection_m().to_vec();
     let points = deflection_m.iter().zip(at.standing_n.force_n());
     let force_n = points.map(|(&d, f)| f * scale * factor(d)).collect();
-    let stiffness = model.unloading_n_per_m(speed_m_per_s).map(|k| k * scale);
+    let stiffness = model.unloading_n_per_m(speed_m_per_s, slot.mass_kg).map(|k| k * scale);
     let unloading = CurveUnloading::of(stiffness);
     let curve = ForceCurve::bare(Envelope::new(deflection_m, force_n).map_err(below)?);
     let sensitivity_sqrt_s_per_m = law.sensitivity;

@@ -15,7 +15,7 @@ use super::models::{MODELS, ModelKind};
 use super::{CaseCurve, QueryPoint, Surrogate, Warning, WarningCode};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{ForceKind, Masses};
-use crate::dataset::{Feature, MASS, OTHER_MASS, TrainingSet, nearest};
+use crate::dataset::{Feature, MASS, OTHER_MASS, SAME_SPEED, TrainingSet, nearest};
 use crate::error::{Error, error};
 use crate::forest::RegressionForest;
 use crate::unit::{SpeedKind, UnitSystem};
@@ -24,9 +24,6 @@ use crate::unit::{SpeedKind, UnitSystem};
 const MOST_NAMED: usize = 8;
 /// A nearest training speed further away than this share of the speed causes a warning.
 const FAR_OUTSIDE_SHARE: f64 = 0.25;
-/// Speeds that differ by this share are one: records have five or six digits, so 13.3333 m/s is 48 km/h.
-pub(super) const ROUNDING: f64 = 1e-4;
-
 /// A surrogate fitted to a group, for the declared force and for the body's.
 #[derive(Clone, Debug)]
 pub struct Model {
@@ -191,7 +188,7 @@ impl Model {
     /// Whether a speed lies between the training speeds, but for the rounding of units.
     pub(super) fn contains(&self, speed_m_per_s: f64) -> bool {
         let (low, high) = self.range_m_per_s();
-        (low * (1.0 - ROUNDING)..=high * (1.0 + ROUNDING)).contains(&speed_m_per_s)
+        (low * (1.0 - SAME_SPEED)..=high * (1.0 + SAME_SPEED)).contains(&speed_m_per_s)
     }
 
     /// Speed in m/s at which the training mass (that of the first run, where they differ) has the energy of `mass_kg` at a
@@ -312,10 +309,11 @@ impl Model {
         Some((law, law.at(&self.curves.declared, speed_m_per_s)?))
     }
 
-    /// Stiffness in N/m of the line on which a body leaves the crush force at a speed, linear
+    /// Stiffness in N/m of the line on which a body of `mass_kg`, or two of that mass, leave the crush force at a speed, linear
     /// between the runs: that with which it rebounds as fast as it did, or else the recorded one of
     /// the declared force.
-    pub(crate) fn unloading_n_per_m(&self, speed_m_per_s: f64) -> Option<f64> {
+    pub(crate) fn unloading_n_per_m(&self, speed_m_per_s: f64, mass_kg: f64) -> Option<f64> {
+        let equal_v = speed_m_per_s * (mass_kg / self.mass_kg).sqrt();
         let moved_kg = self.masses().effective_kg();
         let of = |(case, curve): (&ModelCase, &CaseCurve)| {
             let top_n = curve.force_at(curve.end_m());
@@ -327,7 +325,7 @@ impl Model {
         };
         let known: Vec<(f64, f64)> =
             self.cases.iter().zip(&self.curves.declared).filter_map(of).collect();
-        interpolate_held(&known, speed_m_per_s)
+        interpolate_held(&known, equal_v)
     }
 
     /// The training curves: of the declared force, and of the body's where it is another.

@@ -19,7 +19,7 @@ const LEAST_FREE: f64 = 0.9;
 /// A predicted curve: the master format of exports (JSON).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PredictedCurve {
-    /// Loading branch from (0, 0) to the maximum crush.
+    /// Loading branch to the maximum crush, from 0 on; of a recorded curve the first force need not be 0.
     pub deflection_m: Vec<f64>,
     /// Force in N, one value per deflection; `provenance.force_kind` states which force it is.
     #[serde(rename = "force_N")]

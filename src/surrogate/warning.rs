@@ -5,8 +5,8 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::model::ROUNDING;
 use crate::curve::Masses;
+use crate::dataset::SAME_SPEED;
 use crate::plural::counted;
 use crate::unit::{Shown, km_per_h};
 
@@ -65,7 +65,7 @@ const FAR_OUTSIDE: f64 = 1.0 / 3.0;
 pub(super) fn is_far_outside(speed_m_per_s: f64, low: f64, high: f64) -> bool {
     let outside = (low - speed_m_per_s).max(speed_m_per_s - high);
     // A third of a range of km/h is not a number of m/s, and one speed has no range.
-    outside > (FAR_OUTSIDE * (high - low) * (1.0 + 1e-9)).max(ROUNDING * high)
+    outside > (FAR_OUTSIDE * (high - low) * (1.0 + 1e-9)).max(SAME_SPEED * high)
 }
 
 /// `9 km/h is 16 km/h below the lowest training speed (25 km/h to 72 km/h)`.

@@ -76,7 +76,7 @@ pub(crate) fn bind(plan: &Plan, scenario: &Scenario) -> Result<(Vec<Variable>, D
             if let Some(before) = variables.iter().find(|v| variable.replaces(v)) {
                 return Err(named(error!(
                     Sweep,
-                    "{} would replace what {} has set: vary each quantity once, or by a factor behind its values",
+                    "{} would replace what {} has set: vary each quantity once (of several vehicles name the others), or by a factor behind its values",
                     variable.column,
                     before.column
                 )));

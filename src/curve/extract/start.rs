@@ -73,7 +73,7 @@ impl Start {
                 None => "the record begins there, and the first touch may be earlier",
             };
             remarks.warn(format!(
-                "contact: found at {}, where the body starts to slow down; {earlier}, and the crush is too short by the distance travelled in between: name the contact force in the recipe (contact = {{ file = \"rwforc\", id = 1, component = \"normal_force\" }}), or set contact_time in the run",
+                "contact: found at {}, where the body starts to slow down; {earlier}, and the crush is too short by the distance travelled in between: name the contact force in the recipe (contact = {{ file = …, id = …, component = … }}, the wall's in rwforc or the contact's in rcforc), or set contact_time in the run",
                 milliseconds(onset.time_s)
             ));
         }

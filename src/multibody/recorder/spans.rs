@@ -10,8 +10,8 @@
 /// at the next look has not ended.
 pub(super) const LEAST_N: f64 = 1e3;
 const LEAST_SHARE: f64 = 0.005;
-/// Spans that counted when they ended. The first that counts at the end of the run is among them.
-const MOST_SPANS: usize = 64;
+/// By so much a span has to be larger than those before it to be kept, so that few are.
+const LARGER: f64 = 1.1;
 /// Time between looks in s, if steps are not longer.
 pub(in super::super) const LOOK_S: f64 = 0.25e-3;
 
@@ -222,14 +222,14 @@ impl Spans {
         if self.largest.is_none_or(|largest| span.change() > largest.change()) {
             self.largest = Some(span);
         }
-        if self.closed.len() == MOST_SPANS {
-            let mut closed = std::mem::take(&mut self.closed);
-            closed.retain(|span| self.counts(span));
-            self.closed = closed;
+        let mut closed = std::mem::take(&mut self.closed);
+        closed.retain(|span| self.counts(span));
+        // One that is hardly larger than one before it is never the first that counts.
+        let is_new = closed.last().is_none_or(|last| span.change() >= LARGER * last.change());
+        if is_new && self.counts(&span) {
+            closed.push(span);
         }
-        if self.counts(&span) && self.closed.len() < MOST_SPANS {
-            self.closed.push(span);
-        }
+        self.closed = closed;
     }
 
     /// Whether a span counts beside the largest so far.
@@ -328,7 +328,7 @@ mod tests {
         let first = spans.first().unwrap();
         assert_eq!(first.times_s(), (0.0, moment(499, 0.05e-3, 0.0).time_s));
         assert!((first.mean_deceleration() * first.end.time_s + 1.0).abs() < 1e-12);
-        assert_eq!((spans.closed.len(), spans.main()), (2, None));
+        assert_eq!(spans.main(), None);
     }
 
     #[test]
@@ -353,5 +353,9 @@ mod tests {
         let small = |k: i32| span(f64::from(k), if k % 2 == 0 { 9.999 } else { 10.001 });
         let many: Vec<Span> = (0..200).map(small).chain([span(200.0, 5.0)]).collect();
         assert_eq!(of(&many).first(), many.last());
+        let growing: Vec<Span> = (0..300).map(|k| span(f64::from(k), 9.99)).collect();
+        let (half, large) = (span(300.0, 9.5), span(301.0, 5.0));
+        let found = of(&[&growing[..], &[half, large]].concat());
+        assert_eq!((found.first(), found.main()), (Some(&half), Some(&large)));
     }
 }
