@@ -1379,6 +1379,34 @@ fn walls_that_act_one_after_the_other_are_added() {
     says(&said, "if it stops the body, use --force rwforc:1+2");
     let said = warned(here, "init share --force rwforc:1 -o one.toml");
     assert!(!said.contains("also acts"), "{said}");
+    // One odd run makes no sum of what the others must not add: there the second wall takes a blow of something else.
+    for (name, km_per_h, is_odd) in
+        [("40kmh", 40.0, false), ("50kmh", 50.0, false), ("55kmh", 55.0, true)]
+    {
+        let history = Crash { speed_m_per_s: km_per_h / 3.6, ..Crash::default() }.run();
+        let crush = &history.bodies[0].displacement_m[4];
+        let share = |x: f64| if is_odd { ((x - 0.25) / 0.02).clamp(0.0, 1.0) } else { 0.0 };
+        let taken: Vec<f64> =
+            history.contact_n.iter().zip(crush).map(|(f, x)| f * share(*x)).collect();
+        let first: Vec<f64> = history.contact_n.iter().zip(&taken).map(|(f, s)| f - s).collect();
+        let blow = |t: &f64| if *t < 0.02 { 100e3 } else { 0.0 };
+        let second = if is_odd { taken } else { history.time_s.iter().map(blow).collect() };
+        let run = here.join(format!("odd/{name}"));
+        layout.nodout(&run, &history, &car_nodes());
+        let wall = |id, along_n| Force { id, title: "", along_n, across_n: 0.0 };
+        layout.rwforc(&run, &history, &[wall(1, &first), wall(2, &second)]);
+    }
+    let said = warned(here, "init odd -o odd.toml");
+    let odd = study(here, "odd.toml");
+    assert!(!said.contains("residual"), "{said}");
+    let text = fs::read_to_string(here.join("odd.toml")).unwrap();
+    says(&text, "odd/55kmh: it needs a different recipe from the other runs");
+    assert_eq!(odd["recipe"]["force"]["id"].as_integer(), Some(1));
+    let runs = odd["run"].as_array().unwrap();
+    assert_eq!(runs.len(), 2);
+    for run in runs {
+        assert!((number(&run["mass"], "t") / 1.2 - 1.0).abs() < 1e-2, "{run}");
+    }
     // The user may ask for the sum.
     crumple_ok(here, "init walls --force rwforc:2+1 -o given.toml");
     let given = study(here, "given.toml");

@@ -114,10 +114,10 @@ impl CommonRecipe {
         let explained = views.iter().filter_map(|view| view.explained.as_ref().ok()?.as_ref());
         let opposed = explained.map(|explained| explained.residual).fold(0.0, f64::max);
         let given = [hints.node, hints.minus_node];
-        let nodes: Vec<ChosenNode> = (0..if kind == StudyKind::Pair { 2 } else { 1 })
-            .filter_map(|slot| choose(&views, slot, given[slot], force.is_some()))
-            .collect();
         let are_given = hints.node.is_some() || hints.force.is_some();
+        let nodes: Vec<ChosenNode> = (0..if kind == StudyKind::Pair { 2 } else { 1 })
+            .filter_map(|slot| choose(&views, slot, given[slot], force.is_some(), are_given))
+            .collect();
         Some(Self {
             kind,
             direction,
@@ -287,7 +287,7 @@ struct NodeTally<'a> {
     is_centre: bool,
     /// In which it can represent the body.
     runs: usize,
-    /// The largest of all runs.
+    /// The largest of all runs that are not left out for it.
     residual: f64,
     /// Of all runs together, and how many that are.
     roughness: f64,
@@ -301,6 +301,7 @@ fn choose(
     slot: usize,
     given: Option<i64>,
     by_force: bool,
+    are_given: bool,
 ) -> Option<ChosenNode> {
     let mut tallies: BTreeMap<i64, NodeTally<'_>> = BTreeMap::new();
     for run in views.iter().filter(|view| view.counts).map(|view| view.nodes_of(slot)) {
@@ -310,10 +311,16 @@ fn choose(
             let limit =
                 if is_centre { best + CENTRE_AS_GOOD } else { AS_GOOD.0 * best + AS_GOOD.1 };
             let (runs, roughness, seen) = (0, 0.0, 0.0);
-            let empty = NodeTally { node, is_centre, runs, residual: 0.0, roughness, seen };
+            let empty = NodeTally { node, is_centre, runs, residual, roughness, seen };
             let tally = tallies.entry(node.id).or_insert(empty);
             tally.runs += usize::from(residual <= limit);
-            tally.residual = tally.residual.max(residual);
+            // A run in which it does not follow the force is left out, and says nothing of the others.
+            let is_left_out = |residual: f64| !are_given && residual >= RELATED;
+            tally.residual = match (is_left_out(tally.residual), is_left_out(residual)) {
+                (true, false) => residual,
+                (false, true) => tally.residual,
+                _ => tally.residual.max(residual),
+            };
             tally.roughness += node.roughness;
             tally.seen += 1.0;
         }
