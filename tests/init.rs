@@ -1336,19 +1336,25 @@ fn walls_that_act_one_after_the_other_are_added() {
     let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
-    // The second is not reached at 20 km/h, hardly loaded at 30.
-    for km_per_h in [20.0, 30.0, 50.0, 60.0] {
+    // A run with two walls, of which the second takes a share of the contact that depends on the crush, and a blow besides.
+    let two_walls = |run: &str, km_per_h: f64, share: &dyn Fn(f64) -> f64, blow_n: f64| {
         let history = Crash { speed_m_per_s: km_per_h / 3.6, ..Crash::default() }.run();
-        // The second takes over from the first.
         let crush = &history.bodies[0].displacement_m[4];
-        let share = |x: f64| ((x - 0.25) / 0.02).clamp(0.0, 1.0);
-        let second: Vec<f64> =
+        let taken: Vec<f64> =
             history.contact_n.iter().zip(crush).map(|(f, x)| f * share(*x)).collect();
-        let first: Vec<f64> = history.contact_n.iter().zip(&second).map(|(f, s)| f - s).collect();
-        let run = here.join(format!("walls/{km_per_h}kmh"));
+        let first: Vec<f64> = history.contact_n.iter().zip(&taken).map(|(f, s)| f - s).collect();
+        let blow = |t: f64| if t < 0.02 { blow_n } else { 0.0 };
+        let second: Vec<f64> =
+            history.time_s.iter().zip(&taken).map(|(t, f)| f + blow(*t)).collect();
+        let run = here.join(run);
         layout.nodout(&run, &history, &car_nodes());
         let wall = |id, along_n| Force { id, title: "", along_n, across_n: 0.0 };
         layout.rwforc(&run, &history, &[wall(1, &first), wall(2, &second)]);
+    };
+    // The second takes over from the first: it is not reached at 20 km/h, hardly loaded at 30.
+    let takes_over = |x: f64| ((x - 0.25) / 0.02).clamp(0.0, 1.0);
+    for km_per_h in [20.0, 30.0, 50.0, 60.0] {
+        two_walls(&format!("walls/{km_per_h}kmh"), km_per_h, &takes_over, 0.0);
     }
     assert_eq!(warned(here, "init walls -o found.toml"), "");
     let found = study(here, "found.toml");
@@ -1362,40 +1368,19 @@ fn walls_that_act_one_after_the_other_are_added() {
     says(&text, "they act together or one after the other: the bodies follow their");
     crumple_ok(here, "build found.toml -o found.h5 -q");
     // Where the second takes so little that no run shows it, it is named.
+    let hardly = |x: f64| if x > 0.2 { 0.03 } else { 0.0 };
     for km_per_h in [40.0, 50.0] {
-        let history = Crash { speed_m_per_s: km_per_h / 3.6, ..Crash::default() }.run();
-        let beside = |x: f64| if x > 0.2 { 0.03 } else { 0.0 };
-        let crush = &history.bodies[0].displacement_m[4];
-        let second: Vec<f64> =
-            history.contact_n.iter().zip(crush).map(|(f, x)| f * beside(*x)).collect();
-        let first: Vec<f64> = history.contact_n.iter().zip(&second).map(|(f, s)| f - s).collect();
-        let run = here.join(format!("share/{km_per_h}kmh"));
-        layout.nodout(&run, &history, &car_nodes());
-        let wall = |id, along_n| Force { id, title: "", along_n, across_n: 0.0 };
-        layout.rwforc(&run, &history, &[wall(1, &first), wall(2, &second)]);
+        two_walls(&format!("share/{km_per_h}kmh"), km_per_h, &hardly, 0.0);
     }
     let said = warned(here, "init share -o share.toml");
     says(&said, "rwforc 2 also acts along the motion, in 40kmh with ");
     says(&said, "if it stops the body, use --force rwforc:1+2");
     let said = warned(here, "init share --force rwforc:1 -o one.toml");
     assert!(!said.contains("also acts"), "{said}");
-    // One odd run makes no sum of what the others must not add: there the second wall takes a blow of something else.
-    for (name, km_per_h, is_odd) in
-        [("40kmh", 40.0, false), ("50kmh", 50.0, false), ("55kmh", 55.0, true)]
-    {
-        let history = Crash { speed_m_per_s: km_per_h / 3.6, ..Crash::default() }.run();
-        let crush = &history.bodies[0].displacement_m[4];
-        let share = |x: f64| if is_odd { ((x - 0.25) / 0.02).clamp(0.0, 1.0) } else { 0.0 };
-        let taken: Vec<f64> =
-            history.contact_n.iter().zip(crush).map(|(f, x)| f * share(*x)).collect();
-        let first: Vec<f64> = history.contact_n.iter().zip(&taken).map(|(f, s)| f - s).collect();
-        let blow = |t: &f64| if *t < 0.02 { 100e3 } else { 0.0 };
-        let second = if is_odd { taken } else { history.time_s.iter().map(blow).collect() };
-        let run = here.join(format!("odd/{name}"));
-        layout.nodout(&run, &history, &car_nodes());
-        let wall = |id, along_n| Force { id, title: "", along_n, across_n: 0.0 };
-        layout.rwforc(&run, &history, &[wall(1, &first), wall(2, &second)]);
-    }
+    // One odd run does not make a sum of what the others must not add, whose second wall takes the blow of something else.
+    two_walls("odd/40kmh", 40.0, &|_| 0.0, 100e3);
+    two_walls("odd/50kmh", 50.0, &|_| 0.0, 100e3);
+    two_walls("odd/55kmh", 55.0, &takes_over, 0.0);
     let said = warned(here, "init odd -o odd.toml");
     let odd = study(here, "odd.toml");
     assert!(!said.contains("residual"), "{said}");

@@ -340,7 +340,7 @@ fn choose(
     if let Some(id) = given
         && tallies.first().is_none_or(|first| first.node.id != id)
     {
-        // Told of each run that does not have it.
+        // Each run without it is left out, with the reason.
         return Some(ChosenNode { id, title: None, residual: 1.0, others: Vec::new() });
     }
     let (first, others) = tallies.split_first()?;
