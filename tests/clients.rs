@@ -278,12 +278,12 @@ fn forest_is_as_accurate_as_scikit_learn_on_the_fe_table() {
 /// Records that fall on thresholds or just below them, and others between, as raw doubles.
 fn records_at_thresholds(model: &Value) -> Array2<f64> {
     let trees = model["fitted"]["forest"]["forest"]["trees"].as_array().unwrap();
-    let features = |tree: &Value| -> Vec<i64> {
-        tree["feature"].as_array().unwrap().iter().map(|v| v.as_i64().unwrap()).collect()
+    let bytes = |text: &Value| BASE64_STANDARD.decode(text.as_str().unwrap()).unwrap();
+    let features = |tree: &Value| -> Vec<i32> {
+        bytes(&tree["feature"]).as_chunks().0.iter().map(|b| i32::from_le_bytes(*b)).collect()
     };
     let numbers = |tree: &Value| -> Vec<f64> {
-        let bytes = BASE64_STANDARD.decode(tree["number"].as_str().unwrap()).unwrap();
-        bytes.as_chunks().0.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect()
+        bytes(&tree["number"]).as_chunks().0.iter().map(|b| f64::from_le_bytes(*b)).collect()
     };
     let mut records = Vec::new();
     for tree in trees.iter().take(5) {

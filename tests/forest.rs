@@ -1,5 +1,6 @@
 //! The regression forest as a user of linfa meets it.
 
+use base64::{Engine, prelude::BASE64_STANDARD};
 use crumple::forest::{
     FeaturesPerSplit, ForestError, ForestParams, RegressionForest, StopRule, Thresholds,
 };
@@ -366,8 +367,13 @@ fn stored_forests() {
         *damaged.pointer_mut(part).unwrap() = wrong;
         assert_eq!(read(damaged).check().unwrap_err().to_string(), expected, "{part}");
     }
+    let mut numbers =
+        BASE64_STANDARD.decode(stored["trees"][0]["number"].as_str().unwrap()).unwrap();
+    numbers[..8].copy_from_slice(&f64::INFINITY.to_le_bytes());
+    let infinite = BASE64_STANDARD.encode(numbers);
     for (text, expected) in [
         ("AAAA", "the node arrays of a tree differ in length"),
+        (&infinite, "node 0 of a tree holds a value that is not finite"),
         ("*", "number of a tree: Invalid symbol 42, offset 0."),
     ] {
         let mut damaged = stored.clone();

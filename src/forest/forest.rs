@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use super::grow::{Table, grow};
 use super::params::{FeaturesPerSplit, ForestError, ForestParams, ForestValidParams, MOST_SAMPLES};
 use super::threads::*;
-use super::walk::{BATCH, Rows, Tree, Walk, groups};
+use super::walk::{BATCH, Rows, Tree, groups, visit};
 use crate::stream::Stream;
 
 /// A fitted regression forest.
@@ -91,9 +91,7 @@ impl<F: Float> RegressionForest<F> {
     /// If a tree's arrays do not fit together.
     pub fn check(&self) -> Result<(), ForestError> {
         if self.trees.is_empty() || self.features == 0 {
-            return Err(ForestError::Damaged(
-                "the node arrays differ in length or are empty".into(),
-            ));
+            return Err(ForestError::Damaged("it has no trees or no features".into()));
         }
         self.trees.iter().try_for_each(|tree| tree.check(self.features))?;
         if !self.importance.is_empty() && self.importance.len() != self.features {
@@ -234,7 +232,6 @@ fn out_of_bag<F: Float>(
 ) -> OutOfBag {
     let samples = table.targets.len();
     let mut sums = vec![(0.0, 0u32); samples];
-    let mut walk = Walk::new();
     let mut streams = 0..;
     for trees in groups(&forest.trees) {
         let times: Vec<Vec<u32>> = trees
@@ -242,7 +239,6 @@ fn out_of_bag<F: Float>(
             .zip(&mut streams)
             .map(|(_, tree)| drawn_again(&forest.params, tree, samples))
             .collect();
-        walk.take(trees);
         sums.par_chunks_mut(BATCH).enumerate().for_each(|(batch, sums)| {
             let rows = &table.rows[batch * BATCH..][..sums.len()];
             let records: Vec<F> = rows
@@ -251,7 +247,7 @@ fn out_of_bag<F: Float>(
                 .copied()
                 .collect();
             let (mut unseen, mut walking) = (Vec::new(), Vec::new());
-            for (tree, times) in times.iter().enumerate() {
+            for (tree, times) in trees.iter().zip(&times) {
                 let times = &times[batch * BATCH..];
                 unseen.clear();
                 unseen.extend((0..sums.len()).filter(|&at| times[at] == 0));
@@ -259,9 +255,9 @@ fn out_of_bag<F: Float>(
                 for at in &unseen {
                     walking.extend_from_slice(&records[at * forest.features..][..forest.features]);
                 }
-                walk.leaves(tree, &Rows::new(&walking, forest.features), |row, leaf| {
+                tree.leaves(&Rows::new(&walking, forest.features), |row, leaf| {
                     let (sum, trees) = &mut sums[unseen[row]];
-                    *sum += as_f64(walk.value(leaf)) - table.offset;
+                    *sum += as_f64(tree.value(leaf)) - table.offset;
                     *trees += 1;
                 });
             }
@@ -292,11 +288,10 @@ fn members<F: Float>(
     let mut samples = vec![0; by_target.len()];
     (0..).zip(&table.rows).for_each(|(sample, &row)| samples[row as usize] = sample);
     let mut leaves = vec![0; by_target.len()];
-    let mut walk = Walk::new();
     for (index, tree) in forest.trees.iter().enumerate() {
         let times = drawn_again(&forest.params, index, by_target.len());
-        walk.take(std::slice::from_ref(tree));
-        walk.visit(&rows, forest.features, &mut leaves, |of_row, leaf| *of_row = leaf);
+        let tree_alone = std::slice::from_ref(tree);
+        visit(tree_alone, &rows, forest.features, &mut leaves, |of_row, _, leaf| *of_row = leaf);
         let times = by_target.iter().map(|&row| times[samples[row as usize] as usize]);
         members.push(tree.nodes(), leaves.iter().copied().zip(times));
     }
@@ -319,8 +314,6 @@ fn importance(gains: &[Vec<f64>]) -> Vec<f64> {
     shares
 }
 
-const NODES_PACKED_AS_ROW_WALKS: usize = 16;
-
 /// Trees from which on rows walk in the order of the first tree's leaves, which costs about
 /// as much as four trees: neighbours take nearly the same ways in all trees, so that those in
 /// step arrive together and their nodes are in the cache.
@@ -341,18 +334,11 @@ where
         assert_eq!(x.nrows(), y.len(), "one target is needed per record");
         let trees = F::cast(self.trees.len());
         let x = x.view();
-        let nodes = self.trees.iter().map(Tree::nodes).max().unwrap_or(0);
-        if x.nrows() * NODES_PACKED_AS_ROW_WALKS < nodes {
-            let records = y.axis_iter_mut(Axis(0)).into_par_iter().zip(x.axis_iter(Axis(0)));
-            records.for_each(|(mut y, record)| y[()] = self.predict_one(&record));
-            return;
-        }
-        let mut walk = Walk::new();
         let mut rows: Vec<F> = x.iter().copied().collect();
         let order = (self.trees.len() >= TREES_WORTH_ORDERING).then(|| {
-            walk.take(&self.trees[..1]);
             let mut leaves: Vec<(usize, usize)> = (0..x.nrows()).map(|row| (0, row)).collect();
-            walk.visit(&rows, self.features, &mut leaves, |(of_row, _), leaf| *of_row = leaf);
+            let first = &self.trees[..1];
+            visit(first, &rows, self.features, &mut leaves, |(of_row, _), _, leaf| *of_row = leaf);
             leaves.par_sort_unstable();
             leaves
         });
@@ -361,10 +347,9 @@ where
             rows = order.iter().flat_map(row).copied().collect();
         }
         let mut sums = vec![F::zero(); x.nrows()];
-        for trees in groups(&self.trees) {
-            walk.take(trees);
-            walk.visit(&rows, self.features, &mut sums, |sum, leaf| *sum += walk.value(leaf));
-        }
+        visit(&self.trees, &rows, self.features, &mut sums, |sum, tree, leaf| {
+            *sum += tree.value(leaf);
+        });
         let means = sums.into_iter().map(|sum| sum / trees);
         match order {
             Some(order) => order.iter().zip(means).for_each(|(&(_, row), mean)| y[row] = mean),
@@ -478,7 +463,7 @@ impl<F: Float> Members<F> {
                 && leaves.first.is_sorted()
                 && leaves.first[tree.nodes()] as usize == leaves.members.len()
                 && leaves.members.iter().all(|&m| (m as usize) < self.targets.len())
-                && (0..tree.nodes()).all(|n| !tree.is_leaf(n) || !leaves.of(n).is_empty())
+                && (0..tree.nodes()).all(|n| tree.split_at(n).is_some() || !leaves.of(n).is_empty())
         };
         let whole = self.trees.len() == trees.len()
             && self.targets.iter().all(|t| t.is_finite())

@@ -101,7 +101,7 @@ pub(crate) fn grow<F: Float>(
         rules: Rules::new(params),
         offset: table.offset,
         stream,
-        tree: Tree::empty(),
+        tree: Tree::with_capacity(0),
         gains: vec![0.0; table.columns.len()],
         open: Vec::new(),
         goes_left: vec![false; times.len()],

@@ -78,11 +78,12 @@ impl RegressionForest<f64> {
     fn node(&self, output: &str) -> Message {
         let nodes =
             || self.trees().iter().flat_map(|tree| (0..tree.nodes()).map(move |n| (tree, n)));
-        let leaves = || nodes().filter(|(tree, node)| tree.is_leaf(*node));
+        let splits = || nodes().map(|(tree, node)| tree.split_at(node));
+        let leaves = || nodes().filter(|(tree, node)| tree.split_at(*node).is_none());
         let tree_of = |leaves_only: bool| {
             let count = move |tree: &Tree<f64>| {
                 if leaves_only {
-                    (0..tree.nodes()).filter(|&node| tree.is_leaf(node)).count()
+                    (0..tree.nodes()).filter(|&node| tree.split_at(node).is_none()).count()
                 } else {
                     tree.nodes()
                 }
@@ -90,8 +91,8 @@ impl RegressionForest<f64> {
             (0u64..).zip(self.trees()).flat_map(move |(at, tree)| repeat_n(at, count(tree)))
         };
         let number = |(_, node): (&Tree<f64>, usize)| node as u64;
-        let mode = |(tree, node): (&Tree<f64>, usize)| {
-            if tree.is_leaf(node) { "LEAF" } else { "BRANCH_LT" }
+        let child = |right: u64| {
+            splits().map(move |split| split.map_or(0, |(_, _, left)| u64::from(left) + right))
         };
         Message::default()
             .text(1, INPUT)
@@ -102,15 +103,33 @@ impl RegressionForest<f64> {
             .message(5, &Message::default().text(1, "n_targets").int(3, 1).int(20, INT))
             .message(5, &ints("nodes_treeids", tree_of(false)))
             .message(5, &ints("nodes_nodeids", nodes().map(number)))
-            .message(5, &texts("nodes_modes", nodes().map(mode)))
-            .message(5, &ints("nodes_featureids", nodes().map(|(t, n)| t.feature[n].max(0) as u64)))
-            .message(5, &doubles("nodes_values_as_tensor", nodes().map(|(t, n)| t.threshold[n])))
-            .message(5, &ints("nodes_truenodeids", nodes().map(|(t, n)| t.left[n].into())))
-            .message(5, &ints("nodes_falsenodeids", nodes().map(|(t, n)| t.right[n].into())))
+            .message(
+                5,
+                &texts(
+                    "nodes_modes",
+                    splits().map(|split| if split.is_some() { "BRANCH_LT" } else { "LEAF" }),
+                ),
+            )
+            .message(
+                5,
+                &ints(
+                    "nodes_featureids",
+                    splits().map(|s| s.map_or(0, |(feature, _, _)| feature.into())),
+                ),
+            )
+            .message(
+                5,
+                &doubles(
+                    "nodes_values_as_tensor",
+                    splits().map(|s| s.map_or(0.0, |(_, threshold, _)| threshold)),
+                ),
+            )
+            .message(5, &ints("nodes_truenodeids", child(0)))
+            .message(5, &ints("nodes_falsenodeids", child(1)))
             .message(5, &ints("target_treeids", tree_of(true)))
             .message(5, &ints("target_nodeids", leaves().map(number)))
             .message(5, &ints("target_ids", leaves().map(|_| 0)))
-            .message(5, &doubles("target_weights_as_tensor", leaves().map(|(t, n)| t.value[n])))
+            .message(5, &doubles("target_weights_as_tensor", leaves().map(|(t, n)| t.value(n))))
     }
 }
 

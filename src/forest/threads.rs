@@ -17,20 +17,6 @@ mod in_turn {
     }
     impl<I: IntoIterator> IntoParallelIterator for I {}
 
-    pub(in super::super) trait IndexedParallelIterator: Iterator + Sized {
-        fn with_min_len(self, _: usize) -> Self {
-            self
-        }
-    }
-    impl<I: Iterator> IndexedParallelIterator for I {}
-
-    pub(in super::super) trait ParallelExtend<T>: Extend<T> {
-        fn par_extend(&mut self, items: impl IntoIterator<Item = T>) {
-            self.extend(items);
-        }
-    }
-    impl<T> ParallelExtend<T> for Vec<T> {}
-
     pub(in super::super) trait ParallelSlice<T>: AsRef<[T]> + AsMut<[T]> {
         fn par_chunks(&self, size: usize) -> Chunks<'_, T> {
             self.as_ref().chunks(size)
