@@ -198,6 +198,7 @@ fn cases_are_chosen_by_group_name_speed_and_tag() {
     assert_eq!(listed(" --speed ..18km/h"), of(WALL, &["12kmh", "18kmh"]), "the end is among them");
     assert_eq!(listed(" --speed 5m/s..7m/s"), of(WALL, &["18kmh", "25kmh"]));
     assert_eq!(listed(" --speed 36km/h").len(), 2);
+    assert_eq!(listed(" --speed ..13km/h --speed 18km/h"), of(WALL, &["12kmh", "18kmh"]));
     assert_eq!(listed(" --case lead-car-pair/72kmh --case 12kmh").len(), 2);
     ok(here, "db tag curves.h5 --speed 60km/h.. --add fast,doubtful");
     ok(here, "db tag curves.h5 --case lead-car-wall/60kmh --remove doubtful");

@@ -232,6 +232,20 @@ fn octave_reads_the_matrices() {
     assert_eq!(lines[5], "1");
 }
 
+/// JSON is the master format: a copy of it is the same, and one force alone is asked for.
+#[test]
+fn json_is_copied_whole() {
+    let folder = demo_folder();
+    let here = folder.path();
+    export(here, "lead50.json", "copy.json", &[]);
+    let read = |name: &str| std::fs::read_to_string(here.join(name)).unwrap();
+    assert!(read("copy.json") == read("lead50.json"));
+    export(here, "copy.json", "contact.csv", &["--force", "contact"]);
+    export(here, "copy.json", "body.json", &["--force", "body"]);
+    let error = crumple_fails(here, 1, "export body.json --force contact --to csv -o no.csv");
+    says(&error, "or it was exported with --force body");
+}
+
 /// Columns, matrices and tables hold the band of the force that they hold: JSON and they agree.
 #[test]
 fn bands_stand_beside_their_curves() {

@@ -11,7 +11,7 @@ use serde_json::Value;
 use toml::Table;
 
 use crate::common::containers::binout_of;
-use crate::common::crash::{Crash, Force, History, Layout, MM_KG_MS, MM_T_S, Node, SI};
+use crate::common::crash::{Crash, Force, History, Layout, MM_KG_MS, MM_T_S, Motions, Node, SI};
 use crate::common::{
     crumple_fails, crumple_in, crumple_ok, demo_folder, entries, fixture, is_thorough,
     is_with_shared, json, samples_by_kind, says, shared,
@@ -319,6 +319,41 @@ fn half_models_are_asked_for() {
 
 fn node(id: i64, title: &'static str, body: usize, mass: usize, shakes: f64) -> Node {
     Node { id, title, on: Some((body, mass)), shakes }
+}
+
+/// Another node follows the force better than that of the first body: those that the user names are taken.
+#[test]
+fn the_nodes_of_the_user_are_taken() {
+    let crash =
+        Crash { body_kg: 24e3, other_kg: Some(48e3), speed_m_per_s: 15.0, ..Crash::default() };
+    let mut history = crash.run();
+    // It has half of what the force alone would give both, without waves in a crush zone.
+    let mut third = Motions::default();
+    let (mut x_m, mut v_m_per_s) = (0.0, 0.5 * crash.speed_m_per_s);
+    for force_n in &history.contact_n {
+        v_m_per_s -= 0.5 * force_n * crash.interval_s * (1.0 / 24e3 - 1.0 / 48e3);
+        x_m += v_m_per_s * crash.interval_s;
+        third.displacement_m[4].push(x_m);
+        third.velocity_m_per_s[4].push(v_m_per_s);
+    }
+    history.bodies.push(third);
+    let folder = tempfile::tempdir().unwrap();
+    let run = folder.path().join("pair/a");
+    let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
+    let nodes = [(101, 0, 0.03), (202, 1, 0.0), (303, 2, 0.0)];
+    let nodes = nodes.map(|(id, body, shakes)| node(id, "", body, 4, shakes));
+    layout.nodout(&run, &history, &nodes);
+    let contact = Force { id: 1, title: "contact", along_n: &history.contact_n, across_n: 0.0 };
+    layout.rcforc(&run, &history, &[contact]);
+    let here = folder.path().join("pair");
+    crumple_ok(
+        &here,
+        "init --kind pair --node 101 --minus-node 202 --mass 24t --other-mass 48t --units mm-t-s",
+    );
+    let found = study(&here, "study.toml");
+    let deflection = &found["recipe"]["deflection"];
+    assert_eq!(deflection["node"].as_integer(), Some(101));
+    assert_eq!(deflection["minus_node"].as_integer(), Some(202));
 }
 
 /// Nodes of a car with its crush zone, some hundred on its body, and some that stand still.

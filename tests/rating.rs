@@ -369,7 +369,7 @@ fn wrong_input_says_where_and_what_to_do() {
         (&["a.csv", "wide.csv"][..], 1, "wide.csv: line 3: expected 2 fields, one for each column of the table, found 3: write decimal points, or semicolons between columns, and name every column in the header"),
         (&["a.csv", "bare.csv"][..], 1, "bare.csv: line 1: expected a header with the names of the columns, found numbers: write for example \"time_s,a_m_per_s2\" above them"),
         (&["a.csv", "one.csv"][..], 1, "one.csv: line 1: expected at least two columns separated by commas, semicolons, tabs or blanks, the first of them the time, found \"time\""),
-        (&["a.csv", "a.csv", "--from=0.5s"][..], 1, "the requested interval, from 0.5 s, lies outside the common times from 0 s to 0.199 s"),
+        (&["a.csv", "a.csv", "--from=0.5s"][..], 1, "the requested interval, from 0.5 s, is empty or lies outside the common times from 0 s to 0.199 s"),
         (&["a.csv", "none.csv"][..], 1, "none.csv: No such file"),
         (&["a.csv", "none.csv:v"][..], 1, "none.csv: No such file"),
         (&["a.csv,time=h", "a.csv"][..], 2, "invalid value 'a.csv,time=h' for '<A>': \"h\" is not a unit of time"),

@@ -26,6 +26,7 @@ import os
 import re
 import tempfile
 from collections.abc import Mapping
+from numbers import Number
 from pathlib import Path
 
 import numpy as np
@@ -72,7 +73,7 @@ def _listed(of):
     """One item or several, as a list of texts; None stays."""
     if of is None:
         return None
-    is_one = isinstance(of, (str, int, np.integer))
+    is_one = isinstance(of, (str, Number))
     return [str(_key(one)) for one in ([of] if is_one else of)]
 
 

@@ -95,7 +95,7 @@ def run(*arguments, check=True):
     Raises `crumple.Error` if the command fails.
     """
     words = [os.fspath(a) if isinstance(a, os.PathLike) else str(a) for a in arguments]
-    words = [*_program(), *words[:1], "--json", *words[1:]]
+    words = [*_program(), "--json", *words]
     environment = {**os.environ, "CRUMPLE_PROGRESS": "lines"}
     with tempfile.TemporaryFile() as out:
         with subprocess.Popen(words, stdout=out, stderr=subprocess.PIPE, env=environment) as child:

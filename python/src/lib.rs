@@ -152,13 +152,12 @@ fn read(
         text.parse::<WantedId>().map_err(|e| PyValueError::new_err(format!("{text}: {e}")))
     };
     let ids = ids.map(|ids| ids.into_iter().map(id).collect::<PyResult<Vec<_>>>()).transpose()?;
-    let is_narrowed = ids.is_some() || components.is_some();
     let section_given = section_name.is_some();
     let selection = Selection { ids, components, section: section_name, ..Selection::all() };
     let read = interruptible(py, move || {
         let sections = solver::read_sections(&path, format.as_deref(), &selection)?;
-        // A single section is read as the program does, which knows what is missing and what was meant.
-        if sections.len() == 1 && is_narrowed || sections.is_empty() && section_given {
+        // The program knows which section was meant.
+        if sections.is_empty() && section_given {
             return Ok(vec![solver::read(&path, format.as_deref(), &selection)?]);
         }
         Ok(sections)

@@ -23,6 +23,7 @@ import crumple
 
 DEMO = Path(os.environ["CRUMPLE_DEMO"])
 NODOUT = DEMO / "fe/lead-car-wall/36kmh/nodout"
+BINOUT = Path(__file__).parents[2] / "fixtures/samples/lasso-python/binout/lasso_r12_smp_s_sph_rwforc"
 
 
 def test_histories_are_those_of_the_file():
@@ -52,11 +53,21 @@ def test_only_what_is_selected():
         histories.only()["speed"]
     with pytest.raises(ValueError):
         crumple.read(NODOUT, ids=["three"])
+    with pytest.raises(crumple.Error, match='it has no section "rwforc": it is a text file with the one section "nodout"'):
+        crumple.read(NODOUT, section="rwforc")
+    # Of a file with several sections each name is in one at least.
+    assert set(crumple.read(BINOUT, components="z_momentum")) >= {"matsum"}
+    for wrong, said in [
+        ({"components": ["z_momentum", "z_momentun"]}, 'the file has no component "z_momentun": .*did you mean z_momentum'),
+        ({"ids": [101, 99999999]}, "the file has no entity 99999999: the nearest of its ids are"),
+    ]:
+        with pytest.raises(crumple.Error, match=said):
+            crumple.read(BINOUT, **wrong)
 
 
 def test_one_or_several_of_any_kind():
     whole = crumple.read(NODOUT).only()["x_velocity"][900001]
-    for ids in (900001, "900001", [np.int64(900001)], np.array([900001]), pd.Series([900001.0])):
+    for ids in (900001, 900001.0, "900001", [np.int64(900001)], np.array([900001]), pd.Series([900001.0])):
         for components in ("x_velocity", ["x_velocity"], np.array(["x_velocity"])):
             component = crumple.read(NODOUT, ids=ids, components=components).only()["x_velocity"]
             assert np.array_equal(component[np.int32(900001)], whole) and 900001.0 in component

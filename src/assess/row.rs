@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::left_out::{STEPS, forces_n};
 use super::methods::{FittedNsdm, Method, Times};
 use super::reference::Reference;
-use crate::curve::ForceKind;
+use crate::curve::{ForceKind, is_beyond};
 use crate::dataset::grid;
 use crate::error::Error;
 use crate::rating::acceptance::Acceptance;
@@ -60,13 +60,10 @@ pub(crate) struct Row {
     pub acceleration: Rating,
 }
 
-/// A crush beyond the data by less than this share is that of another unloading or step.
-const BEYOND: f64 = 0.01;
-
 impl Row {
     /// Where the curve's data end, in m, if the run crushes further.
     pub(crate) fn held_from_m(&self) -> Option<f64> {
-        self.data_end_m.filter(|end| self.max_crush_m > (1.0 + BEYOND) * end)
+        self.data_end_m.filter(|end| is_beyond(self.max_crush_m, *end))
     }
 }
 

@@ -84,7 +84,6 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         (None, None) => solver::read(&args.file, format, &selection)?,
     };
     drop(bar);
-    check_section(&args.file, &file, args.section.as_deref())?;
     let outcome = options.warn_of(&args.file, &file.problems);
     if !options.quiet {
         file.notes.iter().for_each(|note| output::eprint_line(&format!("note: {note}")));
@@ -123,22 +122,6 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         })?;
     }
     Ok(outcome)
-}
-
-/// Refuses a section that a text file does not have.
-pub(super) fn check_section(
-    path: &Path,
-    file: &SolverFile,
-    section: Option<&str>,
-) -> Result<(), Failure> {
-    match section.filter(|section| **section != *file.section) {
-        None => Ok(()),
-        Some(section) => usage(format!(
-            "{} has no section \"{section}\": it is a text file with the one section \"{}\"",
-            path.display(),
-            file.format
-        )),
-    }
 }
 
 /// Whether HDF5 is written, else CSV; refuses what would be written over.

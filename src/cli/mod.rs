@@ -275,7 +275,7 @@ fn parsed(arguments: Vec<OsString>) -> Result<Cli, u8> {
     }
     let wants_json =
         arguments.iter().take_while(|word| *word != "--").any(|word| *word == "--json");
-    let matches = shell::command().try_get_matches_from(arguments);
+    let matches = shell::command().try_get_matches_from(flags_first(arguments));
     matches.and_then(|matches| Cli::from_arg_matches(&matches)).map_err(|error| {
         if wants_json && error.use_stderr() {
             // Without the word before it, and without the usage and the way to the help after it.
@@ -290,6 +290,18 @@ fn parsed(arguments: Vec<OsString>) -> Result<Cli, u8> {
         }
         if error.use_stderr() { USAGE } else { DONE }
     })
+}
+
+/// Flags between `sweep` and its `merge` go before both: clap takes them for those of a sweep.
+fn flags_first(mut arguments: Vec<OsString>) -> Vec<OsString> {
+    let is_flag = |word: &OsString| word.to_string_lossy().starts_with('-');
+    let mut words = (1..arguments.len()).filter(|&k| !is_flag(&arguments[k]));
+    if let (Some(first), Some(second)) = (words.next(), words.next())
+        && (arguments[first] == "sweep" && arguments[second] == "merge")
+    {
+        arguments[first..second].sort_by_key(|word| !is_flag(word));
+    }
+    arguments
 }
 
 /// The JSON schemas of the files and documents, by their names in `schemas/`.

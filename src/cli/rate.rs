@@ -4,7 +4,6 @@ use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
 use super::arguments::{FileKind, one_of};
-use super::histories::check_section;
 use super::{
     CommandResult, Failure, GlobalOptions, Outcome, failed, failed_at, output, usage, usage_error,
 };
@@ -513,7 +512,6 @@ impl SignalRequest<'_> {
             ..Selection::all()
         };
         let file = solver::read(self.path(), self.both.format.as_deref(), &selection)?;
-        check_section(self.path(), &file, section)?;
         options.warn_of(self.path(), &file.problems);
         let path = self.path().display();
         let history = match &file.histories[..] {

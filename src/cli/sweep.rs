@@ -346,7 +346,18 @@ fn until(
         is_reached: half_width.is_some_and(|half_width| half_width <= *wanted),
     };
     if !reached.is_reached && report.is_complete() {
-        global.warn(&format!("{column}: ± {wanted} is not reached: state more samples in [sweep]"));
+        let lasting = of.map_or(0.0, |of| of.lasting_half_width(report.rows));
+        let why = if lasting > *wanted {
+            let unknown = report.rows - reached.numbers;
+            format!(
+                "it is not known in {unknown} of {}, which alone leave ± {}, however many there are: give longer curves or a longer duration",
+                counted(report.rows, "run"),
+                digits(lasting)
+            )
+        } else {
+            "state more samples in [sweep]".into()
+        };
+        global.warn(&format!("{column}: ± {wanted} is not reached: {why}"));
     }
     Ok((report, Some(reached)))
 }
@@ -451,7 +462,8 @@ fn print_share_over_limits(
     write!(out, "{:.1} %", percent(over))?;
     if is_random {
         let (low, high) = share_interval(over / report.rows as f64, report.rows);
-        write!(out, "; 95 % confidence interval {:.1} to {:.1} %", 1e2 * low, 1e2 * high)?;
+        let (low, high) = (digits(1e2 * low), digits(1e2 * high));
+        write!(out, "; 95 % confidence interval {low} to {high} %")?;
     }
     writeln!(out, ")")
 }

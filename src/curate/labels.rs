@@ -107,20 +107,12 @@ const LARGE_BYTES: u64 = 32 << 20;
 
 /// The case, if the selection names one and no more, and the file is large.
 fn one_of_a_large_file(path: &Path, selection: &Selection) -> Result<Option<Case>, Error> {
-    let Selection { groups, cases, speed: None, tags } = selection else { return Ok(None) };
-    let ([name], [] | [_], []) = (&cases[..], &groups[..], &tags[..]) else { return Ok(None) };
+    let Some((group, name)) = selection.only() else { return Ok(None) };
     // What is not a file is found, and said, where all cases are read.
     if accepts_changed() || !std::fs::metadata(path).is_ok_and(|meta| meta.len() >= LARGE_BYTES) {
         return Ok(None);
     }
-    let (own, name) = match name.split_once('/') {
-        Some((group, name)) => (Some(group), name),
-        None => (None, name.as_str()),
-    };
-    match (own, groups.first().map(String::as_str)) {
-        (Some(own), Some(asked)) if own != asked => Ok(None),
-        (own, asked) => Database::read_case_alone(path, own.or(asked), name),
-    }
+    Database::read_case_alone(path, group, name)
 }
 
 /// Changes tags and notes of the chosen cases of the database at `path`; returns these as they are

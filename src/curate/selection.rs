@@ -18,7 +18,8 @@ pub(crate) struct Selection {
     pub groups: Vec<String>,
     /// Names of cases, or `GROUP/NAME`; all if empty.
     pub cases: Vec<String>,
-    pub speed: Option<SpeedRange>,
+    /// Ranges of which one holds the impact speed; any if empty.
+    pub speeds: Vec<SpeedRange>,
     /// Cases that have one of these; all if empty.
     pub tags: Vec<String>,
 }
@@ -89,6 +90,19 @@ impl Selection {
         *self == Self::default()
     }
 
+    /// Group, if it is stated, and name, if one case is named and nothing else is chosen by.
+    pub(crate) fn only(&self) -> Option<(Option<&str>, &str)> {
+        let Self { groups, cases, speeds, tags } = self;
+        let ([case], [] | [_], [], []) = (&cases[..], &groups[..], &speeds[..], &tags[..]) else {
+            return None;
+        };
+        match (case.split_once('/'), groups.first()) {
+            (None, group) => Some((group.map(String::as_str), case)),
+            (Some((own, name)), None) => Some((Some(own), name)),
+            (Some((own, name)), Some(group)) => (own == group).then_some((Some(own), name)),
+        }
+    }
+
     /// The chosen cases, by group, speed and name; `path` is for messages.
     pub(crate) fn find<'a>(
         &self,
@@ -108,7 +122,8 @@ impl Selection {
         }
         let is_chosen = |case: &&Case| {
             (self.cases.is_empty() || named.iter().any(|c| CasePath::of(c) == CasePath::of(case)))
-                && self.speed.is_none_or(|range| range.holds(case.conditions.speed.m_per_s))
+                && (self.speeds.is_empty()
+                    || self.speeds.iter().any(|range| range.holds(case.conditions.speed.m_per_s)))
                 && (self.tags.is_empty()
                     || self.tags.iter().any(|tag| case.provenance.tags.contains(tag)))
         };
@@ -126,8 +141,9 @@ impl Selection {
         if !self.cases.is_empty() {
             asked.push(format!("among {}", self.cases.join(", ")));
         }
-        if let Some(range) = self.speed {
-            asked.push(format!("has a speed of {range}"));
+        if !self.speeds.is_empty() {
+            let ranges: Vec<String> = self.speeds.iter().map(ToString::to_string).collect();
+            asked.push(format!("has a speed of {}", ranges.join(" or ")));
         }
         if !self.tags.is_empty() {
             let tags: Vec<String> = self.tags.iter().map(|tag| format!("\"{tag}\"")).collect();

@@ -27,6 +27,7 @@ use crate::unit::{Speed, UnitSystem};
 pub use energy::audit;
 pub use envelope::Envelope;
 pub use extract::{Extracted, Measured, MeasuredForce, Setup, Stated, StatedContact, extract};
+pub(crate) use force_curve::is_beyond;
 pub use force_curve::{CurveUnloading, ForceCurve, Tail};
 pub use from_table::from_table;
 pub use loading::{Loading, unloading_stiffness};

@@ -211,13 +211,18 @@ impl<'a> RunView<'a> {
             self.best.clone()
         };
         self.check_kind(*of_others)?;
-        // The body of the node that the caller names comes first.
         Ok(explained.map(|mut explained| {
-            let has = |body: &usize| {
-                self.survey.bodies[*body].nodes.iter().any(|node| Some(node.id) == hints.node)
-            };
-            if let Some(slot) = explained.bodies.iter().position(has) {
-                explained.bodies.swap(0, slot);
+            let named = [hints.node, hints.minus_node];
+            for (slot, id) in named.into_iter().enumerate().take(explained.bodies.len()) {
+                let is_of = |node: &NodeCandidate| Some(node.id) == id;
+                let has = |body: &Body| body.nodes.iter().any(is_of);
+                // The body of a node that the caller names is the one, whatever the force explains better.
+                if let Some(body) = self.survey.bodies.iter().position(has) {
+                    match explained.bodies.iter().position(|other| *other == body) {
+                        Some(place) => explained.bodies.swap(slot, place),
+                        None => explained.bodies[slot] = body,
+                    }
+                }
             }
             explained
         }))

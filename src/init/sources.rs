@@ -186,9 +186,10 @@ impl Source {
         ids: Option<Vec<solver::WantedId>>,
         components: &[&str],
     ) -> Result<SolverFile, Reason> {
+        let components = components.iter().filter(|component| self.has(component));
         let selection = Selection {
             ids,
-            components: Some(components.iter().map(ToString::to_string).collect()),
+            components: Some(components.map(ToString::to_string).collect()),
             section: self.section.clone(),
             ..Selection::all()
         };

@@ -29,6 +29,7 @@ mod reference;
 mod rows;
 mod run;
 
+use crate::curve::is_beyond;
 use crate::error::{Error, error};
 pub(crate) use chain::Tension;
 pub use chain::{
@@ -39,9 +40,6 @@ pub(crate) use law::StoredBy;
 pub use law::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
 use run::Grid;
 pub use run::{BodyHistory, InterfaceHistory, Ledger, Method, Record, Run, RunSettings};
-
-/// A curve's own run ends where the curve does, but for rounding.
-const AT_END_M: f64 = 1e-4;
 
 /// Runs the chain from the first contact (t = 0) for `duration_s`.
 ///
@@ -122,7 +120,7 @@ fn beyond_ends(chain: &Chain, run: &Run) -> Vec<String> {
             ("pulled apart by", history.max_extension_m, tension_end_m),
         ];
         for (what, deflection_m, end_m) in reached {
-            if deflection_m > end_m + AT_END_M {
+            if is_beyond(deflection_m, end_m) {
                 warnings.push(format!(
                     "interface {} is {what} {deflection_m:.4} m, beyond the end of its curve's data at {end_m:.4} m: the force there is an assumption",
                     interface.name

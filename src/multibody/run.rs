@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::chain::{Body, Chain, Interface};
 use super::law::ForceLaw;
+use crate::curve::is_beyond;
 use crate::error::{Error, KeyPath, error};
 
 /// Default step of velocity Verlet: at 0.05 ms (a fifteenth of the output interval) the crush
@@ -184,12 +185,17 @@ pub struct InterfaceHistory {
     /// When contact began, in s. `None` without contact, and by the reference method.
     #[serde(skip)]
     pub contact_time_s: Option<f64>,
-    /// Separation speed over speed of approach at the interface, once it has opened again.
+    /// Separation speed over speed of approach at the interface, when it first opens again.
     /// `None` below 0.1 m/s of approach, above 1 (where contacts repeat or neighbours push), and at the plate of an end.
     pub restitution: Option<f64>,
 }
 
 impl InterfaceHistory {
+    /// Whether it was crushed beyond the data of its curve, by more than another unloading or step explains.
+    pub(crate) fn is_beyond_data(&self) -> bool {
+        is_beyond(self.max_deflection_m, self.data_end_m)
+    }
+
     /// All energy that it has taken by the end, in J, what it stores among it; `None` if a part is not known.
     pub fn energy_at_end_j(&self) -> Option<f64> {
         Some(self.stored_at_end_j + self.dissipated_at_end_j + self.damped_j?)
@@ -329,8 +335,7 @@ impl Run {
 
     /// Interfaces, counted from back to front, that were crushed beyond the data of their curves.
     pub fn beyond_data(&self) -> impl Iterator<Item = usize> {
-        let is_beyond = |i: &InterfaceHistory| i.max_deflection_m > i.data_end_m + super::AT_END_M;
-        self.interfaces.iter().enumerate().filter(move |(_, i)| is_beyond(i)).map(|(k, _)| k)
+        self.interfaces.iter().enumerate().filter(|(_, i)| i.is_beyond_data()).map(|(k, _)| k)
     }
 
     /// All that a user must know, as text.

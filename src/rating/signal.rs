@@ -155,7 +155,7 @@ impl Pair {
         if from_s >= to_s {
             return Err(error!(
                 Rating,
-                "the requested interval, {asked}, lies outside the common times from {} s to {} s",
+                "the requested interval, {asked}, is empty or lies outside the common times from {} s to {} s",
                 common.0,
                 common.1
             ));

@@ -241,8 +241,7 @@ fn add_verdicts(
         );
         content.verdict(Verdict::known(name, text));
     }
-    let beyond =
-        summary.interfaces.iter().filter(|of| of.history.max_deflection_m > of.history.data_end_m);
+    let beyond = summary.interfaces.iter().filter(|of| of.history.is_beyond_data());
     let beyond: Vec<&str> = beyond.map(|of| of.name).collect();
     if !beyond.is_empty() {
         let text = format!(

@@ -80,7 +80,9 @@ pub(super) fn sequence<'a>(prepared: &'a Prepared, run: &Run) -> Vec<Event<'a>> 
                 add(time_s.max(contact_s), Happening::Stage { name });
             }
         }
-        if let Some(time_s) = crossing(history.data_end_m) {
+        if history.is_beyond_data()
+            && let Some(time_s) = crossing(history.data_end_m)
+        {
             add(time_s.max(contact_s), Happening::BeyondData);
         }
         // At the end of the run it is still crushed.

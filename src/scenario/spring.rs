@@ -168,7 +168,7 @@ fn which_force(
 ) -> Result<Option<ForceKind>, Error> {
     if asked == Some(ForceKind::Contact) && declared == Some(ForceKind::Body) {
         return Err(predict_error(
-            error!(Prediction at "force", "the curve has a body force and no contact force: its study's recipe names none; use the body force"),
+            error!(Prediction at "force", "the curve has a body force and no contact force, because its study's recipe names none or it was exported with --force body: use the body force"),
         ));
     }
     if slot.split && slot.role != Role::Within && asked.or(declared) == Some(ForceKind::Body) {

@@ -73,10 +73,7 @@ pub fn read(path: &Path, format: Option<&str>, selection: &Selection) -> Result<
         ));
     }
     match sections.pop() {
-        Some(file) => {
-            check_selection(path, &file, selection)?;
-            Ok(file)
-        }
+        Some(file) => Ok(file),
         None => {
             let section = selection.section.as_deref().unwrap_or_default();
             let known = if path.is_file() {
@@ -101,7 +98,7 @@ fn listed(sections: &[SolverFile]) -> String {
 }
 
 /// Reads the selected histories of every section of the file at `path`, or of the one
-/// selected. Ids and components are not compared with what a section has.
+/// selected. Each id and component must be in one section at least.
 ///
 /// # Errors
 /// If the file cannot be opened or its kind is not known.
@@ -127,6 +124,11 @@ pub fn read_sections(
         sections.iter_mut().for_each(|section| section.problems.push(problem.clone()));
     }
     if !format.is_binary() || !sections.is_empty() || selection.section.is_some() {
+        match &sections[..] {
+            [] => {}
+            [section] => check_selection(path, section, selection)?,
+            several => check_selection(path, &joined(several), selection)?,
+        }
         return Ok(sections);
     }
     let looks_like = match format.name {
@@ -135,6 +137,19 @@ pub fn read_sections(
         _ => "it has no history that is read",
     };
     Err(unknown_format(path, looks_like))
+}
+
+/// What can be selected from several sections.
+fn joined(sections: &[SolverFile]) -> SolverFile {
+    let longest = sections.iter().map(|s| &s.time).max_by_key(|time| time.len());
+    SolverFile {
+        section: "the file".into(),
+        entities: sections.iter().flat_map(|s| s.entities.iter().cloned()).collect(),
+        without_data: sections.iter().flat_map(|s| s.without_data.iter().cloned()).collect(),
+        components: sections.iter().flat_map(|s| s.components.iter().cloned()).collect(),
+        time: longest.cloned().unwrap_or_default(),
+        ..SolverFile::default()
+    }
 }
 
 /// The error of a file that no reader knows.
@@ -168,6 +183,16 @@ fn open(
         Some(name) => named(name)?,
         None => detect(path, &*first)?,
     };
+    if let Some(section) = selection.section.as_deref().filter(|name| *name != format.name)
+        && !format.is_binary()
+    {
+        return Err(error!(
+            SolverFile,
+            "{}: it has no section \"{section}\": it is a text file with the one section \"{}\"",
+            path.display(),
+            format.name
+        ));
+    }
     let mut parts = vec![first];
     if format.is_binary() {
         for part in family.into_iter().skip(1) {

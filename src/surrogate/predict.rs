@@ -22,7 +22,7 @@ use super::query::{Query, ResolvedQuery};
 use super::spikes::without_spikes;
 use super::warning::is_unlike;
 use super::{Model, QueryPoint, Warning};
-use crate::curve::{Envelope, ForceCurve, ForceKind};
+use crate::curve::{Envelope, ForceCurve, ForceKind, is_beyond};
 use crate::dataset::{OTHER_MASS, grid, nearest};
 use crate::error::{Error, error};
 
@@ -30,8 +30,6 @@ use crate::error::{Error, error};
 const POINTS: usize = 400;
 /// The body's motion is followed to this share of the longest training curve.
 const REACH: f64 = 1.5;
-/// A maximum crush above this share of that of the runs deserves a warning.
-const CRUSH_BEYOND: f64 = 1.01;
 
 /// The curve of `model` at the speed of `query`, with its audit and warnings.
 ///
@@ -276,11 +274,11 @@ impl<'a> Prediction<'a> {
         let unloading = asked.unloading_n_per_m();
         warnings.extend(asked.warnings(unloading, body_energy.filter(is_worse).unwrap_or(energy)));
         let (crush_m, data_end_m) = (declared.end_m(), model.largest_crush_m());
-        if crush_m > CRUSH_BEYOND * data_end_m {
+        if is_beyond(crush_m, data_end_m) {
             warnings.push(Warning::beyond_data(crush_m, data_end_m));
         }
         // Between the training speeds no curve that was left out goes on there: a mass does that.
-        let is_beyond = crush_m > CRUSH_BEYOND * data_end_m && model.contains(v);
+        let is_beyond = is_beyond(crush_m, data_end_m) && model.contains(v);
         let ratio = asked.mass_kg / model.masses().effective_kg();
         let without_band = match () {
             () if is_unlike(ratio) && !model.has_mass() => {

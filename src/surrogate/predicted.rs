@@ -305,7 +305,7 @@ impl PredictedCurve {
     pub fn of_force(&self, kind: ForceKind) -> Result<Self, Error> {
         match (kind, self.provenance.force_kind) {
             (ForceKind::Contact, ForceKind::Body) => Err(
-                error!(Prediction at "force", "the curve has a body force and no contact force: its study's recipe names none; use the body force"),
+                error!(Prediction at "force", "the curve has a body force and no contact force, because its study's recipe names none or it was exported with --force body: use the body force"),
             ),
             (ForceKind::Contact, ForceKind::Contact) => self.of_contact_force(),
             (ForceKind::Body, _) => self.of_body_force(),
@@ -407,7 +407,7 @@ impl PredictedCurve {
         let mut loading = match (force, self.provenance.force_kind) {
             (ForceKind::Contact, ForceKind::Body) => {
                 return Err(
-                    error!(Prediction at "force", "the curve has a body force and no contact force: its study's recipe names none; use the body force"),
+                    error!(Prediction at "force", "the curve has a body force and no contact force, because its study's recipe names none or it was exported with --force body: use the body force"),
                 );
             }
             (ForceKind::Contact, ForceKind::Contact) => self.envelope()?,

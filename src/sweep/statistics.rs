@@ -179,6 +179,14 @@ impl ColumnStatistics {
         }
         (self.count >= LEAST_NUMBERS).then_some(Z * self.sd? / (self.count as f64).sqrt())
     }
+
+    /// What the rows of which [`OVER_LIMITS`] is not known will leave of its half width, however many more there
+    /// are: at least so much with 97.5 % probability.
+    pub(crate) fn lasting_half_width(&self, rows: u64) -> f64 {
+        let Some(mean) = self.mean.filter(|_| self.column == OVER_LIMITS) else { return 0.0 };
+        let unknown = (rows - self.count) as f64 / rows as f64;
+        share_interval(unknown, rows).0 * mean.max(1.0 - mean)
+    }
 }
 
 /// A share of `count` runs with the interval that holds it with 95 % probability (Wilson, JASA 22, 1927).

@@ -29,7 +29,7 @@ pub(crate) struct Precision {
 /// Draws before the precision is looked at for the first time.
 const FIRST: u64 = 100;
 
-/// Runs samples of the sweep until `precision` is reached, or all that its plan states, and writes the rows to `output` as
+/// Runs samples of the sweep until `precision` is reached, or cannot be, or all that its plan states, and writes the rows to `output` as
 /// [`super::write()`] does. Fewer samples of an earlier run are kept. Gives the statistics of the column with the report.
 ///
 /// # Errors
@@ -79,7 +79,9 @@ pub(crate) fn write_until(
         let of = report.columns.iter().find(|of| of.column == precision.column);
         let half_width = of.and_then(|of: &ColumnStatistics| of.half_width(report.rows));
         let is_precise = half_width.is_some_and(|half_width| half_width <= precision.half_width);
-        if !report.is_complete() || is_precise || samples == most {
+        let is_hopeless =
+            of.is_some_and(|of| of.lasting_half_width(report.rows) > precision.half_width);
+        if !report.is_complete() || is_precise || is_hopeless || samples == most {
             return Ok((report, half_width));
         }
         samples =

@@ -169,9 +169,9 @@ struct Chosen {
     /// Case of the group, or GROUP/CASE; may be repeated [default: all]
     #[arg(long, help_heading = "Which cases")]
     case: Vec<String>,
-    /// Impact speeds: 20km/h..40km/h, ..40km/h, 20km/h.. or 36km/h
+    /// Impact speeds: 20km/h..40km/h, ..40km/h, 20km/h.. or 36km/h; may be repeated
     #[arg(long, value_name = "RANGE", allow_hyphen_values = true, help_heading = "Which cases")]
-    speed: Option<SpeedRange>,
+    speed: Vec<SpeedRange>,
     /// Tag that the cases have, or one of several; may be repeated
     #[arg(long, help_heading = "Which cases")]
     tag: Vec<String>,
@@ -182,7 +182,7 @@ impl Chosen {
         Selection {
             groups: self.group.clone(),
             cases: self.case.clone(),
-            speed: self.speed,
+            speeds: self.speed.clone(),
             tags: self.tag.clone(),
         }
     }

@@ -29,15 +29,7 @@ pub(super) struct Args {
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let selection = args.chosen.selection();
-    let Selection { groups, cases, speed, tags } = &selection;
-    if let ([name], [] | [_], None, []) = (&cases[..], &groups[..], speed, &tags[..])
-        && !args.compare
-    {
-        // A name of one group is read by itself.
-        let (group, name) = match (groups.first(), name.split_once('/')) {
-            (None, Some((group, name))) => (Some(group), name),
-            (group, _) => (group.map(String::as_str), name.as_str()),
-        };
+    if let Some((group, name)) = selection.only().filter(|_| !args.compare) {
         let case = Database::read_case(&args.database, group, name)?;
         return show(&[&case], options);
     }
