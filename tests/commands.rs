@@ -599,6 +599,25 @@ fn energy_rule_takes_up_the_kinetic_energy() {
     }
 }
 
+/// The body force takes up the impact's energy by construction: the contact force is held against those of the runs. And how far
+/// the rebound was off is said.
+#[test]
+fn a_contact_force_unlike_the_runs_is_warned_of() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let cases = "--group lead-car-wall --case 12kmh --case 60kmh --case 72kmh";
+    crumple_ok(here, &format!("db copy curves.h5 {cases} --to few.h5 -q"));
+    crumple_ok(here, "train few.h5 --model linear -o few.model -q");
+    let warnings = |model: &str, speed: &str| {
+        let curve = json(&crumple_ok(here, &format!("predict {model} --speed {speed} --json -q")));
+        curve["warnings"].to_string()
+    };
+    says(&warnings("few.model", "20km/h"), "the contact force absorbs 109.9 % of the impact's");
+    assert!(!warnings("lead.model", "20km/h").contains("absorbs"));
+    let printed = crumple_ok(here, "predict lead.model --speed 50km/h");
+    says(&printed, "km/h, off by 3.7 % in the mean of the left-out speeds");
+}
+
 /// Left-out speeds say nothing of a mass that crushes far beyond the runs, or of one that is not a vehicle's.
 #[test]
 fn a_mass_far_from_the_runs_has_no_band() {

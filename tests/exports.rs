@@ -232,16 +232,16 @@ fn octave_reads_the_matrices() {
     assert_eq!(lines[5], "1");
 }
 
-/// JSON is the master format: a copy of it is the same, and one force alone is asked for.
+/// A predicted curve in JSON is exported as one of its forces, which is said.
 #[test]
-fn json_is_copied_whole() {
+fn json_of_one_force_says_so() {
     let folder = demo_folder();
     let here = folder.path();
-    export(here, "lead50.json", "copy.json", &[]);
-    let read = |name: &str| std::fs::read_to_string(here.join(name)).unwrap();
-    assert!(read("copy.json") == read("lead50.json"));
-    export(here, "copy.json", "contact.csv", &["--force", "contact"]);
-    export(here, "copy.json", "body.json", &["--force", "body"]);
+    let notes = export_notes(here, "lead50.json", &["-o", "body.json"]);
+    assert!(notes.contains("the body force alone is exported"), "{notes}");
+    let notes = export_notes(here, "lead.model", &["--speed", "50km/h", "-o", "both.json"]);
+    assert!(!notes.contains("alone"), "{notes}");
+    export(here, "both.json", "contact.csv", &["--force", "contact"]);
     let error = crumple_fails(here, 1, "export body.json --force contact --to csv -o no.csv");
     says(&error, "or it was exported with --force body");
 }

@@ -958,6 +958,38 @@ fn parameters_through_the_commands() {
     assert!(!here.join("m2").exists());
 }
 
+/// The default starts from the crush law, but from `rate` where the runs need more stopped mass than a crush zone holds.
+#[test]
+fn the_default_needs_a_usual_stopped_mass() {
+    // The law of a stopped mass m(d): contact force f (1 − m/M) + m′v², where f slows the body down.
+    let run = |km_per_h: f64, kg_per_m: f64| {
+        let mut case = case(&format!("{km_per_h}"), km_per_h / 3.6, 20e3, &law);
+        let curve = &case.curves.sampled;
+        let (d, f) = (curve.deflection_m(), curve.force_n());
+        let contact = (0..d.len()).map(|i| {
+            let v = case.curves.closing_speed_m_per_s[i].max(0.0);
+            f[i] * (1.0 - kg_per_m * d[i] / 20e3) + kg_per_m * v * v
+        });
+        let (time, d) = (curve.time_s().to_vec(), d.to_vec());
+        let curve = Curve::new(time, d, contact.collect()).unwrap();
+        case.curves.original = curve.clone();
+        case.curves.sampled = curve;
+        case
+    };
+    let reason = |kg_per_m: f64| {
+        let cases = [20.0, 30.0, 40.0, 50.0, 60.0].map(|v| run(v, kg_per_m));
+        let auto = Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None };
+        let model = train("made", &cases, auto).unwrap();
+        let json: serde_json::Value = serde_json::from_slice(&model.to_json().unwrap()).unwrap();
+        let stopped = json["crush_law"]["stopped_kg"].as_array().unwrap();
+        (stopped.last().unwrap().as_f64().unwrap(), model.leave_one_out.unwrap().reason)
+    };
+    let (light_kg, of_light) = reason(1e3);
+    assert!(light_kg < 3e3 && !of_light.contains("of rate"), "{light_kg}: {of_light}");
+    let (heavy_kg, of_heavy) = reason(6e3);
+    assert!(heavy_kg > 3e3 && of_heavy.contains("of rate"), "{heavy_kg}: {of_heavy}");
+}
+
 /// For trains the ends of the range count; a group whose runs tell no stopped mass says so, and the choice continues.
 #[test]
 fn the_choice_for_trains_counts_the_ends() {

@@ -40,7 +40,7 @@ fn the_demo_ends_with_a_small_page_that_needs_nothing() {
         "mean deceleration above 5 g (EN 15227:2020+A1:2024",
         "What drives the interfaces",
         "most energy is absorbed at",
-        "energy dissipated, dampers included",
+        "energy dissipated or damped",
         "Next FE run:",
         "BLAKE3",
         // The template escapes the slash, too.

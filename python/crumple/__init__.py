@@ -25,6 +25,7 @@ import json
 import os
 import re
 import tempfile
+import warnings
 from collections.abc import Mapping
 from numbers import Number
 from pathlib import Path
@@ -354,7 +355,7 @@ class Model:
         the model's further parameters; `energy_correct` scales the forces so that the one that moves
         the body takes up the impact's energy.
 
-        What the program would warn of is in `Curve.warnings`.
+        What the program warns of is a Python warning (`crumple.Warned`), and in `Curve.warnings`.
 
         Raises `crumple.Error` far outside the speeds of the runs (`range`, in m/s), unless `extrapolate`.
         """
@@ -365,7 +366,10 @@ class Model:
         crush = None if crush is None else _quantity("crush", crush, "m")
         mass = None if mass is None else _quantity("mass", mass, "kg")
         document = self._model.predict(speed, crush, extrapolate, mass, max_crush, further, energy_correct)
-        return Curve(json.loads(document))
+        curve = Curve(json.loads(document))
+        for warning in curve.warnings:
+            warnings.warn(warning["message"], Warned, stacklevel=2)
+        return curve
 
     def __reduce__(self):
         return (type(self), (self.path.resolve(),))

@@ -1,8 +1,8 @@
 //! The choice among models that were validated, and the run that would help most.
 //!
 //! Two to five left-out speeds decide little: the model with the smallest mean is often the luckiest one. `auto` therefore starts
-//! from the simplest model of the physics that the runs allow (`crush-law`, else `rate`), and leaves it only for one whose errors at the speeds
-//! left out are smaller by more than the differences scatter: in force, velocity, acceleration and crush together. `validate --subsets` shows what that costs
+//! from the simplest model of the physics that the runs allow (`crush-law`; `rate` where that cannot be had, or needs more stopped mass than crush
+//! zones hold), and leaves it only for one whose errors at the speeds left out are smaller by more than the differences scatter: in force, velocity, acceleration and crush together. `validate --subsets` shows what that costs
 //! against the best model in hindsight. The errors of the chosen model are a little optimistic, so `--nested` repeats the choice without
 //! each left-out speed. For trains the ends of the range count as much as the inner speeds. Two speeds leave nothing to choose by: the
 //! default stands.
@@ -45,14 +45,18 @@ pub enum Selection<'a> {
 
 /// The chosen model and why, by its errors `of` the speeds that count for the purpose; `None` without any model.
 ///
-/// The default is the simplest model whose force follows the closing speed, or if there is none, the one with the smallest mean error.
+/// The default is the first of the `physical` ones, or if there is none, the one with the smallest mean error.
 /// Another takes its place if the mean of the paired differences is larger than their standard deviation, from three speeds on; or, of
 /// fewer, if it is grossly better at each.
-pub(crate) fn choose(of: &[(&str, Vec<f64>)], purpose: Purpose) -> Option<(String, String)> {
+pub(crate) fn choose(
+    of: &[(&str, Vec<f64>)],
+    purpose: Purpose,
+    physical: &[&str],
+) -> Option<(String, String)> {
     let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
     let best = of.iter().min_by(|a, b| mean(&a.1).total_cmp(&mean(&b.1)))?;
-    let physical = default_among(of.iter().map(|(name, _)| *name));
-    let default = of.iter().find(|(name, _)| physical == Some(name)).unwrap_or(best);
+    let physical = physical.iter().find_map(|name| of.iter().find(|model| model.0 == *name));
+    let default = physical.unwrap_or(best);
     let is_better = |(_, errors): &&(&str, Vec<f64>)| {
         let gains: Vec<f64> =
             default.1.iter().zip(errors).map(|(own, other)| own - other).collect();
@@ -102,11 +106,13 @@ pub(crate) fn choose(of: &[(&str, Vec<f64>)], purpose: Purpose) -> Option<(Strin
     Some((default.0.into(), reason))
 }
 
-/// The simplest of these models whose force follows the closing speed.
-pub(super) fn default_among<'a>(names: impl Iterator<Item = &'a str> + Clone) -> Option<&'a str> {
+/// The models whose force follows the closing speed, the default first: the simplest one, but after the others what needs a
+/// stopped mass that the crush zone cannot hold.
+pub(super) fn physical(set: &TrainingSet) -> Vec<&'static str> {
+    let is_doubtful = set.stopped_mass().is_some_and(|m| !m.is_usual(set.masses.effective_kg()));
     let mut physical: Vec<_> = MODELS.iter().filter(|entry| entry.follows_closing).collect();
-    physical.sort_by_key(|entry| entry.complexity);
-    physical.into_iter().find_map(|entry| names.clone().find(|name| *name == entry.name))
+    physical.sort_by_key(|entry| (entry.needs_crush_law && is_doubtful, entry.complexity));
+    physical.into_iter().map(|entry| entry.name).collect()
 }
 
 /// Whether differences at so many speeds have a scatter that says something.
@@ -261,7 +267,7 @@ mod tests {
 
     fn chosen(of: &[(&str, &[f64])]) -> String {
         let of: Vec<(&str, Vec<f64>)> = of.iter().map(|(m, e)| (*m, e.to_vec())).collect();
-        choose(&of, Purpose::Vehicle).unwrap().0
+        choose(&of, Purpose::Vehicle, &["crush-law", "rate"]).unwrap().0
     }
 
     #[test]
@@ -275,11 +281,11 @@ mod tests {
         assert_eq!(chosen(&[law, ("extra", &[0.8, 1.0])]), "crush-law");
         assert_eq!(chosen(&[law, ("extra", &[0.4, 0.5])]), "extra");
         assert_eq!(chosen(&[("crush-law", &[1.0]), ("extra", &[0.1])]), "crush-law");
-        assert!(choose(&[], Purpose::Vehicle).is_none());
+        assert!(choose(&[], Purpose::Vehicle, &["rate"]).is_none());
     }
 
     #[test]
-    fn the_default_is_the_simplest_that_follows_the_closing_speed() {
+    fn the_default_is_the_first_that_follows_the_closing_speed() {
         let rate: (&str, &[f64]) = ("rate", &[1.0]);
         let linear: (&str, &[f64]) = ("linear", &[0.9]);
         assert_eq!(chosen(&[linear, rate]), "rate");

@@ -191,6 +191,10 @@ impl<'a> LeftOutCase<'a> {
             energy_error: *energy_error,
             max_crush_error: *max_crush_error,
             max_crush_errors: BTreeMap::new(),
+            rebound_error: curve
+                .rebound
+                .zip(self.own.motion.rebound_speed_m_per_s)
+                .map(|(predicted, fe)| predicted.speed_m_per_s / fe - 1.0),
             peaks: peak_errors(&along, &reference, &predicted),
             velocity_l1: body.velocity_l1,
             acceleration_l1: body.acceleration_l1,

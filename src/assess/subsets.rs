@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use super::choose::{Purpose, scores};
+use super::choose::{Purpose, physical, scores};
 use super::left_out::LeftOutCase;
 use super::scatter::scatter;
 use super::validate::{
@@ -106,7 +106,7 @@ fn subset(
     left_out.retain(|case| case.inner);
     let own = trials(&fitting, &left_out);
     let tables = Tables::of(&fitting, &own, left_out.len(), (set.force_kind, None));
-    let (chosen, _) = tables.chosen(Purpose::Vehicle)?;
+    let (chosen, _) = tables.chosen(Purpose::Vehicle, &physical(&kept))?;
     let mut rows: Vec<LeftOut> = Vec::new();
     let mut means = Vec::new();
     let mut inside: BTreeMap<String, Vec<f64>> = BTreeMap::new();

@@ -12,7 +12,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::against::Against;
-use super::choose::{NextRun, Purpose, Selection, choose, default_among, scores};
+use super::choose::{NextRun, Purpose, Selection, choose, physical, scores};
 use super::left_out::{Answers, LeftOutCase, LeftOutRun, Score, query_of};
 use super::scatter::scatter;
 use super::subsets::OverSubsets;
@@ -126,8 +126,9 @@ pub(super) fn choose_and_fit(group: &str, cases: &[Case], seed: u64) -> Result<M
     left_out.retain(|case| case.inner);
     let trials = trials(&fitting, &left_out);
     let tables = Tables::of(&fitting, &trials, left_out.len(), (set.force_kind, None));
-    let (chosen, _) =
-        tables.chosen(Purpose::Vehicle).unwrap_or_else(|| without_validation(&fitting));
+    let physical = physical(&set);
+    let chosen = tables.chosen(Purpose::Vehicle, &physical);
+    let (chosen, _) = chosen.unwrap_or_else(|| without_validation(&fitting, &physical));
     let all = ModelKind::all(seed);
     let kind = all.into_iter().find(|kind| kind.name() == chosen).expect("it is among all");
     let mut model = Model::fit(&set, kind)?;
@@ -213,7 +214,9 @@ pub(crate) fn validate_speeds(
     let (chosen, reason) = match selection {
         Selection::Named(model) => (model.to_string(), "asked for".into()),
         Selection::Best(purpose) => {
-            tables.chosen(purpose).unwrap_or_else(|| without_validation(&fitting))
+            let physical = physical(&set);
+            let chosen = tables.chosen(purpose, &physical);
+            chosen.unwrap_or_else(|| without_validation(&fitting, &physical))
         }
     };
     let [band, band_outside] = tables.bands(&chosen, declared, scatter_of(declared));
@@ -369,8 +372,8 @@ impl Tables {
     }
 
     /// The model chosen for a purpose, and why.
-    pub(super) fn chosen(&self, purpose: Purpose) -> Option<(String, String)> {
-        choose(&scores(&self.means, &self.rows, purpose), purpose)
+    pub(super) fn chosen(&self, purpose: Purpose, physical: &[&str]) -> Option<(String, String)> {
+        choose(&scores(&self.means, &self.rows, purpose), purpose, physical)
     }
 
     /// The bands of one force of a model: between training speeds, and outside of them.
@@ -506,9 +509,10 @@ fn without_means(model: &str) -> String {
 }
 
 /// With too few speeds to leave one out: the default, or the nearest of cases that differ in more than speed.
-fn without_validation(fitting: &[ModelKind]) -> (String, String) {
-    let default = default_among(fitting.iter().map(ModelKind::name)).unwrap_or("nearest");
-    (default.into(), "too few speeds to leave one out".into())
+fn without_validation(fitting: &[ModelKind], physical: &[&str]) -> (String, String) {
+    let fits = |name: &&&str| fitting.iter().any(|kind| kind.name() == **name);
+    let default = physical.iter().find(fits).unwrap_or(&"nearest");
+    ((*default).into(), "too few speeds to leave one out".into())
 }
 
 /// The rule for the maximum crush: the body's motion, unless another has answers at more of the speeds; the reference method keeps its
@@ -553,6 +557,11 @@ fn mean_over(model: &str, rule: MaxCrushRule, rows: Vec<&LeftOut>) -> Option<Mea
                 Some((rule, errors?.iter().sum::<f64>() / rows.len() as f64))
             })
             .collect(),
+        rebound_error: rows
+            .iter()
+            .map(|r| Some(r.rebound_error?.abs()))
+            .sum::<Option<f64>>()
+            .map(|sum| sum / rows.len() as f64),
         velocity_l1: over(|r| r.velocity_l1),
         acceleration_l1: over(|r| r.acceleration_l1),
         acceleration_unfiltered_l1: over(|r| r.acceleration_unfiltered_l1),

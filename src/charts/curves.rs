@@ -10,7 +10,7 @@ use crate::error::{Error, error};
 use crate::plot::{self, Axis, Chart, Mark, Panel, Series, Shown};
 use crate::surrogate::band::{Band, LeftOutSpeeds};
 use crate::surrogate::{ModelCase, PredictedCurve, predict};
-use crate::unit::km_per_h;
+use crate::unit::{SpeedKind, km_per_h};
 
 /// Axes of force over deflection.
 fn axes(largest_n: f64) -> Panel {
@@ -236,7 +236,10 @@ pub(crate) fn left_out(LeftOutPrediction { case, curve, motion }: LeftOutPredict
     if let Some((time_s, v_m_per_s)) = motion {
         let mut speeds =
             Panel::new(Axis::new("time", "ms", 1e3), Axis::new("closing speed", "m/s", 1.0));
-        speeds.title = "one mass against a wall".into();
+        speeds.title = match case.conditions.speed.kind {
+            SpeedKind::Wall => "one mass against a wall".into(),
+            SpeedKind::Closing => "the pair as one reduced mass".into(),
+        };
         let end = time_s.last().copied().unwrap_or_default();
         let states = case.curves.sampled.time_s().iter().take_while(|t| **t <= end).count();
         let fe_time = case.curves.sampled.time_s()[..states].to_vec();

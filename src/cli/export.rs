@@ -90,7 +90,7 @@ pub(super) struct Target {
     /// Units of the file, such as mm-t-s (default: lsdyna and radioss the study's, adams mm and N, others SI)
     #[arg(long, value_parser = units)]
     units: Option<UnitSystem>,
-    /// Which force [default: body; JSON holds both]
+    /// Which force [default: body; JSON of a model's or a database's curve holds both]
     #[arg(long, value_parser = one_of(FORCES))]
     force: Option<ForceKind>,
     /// Number of the first curve in the target's deck [default: 101]
@@ -296,8 +296,18 @@ fn export_curves(
     input: &Input,
     output: Option<&Path>,
 ) -> Result<(Exported, Vec<String>), Failure> {
-    let (curves, quality) = input.curves(args)?;
-    let (notes, mut warnings) = quality.map_or_else(Default::default, |q| (q.notes, q.warnings));
+    let (mut curves, quality) = input.curves(args)?;
+    let (mut notes, mut warnings) =
+        quality.map_or_else(Default::default, |q| (q.notes, q.warnings));
+    if let (Input::Curve(curve), true, None) =
+        (input, format.holds_both_forces(), args.target.force)
+    {
+        // The file itself holds both.
+        curves[0] = curve.of_force(ForceKind::Body)?;
+        if curve.provenance.force_kind == ForceKind::Contact {
+            notes.push("the body force alone is exported, which drives a body of one mass: --force contact exports the contact force, and the file itself has both".into());
+        }
+    }
     for warning in curves.iter().flat_map(|c| &c.warnings).map(ToString::to_string) {
         if !warnings.contains(&warning) {
             warnings.push(warning);

@@ -192,7 +192,11 @@ fn lines(curve: &PredictedCurve) -> Vec<(&'static str, String)> {
         let drives = kind.drives();
         lines.push(("unloading", format!("{shown} of the {name} force, which drives {drives}")));
     }
-    lines.extend(curve.rebound.map(|rebound| ("rebound", km_per_h(rebound.speed_m_per_s))));
+    lines.extend(curve.rebound.map(|rebound| {
+        let error = rebound.left_out_error.map(percent);
+        let error = error.map(|e| format!(", off by {e} in the mean of the left-out speeds"));
+        ("rebound", km_per_h(rebound.speed_m_per_s) + &error.unwrap_or_default())
+    }));
     for (force, band) in provenance.bands() {
         let (share, level) = (percent(band.pointwise_share), band.level * 100.0);
         let (force, rests_on) = (force.name(), rests_on(&band, provenance.in_range));

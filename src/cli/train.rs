@@ -209,9 +209,6 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     Ok(outcome)
 }
 
-/// Crush zones with their equipment are up to about a tenth of a vehicle; beyond this share that is said.
-const USUAL_SHARE: f64 = 0.15;
-
 /// How much of the crush zone stops before the body, over which deflection, and how well the runs agree.
 pub(super) fn stopped_mass_line(stopped: &StoppedMass, kind: SpeedKind, moved_kg: f64) -> String {
     let (end_m, all_kg) = stopped.in_all();
@@ -221,12 +218,12 @@ pub(super) fn stopped_mass_line(stopped: &StoppedMass, kind: SpeedKind, moved_kg
     };
     let scatter_kg = stopped.residual_kg;
     let share = all_kg / moved_kg;
-    let unusual = match share > USUAL_SHARE {
-        true => format!(
+    let unusual = match stopped.is_usual(moved_kg) {
+        false => format!(
             "; {:.0} % of the moving mass is more than crush zones hold: part of it stands for what else lies between contact force and body, such as parts that turn or vibrate",
             share * 100.0
         ),
-        false => String::new(),
+        true => String::new(),
     };
     format!(
         "crush law: {all_kg:.0} kg {of} come to rest within {end_m:.3} m of crush (scatter {scatter_kg:.0} kg RMS){unusual}"

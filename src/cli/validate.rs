@@ -356,6 +356,11 @@ fn print_summary(out: &mut dyn Write, validation: &Validation) -> io::Result<()>
         output::table(out, table)?;
     }
     writeln!(out, "{} chosen (*): {}", validation.chosen, validation.reason)?;
+    // The other models need what few groups have.
+    let is_rate = |unsuited: &&String| unsuited.starts_with("rate: ");
+    if let Some(unsuited) = validation.unsuited.iter().find(is_rate) {
+        writeln!(out, "without {unsuited}")?;
+    }
     print_acceptance(out, validation, "")?;
     for (force, band) in bands(validation) {
         let span = km_per_h(band.span_m_per_s);
@@ -432,9 +437,12 @@ fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
                 error.map_or("-".into(), |e| format!("{}{mark}", percent(*e)))
             });
         }
-        table = table.column("velocity", |m| percent(m.velocity_l1)).column("acceleration", |m| {
-            acceleration(m.acceleration_l1, m.acceleration_unfiltered_l1)
-        });
+        table = table
+            .column("rebound", |m| m.rebound_error.map_or("-".into(), percent))
+            .column("velocity", |m| percent(m.velocity_l1))
+            .column("acceleration", |m| {
+                acceleration(m.acceleration_l1, m.acceleration_unfiltered_l1)
+            });
         for force in ["contact", "body"] {
             let floors = validation.floors.iter().filter(|f| f.inner && f.force == force);
             let count = floors.clone().count();

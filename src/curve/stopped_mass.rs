@@ -48,6 +48,8 @@ const SHORTER_AT_TIP: f64 = 1.5;
 const FAST: f64 = 0.25;
 /// Largest part of the mass that a crush zone may stop: beyond it the runs are inconsistent.
 const MOST_STOPPED: f64 = 0.5;
+/// Crush zones with their equipment are up to about a tenth of a vehicle.
+const USUAL_SHARE: f64 = 0.15;
 /// The runs' momentum must agree on the stopped mass within this share of it; otherwise it is unknown.
 const AGREES: f64 = 0.5;
 /// Points of a segment at which a run's force and speed are averaged.
@@ -104,6 +106,12 @@ impl StoppedMass {
         let all_kg = self.stopped_kg[self.stopped_kg.len() - 1];
         let i = self.stopped_kg.iter().position(|&m| m >= all_kg).unwrap_or(0);
         (self.deflection_m[i], all_kg)
+    }
+
+    /// Whether it is not more of the moving mass than crush zones with their equipment hold: more stands for what
+    /// else lies between contact force and body, such as an engine, or parts that turn or vibrate.
+    pub(crate) fn is_usual(&self, moved_kg: f64) -> bool {
+        self.in_all().1 <= USUAL_SHARE * moved_kg
     }
 
     pub(crate) fn at(&self, deflection_m: f64) -> f64 {

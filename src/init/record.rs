@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use super::folders::{Reason, speed_in};
-use super::measure::{Impact, MassEstimates};
+use super::measure::{Impact, MassEstimates, interval};
 use super::recipe::CommonRecipe;
 use super::sources::{Source, Sources, component, impulse, picked, rising, velocity};
 use super::survey::{STOPPED, Survey, bracketed};
@@ -215,8 +215,15 @@ impl Record {
             in_free_flight: in_free_flight.unwrap_or_default(),
             unexplained: self.unexplained(k),
             by_energy: kg(&by_energy, k),
+            coarseness: self.coarseness().unwrap_or_default(),
         };
         (0..self.velocities.len()).map(estimates).collect()
+    }
+
+    /// The interval of the states over the time from contact to the end of the loading.
+    fn coarseness(&self) -> Option<f64> {
+        let (first, end) = (self.contact()?.0, self.loading_end().ok()?);
+        Some(interval(&self.time) / (self.time[end] - first)).filter(|c| (0.0..1.0).contains(c))
     }
 
     /// The first body's mass, given or by kinetic energy, over that by momentum.

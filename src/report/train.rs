@@ -403,14 +403,14 @@ fn interfaces(summary: &Summary<'_>) -> impl Into<Table> {
         .column("peak force", move |of| of.load_n().map_or("–".into(), |n| force.text(n)))
         .column("maximum crush", |of| metres(of.history.max_deflection_m))
         .column("time of it", |of| format!("{:.1} ms", 1e3 * of.history.max_deflection_time_s))
-        .column("energy dissipated, dampers included", |of| {
+        .column("energy dissipated or damped", |of| {
             energy.text(of.history.dissipated_at_end_j + of.history.damped_j.unwrap_or(0.0))
         })
-        .column("energy stored", |of| energy.text(of.history.stored_at_end_j))
+        .column("stored", |of| energy.text(of.history.stored_at_end_j))
         .column("share of energy", |of| of.energy_share.map_or("–".into(), percent))
         .column("curve", |of| &of.used.curve)
-        .column("which force", |of| of.used.force.unwrap_or("unknown"))
-        .column("curve for a speed of", |of| of.used.speed_m_per_s.map_or("–".into(), km_per_h))
+        .column("force", |of| of.used.force.unwrap_or("unknown"))
+        .column("for a speed of", |of| of.used.speed_m_per_s.map_or("–".into(), km_per_h))
 }
 
 /// Where each curve comes from, and how wrong its model was at speeds that it did not know.

@@ -30,6 +30,9 @@ pub struct LeftOut {
     pub max_crush_error: f64,
     /// Maximum crush by every rule that has an answer.
     pub max_crush_errors: BTreeMap<MaxCrushRule, f64>,
+    /// Speed of the rebound from the curve's maximum crush, where both are known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rebound_error: Option<f64>,
     /// The first two peaks of FE's curve.
     pub(crate) peaks: Vec<PeakError>,
     /// Multi-body run driven by the model's body force; by the declared one if the two are
@@ -110,6 +113,9 @@ pub struct Means {
     pub max_crush_rule: MaxCrushRule,
     /// By every rule that has an answer at all inner speeds.
     pub max_crush_errors: BTreeMap<MaxCrushRule, f64>,
+    /// Magnitude of the error of the rebound's speed, if it is known at all of these speeds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rebound_error: Option<f64>,
     /// Of the velocity.
     pub velocity_l1: f64,
     /// Of accelerations filtered with CFC 60.

@@ -203,21 +203,22 @@ impl Model {
 
     /// The first case whose work cannot be that of its impact, in words.
     fn impossible_case(&self) -> Option<String> {
+        let (least, most) = POSSIBLE;
+        let found = self.work_over_energy().find(|(_, ratio)| !(least..=most).contains(ratio));
+        found.map(|(name, ratio)| {
+            format!("the work of its case \"{name}\" is {ratio:.3} of the impact's energy")
+        })
+    }
+
+    /// Name of each whole case of the group's mass, and the work of its force over the impact's energy.
+    pub(super) fn work_over_energy(&self) -> impl Iterator<Item = (&str, f64)> {
         let masses = Masses { body_kg: self.mass_kg, other_kg: self.other_mass_kg };
-        self.cases.iter().filter(|case| !case.truncated && case.features.is_empty()).find_map(
-            |case| {
-                let curve = Envelope::new(case.deflection_m.clone(), case.force_n.clone()).ok()?;
-                let speed = Speed { m_per_s: case.speed_m_per_s, kind: self.speed_kind };
-                let ratio = curve.work() / masses.kinetic_energy_j(speed);
-                let (least, most) = POSSIBLE;
-                (!(least..=most).contains(&ratio)).then(|| {
-                    format!(
-                        "the work of its case \"{}\" is {ratio:.3} of the impact's energy",
-                        case.name
-                    )
-                })
-            },
-        )
+        let whole = self.cases.iter().filter(|case| !case.truncated && case.features.is_empty());
+        whole.filter_map(move |case| {
+            let curve = Envelope::new(case.deflection_m.clone(), case.force_n.clone()).ok()?;
+            let speed = Speed { m_per_s: case.speed_m_per_s, kind: self.speed_kind };
+            Some((&*case.name, curve.work() / masses.kinetic_energy_j(speed)))
+        })
     }
 
     /// What a fitted model guarantees and a file might not.

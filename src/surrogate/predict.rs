@@ -22,7 +22,7 @@ use super::query::{Query, ResolvedQuery};
 use super::spikes::without_spikes;
 use super::warning::is_unlike;
 use super::{Model, QueryPoint, Warning};
-use crate::curve::{Envelope, ForceCurve, ForceKind, is_beyond};
+use crate::curve::{EnergyAudit, Envelope, ForceCurve, ForceKind, is_beyond};
 use crate::dataset::{OTHER_MASS, grid, nearest};
 use crate::error::{Error, error};
 
@@ -273,6 +273,9 @@ impl<'a> Prediction<'a> {
         let is_worse = |other: &f64| is_moving || (other - 1.0).abs() > (energy - 1.0).abs();
         let unloading = asked.unloading_n_per_m();
         warnings.extend(asked.warnings(unloading, body_energy.filter(is_worse).unwrap_or(energy)));
+        if is_moving && body_energy.is_some_and(|e| (e - 1.0).abs() <= EnergyAudit::TOLERANCE) {
+            warnings.extend(contact_mismatch(model, energy));
+        }
         let (crush_m, data_end_m) = (declared.end_m(), model.largest_crush_m());
         if is_beyond(crush_m, data_end_m) {
             warnings.push(Warning::beyond_data(crush_m, data_end_m));
@@ -341,6 +344,16 @@ impl<'a> Prediction<'a> {
             body.map(|b| curve.stiffness_where_stopped(&b, ForceKind::Body));
         curve
     }
+}
+
+/// If the contact force absorbs less or more of the impact's energy than in any of the runs: it also stops the mass of the crush
+/// zone, so that theirs is not 1 either.
+fn contact_mismatch(model: &Model, energy: f64) -> Option<Warning> {
+    let runs = model.work_over_energy().map(|(_, ratio)| ratio);
+    let (least, most) = runs.fold((f64::INFINITY, 0.0), |(l, m), of| (of.min(l), of.max(m)));
+    let usual = least - EnergyAudit::TOLERANCE..=most + EnergyAudit::TOLERANCE;
+    (least <= most && !usual.contains(&energy))
+        .then(|| Warning::contact_energy_mismatch(energy, (least, most)))
 }
 
 /// The force times `factor`.

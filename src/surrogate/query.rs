@@ -182,6 +182,11 @@ impl<'a> ResolvedQuery<'a> {
         Some(Rebound {
             speed_m_per_s: speed * (self.v / equal_v),
             stiffness_n_per_m: rebound_stiffness_n_per_m(top_n, trained_kg, speed)?,
+            left_out_error: self
+                .model
+                .leave_one_out
+                .as_ref()
+                .and_then(|of| of.chosen_means()?.rebound_error),
         })
     }
 

@@ -47,6 +47,7 @@ impl PredictedCurve {
             speed_m_per_s: top_n
                 / (stiffness_n_per_m * case.conditions.masses.effective_kg()).sqrt(),
             stiffness_n_per_m,
+            left_out_error: None,
         });
         let mut curve = Self {
             body_force_n: body.as_ref().map(|b| at(&b.loading)),

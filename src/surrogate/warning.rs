@@ -205,6 +205,18 @@ impl Warning {
         }
     }
 
+    pub(crate) fn contact_energy_mismatch(ratio: f64, (least, most): (f64, f64)) -> Self {
+        Self {
+            code: WarningCode::EnergyMismatch,
+            message: format!(
+                "the contact force absorbs {:.1} % of the impact's kinetic energy, in the training runs {:.1} to {:.1} %",
+                ratio * 100.0,
+                least * 100.0,
+                most * 100.0
+            ),
+        }
+    }
+
     /// Warnings of a recorded case: that it ended while loading, and those of its build.
     pub(crate) fn of_case(name: &str, truncated: bool, warnings: &[String]) -> Vec<Self> {
         let own = warnings.iter().filter(|w| !truncated || !w.starts_with("truncated:"));
