@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use crate::common::{
     build_fixture, crumple_fails, crumple_in, crumple_ok as ok, crumple_started, edited, entries,
-    fixture, held_by_another, is_thorough, json, program, python, says, study_in,
+    fixture, held_by_another, is_thorough, json, program, python, said, says, study_in,
 };
 use crumple::curve::Case;
 use crumple::database::Database;
@@ -1256,4 +1256,18 @@ fn h5py_reads_what_was_edited_in_place() {
     ok(here, "db rm curves.h5 --group nose --case 12kmh");
     ok(here, "db copy curves.h5 --group nose --to-group copies");
     assert_eq!(count(), 16 * 6);
+}
+
+/// Runs of two designs in one group are told from one another by their peaks.
+#[test]
+fn another_design_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    for (group, case) in [(WALL, "18kmh"), ("staged-lead-wall", "20kmh")] {
+        build_fixture(here, group);
+        let of = format!("db copy curves.h5 --group {group} --case {case}");
+        ok(here, &format!("{of} --to-group mixed --to mixed.h5 -q"));
+    }
+    let said = said(&crumple_in(here, "db ls mixed.h5"));
+    says(&said, "its peaks come in a different order from those of 18kmh");
 }

@@ -367,13 +367,17 @@ fn stored_forests() {
         *damaged.pointer_mut(part).unwrap() = wrong;
         assert_eq!(read(damaged).check().unwrap_err().to_string(), expected, "{part}");
     }
-    let mut numbers =
-        BASE64_STANDARD.decode(stored["trees"][0]["number"].as_str().unwrap()).unwrap();
-    numbers[..8].copy_from_slice(&f64::INFINITY.to_le_bytes());
-    let infinite = BASE64_STANDARD.encode(numbers);
+    for wrong in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+        let mut damaged = stored.clone();
+        let number = &mut damaged["trees"][0]["number"];
+        let mut numbers = BASE64_STANDARD.decode(number.as_str().unwrap()).unwrap();
+        numbers[..8].copy_from_slice(&wrong.to_le_bytes());
+        *number = BASE64_STANDARD.encode(numbers).into();
+        let error = read(damaged).check().unwrap_err().to_string();
+        assert_eq!(error, "node 0 holds a value that is not finite", "{wrong}");
+    }
     for (text, expected) in [
         ("AAAA", "the node arrays of a tree differ in length"),
-        (&infinite, "node 0 of a tree holds a value that is not finite"),
         ("*", "number of a tree: Invalid symbol 42, offset 0."),
     ] {
         let mut damaged = stored.clone();

@@ -544,6 +544,8 @@ fn h5py_finds_in_large_hdf5_what_csv_holds() {
     }
     folder.ok("sweep -q merge -o all.h5 p1.csv p2.csv");
     folder.ok("sweep merge -q -o converted.h5 out.csv");
+    // Options of a sweep are none of its merge.
+    says(&folder.fails(2, "sweep --restart merge -o all.csv p1.csv p2.csv"), "cannot be used with");
     let whole = folder.read("out.h5");
     assert!(whole.len() > 1 << 20);
     assert!(folder.read("all.h5") == whole && folder.read("converted.h5") == whole);
@@ -715,7 +717,7 @@ fn what_is_not_known_is_not_precise() {
     let text = SCENARIO.replace("60ms", "200ms");
     folder.put("nose.csv", "d_m,force_MN\n0,0\n0.02,3\n0.05,1.6\n5,2\n");
     folder.put("s.toml", &format!("{text}{limits}{plan}"));
-    let report = folder.json("sweep s.toml -o out.csv --until over_limits=0.05 --json -q");
+    let report = folder.json("sweep s.toml -o out.csv --until over_limits=0.02 --json -q");
     let until = &report["until"];
     let (numbers, rows) = (until["numbers"].as_u64().unwrap(), report["rows"].as_u64().unwrap());
     assert!(numbers < rows, "some are not known: {report}");
@@ -725,9 +727,9 @@ fn what_is_not_known_is_not_precise() {
     );
     // More rows would not help, so that it ends early.
     assert_eq!((rows, &until["is_reached"]), (100, &false.into()));
-    let output = crumple_in(folder.path(), "sweep s.toml -o again.csv --until over_limits=0.05");
+    let output = crumple_in(folder.path(), "sweep s.toml -o again.csv --until over_limits=0.02");
     let said = String::from_utf8(output.stderr).unwrap();
-    assert!(said.contains("it is not known in") && said.contains("which alone leave ±"), "{said}");
+    assert!(said.contains("it is not known in") && said.contains("that alone leaves ±"), "{said}");
     // The table says of how many rows its numbers are.
     let printed = folder.ok("sweep s.toml -o table.csv");
     let said = "numbers of some rows only: over_limits (known in ";

@@ -351,7 +351,7 @@ class Model:
         by the model's mean error.
 
         `mass` (kg, or "30t") is that of the body if it is not the runs'; `max_crush` the rule for the largest deflection: "spline",
-        "monotone", "energy" or "motion" (default: the one that was best when speeds were left out); `parameters` a dict of
+        "monotone", "energy" or "motion" (default: "motion", if it has an answer at every speed left out); `parameters` a dict of
         the model's further parameters; `energy_correct` scales the forces so that the one that moves
         the body takes up the impact's energy.
 

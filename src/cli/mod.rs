@@ -292,9 +292,19 @@ fn parsed(arguments: Vec<OsString>) -> Result<Cli, u8> {
     })
 }
 
-/// Flags between `sweep` and its `merge` go before both: clap takes them for those of a sweep.
+/// Global flags between `sweep` and its `merge` go before both: clap takes them for those of a sweep.
 fn flags_first(mut arguments: Vec<OsString>) -> Vec<OsString> {
-    let is_flag = |word: &OsString| word.to_string_lossy().starts_with('-');
+    const FLAGS: [&str; 8] = [
+        "--json",
+        "-q",
+        "--quiet",
+        "-v",
+        "--verbose",
+        "--strict",
+        "--accept-changed",
+        "--overwrite",
+    ];
+    let is_flag = |word: &OsString| FLAGS.iter().any(|flag| *word == **flag);
     let mut words = (1..arguments.len()).filter(|&k| !is_flag(&arguments[k]));
     if let (Some(first), Some(second)) = (words.next(), words.next())
         && (arguments[first] == "sweep" && arguments[second] == "merge")

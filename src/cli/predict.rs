@@ -194,7 +194,7 @@ fn lines(curve: &PredictedCurve) -> Vec<(&'static str, String)> {
     }
     lines.extend(curve.rebound.map(|rebound| {
         let error = rebound.left_out_error.map(percent);
-        let error = error.map(|e| format!(", off by {e} in the mean of the left-out speeds"));
+        let error = error.map(|e| format!(", off by {e} on average at the left-out speeds"));
         ("rebound", km_per_h(rebound.speed_m_per_s) + &error.unwrap_or_default())
     }));
     for (force, band) in provenance.bands() {

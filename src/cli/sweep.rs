@@ -350,8 +350,9 @@ fn until(
         let why = if lasting > *wanted {
             let unknown = report.rows - reached.numbers;
             format!(
-                "it is not known in {unknown} of {}, which alone leave ± {}, however many there are: give longer curves or a longer duration",
+                "it is not known in {unknown} of {}, {} of which failed; that alone leaves ± {}, however many there are: give longer curves or a longer duration",
                 counted(report.rows, "run"),
+                report.failed,
                 digits(lasting)
             )
         } else {

@@ -18,12 +18,12 @@ use super::{Case, Envelope, ForceKind};
 use crate::error::Error;
 use crate::unit::SpeedKind;
 
-/// A crush beyond a curve's data by less than this share is that of another unloading or step.
-const BEYOND: f64 = 0.01;
+/// A crush beyond a curve's data by less than this share, or less than this in m, is that of another unloading or step.
+const BEYOND: (f64, f64) = (0.01, 1e-4);
 
 /// Whether a crush goes so far beyond the data of its curve that the force there matters.
 pub(crate) fn is_beyond(crush_m: f64, data_end_m: f64) -> bool {
-    crush_m > (1.0 + BEYOND) * data_end_m
+    crush_m > data_end_m + (BEYOND.0 * data_end_m).max(BEYOND.1)
 }
 
 /// A force–deflection curve that can drive an interface, with what its source knows of it.

@@ -165,23 +165,21 @@ impl<'de, F: Float> Deserialize<'de> for Tree<F> {
         };
         let features = bytes("feature", &stored.feature)?;
         let (lefts, numbers) = (bytes("left", &stored.left)?, bytes("number", &stored.number)?);
-        let (features, lefts) = (features.as_chunks().0, lefts.as_chunks().0);
-        let numbers = numbers.as_chunks().0;
-        if [lefts.len(), numbers.len()] != [features.len(); 2] {
+        if features.len() % 4 != 0
+            || (lefts.len(), numbers.len()) != (features.len(), 2 * features.len())
+        {
             return Err(D::Error::custom("the node arrays of a tree differ in length"));
         }
+        let (features, lefts) = (features.as_chunks().0, lefts.as_chunks().0);
+        let numbers = numbers.as_chunks().0;
         let mut tree = Self::with_capacity(features.len());
         for ((&feature, &left), &number) in features.iter().zip(lefts).zip(numbers) {
-            let (node, number) = (tree.nodes(), F::cast(f64::from_le_bytes(number)));
-            if !number.is_finite() {
-                return Err(D::Error::custom(format_args!(
-                    "node {node} of a tree holds a value that is not finite"
-                )));
-            }
-            tree.push_leaf(number);
-            let feature = i32::from_le_bytes(feature);
+            let (feature, number) = (i32::from_le_bytes(feature), f64::from_le_bytes(number));
+            let node = tree.push_leaf(F::cast(number));
             if feature != LEAF {
-                tree.split(node, feature as usize, number, u32::from_le_bytes(left) as usize);
+                // What is not finite is found by the check, and must not look like a leaf.
+                let threshold = F::cast(if number.is_finite() { number } else { f64::NAN });
+                tree.split(node, feature as usize, threshold, u32::from_le_bytes(left) as usize);
             }
         }
         Ok(tree)
@@ -308,7 +306,11 @@ impl<F: Float> Tree<F> {
             return damaged("a tree has no nodes".into());
         }
         for node in 0..nodes {
-            let Some((feature, _, left)) = self.split_at(node) else { continue };
+            let split = self.split_at(node);
+            if !split.map_or(self.value[node], |(_, threshold, _)| threshold).is_finite() {
+                return damaged(format!("node {node} holds a value that is not finite"));
+            }
+            let Some((feature, _, left)) = split else { continue };
             if feature as usize >= features {
                 let feature = feature as i32;
                 return damaged(format!("node {node} splits on feature {feature} of {features}"));

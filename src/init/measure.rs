@@ -75,6 +75,9 @@ const SAME_BY_ENERGY: f64 = 0.05;
 /// Masses of runs that differ by less are one: so much two runs of one model scatter.
 pub(super) const SAME_MASS: f64 = 0.03;
 
+/// Largest share by which coarse records may let a mass be off.
+const MOST_COARSE: f64 = 0.03;
+
 /// What a run says of a mass, in kg.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct MassEstimates {
@@ -84,7 +87,8 @@ pub(super) struct MassEstimates {
     /// Share by which other forces than the contact's may have changed it.
     pub unexplained: f64,
     pub by_energy: Option<f64>,
-    /// Interval of the states over the time from contact to the largest crush, of which a mass by momentum may be off by half.
+    /// Interval of the states over the time from contact to the largest crush, of which a mass by momentum may be off by
+    /// half; after the contact that of the forces alone.
     pub coarseness: f64,
 }
 
@@ -154,7 +158,7 @@ pub(super) fn agree(
     }
     let of = |(k, (_, mass)): (usize, &(String, MassEstimates))| {
         let (kg, by_energy) = mass.kg()?;
-        Some((k, kg, if by_energy { 0.0 } else { 0.5 * mass.coarseness }))
+        Some((k, kg, if by_energy { 0.0 } else { (0.5 * mass.coarseness).min(MOST_COARSE) }))
     };
     let mut by_mass: Vec<(usize, f64, f64)> = runs.iter().enumerate().filter_map(of).collect();
     by_mass.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -162,6 +166,13 @@ pub(super) fn agree(
     for one in by_mass.chunk_by(|a, b| is_near(a.1, b.1, SAME_MASS + a.2 + b.2)) {
         let median = 0.5 * (one[(one.len() - 1) / 2].1 + one[one.len() / 2].1);
         let (least, most) = (one[0].1, one[one.len() - 1].1);
+        if !is_near(least, most, SAME_MASS) {
+            warnings.push(format!(
+                "mass: the runs' masses by momentum lie between {} and {}, which their coarse records leave open: one mass is taken; give --mass if it is known",
+                shown_mass(least),
+                shown_mass(most)
+            ));
+        }
         for &(k, ..) in one {
             let mut from = runs[k].1.from();
             if one.len() > 1 {
@@ -307,7 +318,8 @@ mod tests {
         assert!(differ(&found).unwrap().contains("(20.2, 24 t)"));
         // A state every 2 ms of a crash of 60 ms leaves a few per cent open.
         let coarse = |kg: f64, coarseness| MassEstimates { coarseness, ..by_momentum(kg) };
-        for (coarseness, masses) in [(0.03, 1), (0.001, 2)] {
+        assert!(warnings.is_empty());
+        for (coarseness, masses) in [(0.03, 1), (0.001, 2), (0.0, 2)] {
             let runs = [19_480.0, 20_440.0].map(|kg| (format!("{kg}"), coarse(kg, coarseness)));
             let mut found: Vec<f64> = agree(&runs, "unknown", &mut warnings)
                 .iter()
@@ -315,6 +327,7 @@ mod tests {
                 .collect();
             found.dedup();
             assert_eq!(found.len(), masses, "{coarseness}: {found:?}");
+            assert_eq!(warnings.drain(..).count(), 2 - masses, "one mass of several is said");
         }
     }
 

@@ -211,21 +211,45 @@ impl<'a> RunView<'a> {
             self.best.clone()
         };
         self.check_kind(*of_others)?;
-        Ok(explained.map(|mut explained| {
-            let named = [hints.node, hints.minus_node];
-            for (slot, id) in named.into_iter().enumerate().take(explained.bodies.len()) {
-                let is_of = |node: &NodeCandidate| Some(node.id) == id;
-                let has = |body: &Body| body.nodes.iter().any(is_of);
-                // The body of a node that the caller names is the one, whatever the force explains better.
-                if let Some(body) = self.survey.bodies.iter().position(has) {
-                    match explained.bodies.iter().position(|other| *other == body) {
-                        Some(place) => explained.bodies.swap(slot, place),
-                        None => explained.bodies[slot] = body,
-                    }
+        explained.map(|explained| self.with_named(explained, hints)).transpose()
+    }
+
+    /// The bodies of the nodes that the caller names are the ones, whatever the force explains better.
+    fn with_named(&self, mut of: Explanation, hints: &UserHints) -> Result<Explanation, String> {
+        let body = |id: Option<i64>| {
+            let has = |body: &Body| body.nodes.iter().any(|node| Some(node.id) == id);
+            self.survey.bodies.iter().position(has)
+        };
+        let named = [body(hints.node), body(hints.minus_node)];
+        if let ([Some(a), Some(b)], [Some(node), Some(other)]) =
+            (named, [hints.node, hints.minus_node])
+            && a == b
+        {
+            return Err(format!("nodes {node} and {other} move as one body"));
+        }
+        for (slot, body) in named.into_iter().enumerate().take(of.bodies.len()) {
+            let Some(body) = body else { continue };
+            let is_pushed_alike = |other: usize| match of.force {
+                Some(force) => {
+                    let sign = |k: usize| best(&self.survey.bodies[k], force).1;
+                    sign(body) == sign(other)
                 }
+                None => false,
+            };
+            match of.bodies.iter().position(|other| *other == body) {
+                Some(place) => of.bodies.swap(slot, place),
+                // Alone, it takes the place of the body that the force pushes the same way.
+                None if named.contains(&None)
+                    && of.bodies.len() == 2
+                    && is_pushed_alike(of.bodies[1 - slot]) =>
+                {
+                    of.bodies.swap(0, 1);
+                    of.bodies[slot] = body;
+                }
+                None => of.bodies[slot] = body,
             }
-            explained
-        }))
+        }
+        Ok(of)
     }
 
     /// The nodes of one of the bodies that the force explains, each with what it leaves of the

@@ -220,10 +220,15 @@ impl Record {
         (0..self.velocities.len()).map(estimates).collect()
     }
 
-    /// The interval of the states over the time from contact to the end of the loading.
+    /// The interval of the states over the time from contact to the end of the loading. After the contact only that of the
+    /// forces counts: velocities are constant.
     fn coarseness(&self) -> Option<f64> {
         let (first, end) = (self.contact()?.0, self.loading_end().ok()?);
-        Some(interval(&self.time) / (self.time[end] - first)).filter(|c| (0.0..1.0).contains(c))
+        let mut interval_s = interval(&self.force_time);
+        if self.free_flight(end).is_none() {
+            interval_s = interval_s.max(interval(&self.time));
+        }
+        Some(interval_s / (self.time[end] - first)).filter(|c| c.is_finite() && *c > 0.0)
     }
 
     /// The first body's mass, given or by kinetic energy, over that by momentum.

@@ -34,6 +34,7 @@ pub(crate) mod source;
 mod states;
 mod zeros;
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use crate::error::{Error, error};
@@ -63,7 +64,7 @@ pub use source::{Access, Source};
 /// sections and none is selected, or a selected section, id or component is not in it.
 /// Damage within the file is not error: see [`SolverFile::problems`].
 pub fn read(path: &Path, format: Option<&str>, selection: &Selection) -> Result<SolverFile, Error> {
-    let mut sections = read_sections(path, format, selection)?;
+    let mut sections = sections_of(path, format, selection)?;
     if sections.len() > 1 {
         return Err(error!(
             SolverFile,
@@ -73,7 +74,10 @@ pub fn read(path: &Path, format: Option<&str>, selection: &Selection) -> Result<
         ));
     }
     match sections.pop() {
-        Some(file) => Ok(file),
+        Some(file) => {
+            check_selection(path, &file, selection)?;
+            Ok(file)
+        }
         None => {
             let section = selection.section.as_deref().unwrap_or_default();
             let known = if path.is_file() {
@@ -107,6 +111,22 @@ pub fn read_sections(
     format: Option<&str>,
     selection: &Selection,
 ) -> Result<Vec<SolverFile>, Error> {
+    let sections = sections_of(path, format, selection)?;
+    match &sections[..] {
+        [] => {}
+        [section] => check_selection(path, section, selection)?,
+        _ if selection.ids.is_none() && selection.components.is_none() => {}
+        several => check_selection(path, &joined(several), selection)?,
+    }
+    Ok(sections)
+}
+
+/// The same without holding the selection against what the sections have.
+fn sections_of(
+    path: &Path,
+    format: Option<&str>,
+    selection: &Selection,
+) -> Result<Vec<SolverFile>, Error> {
     let io = |source| Error::io(path, source);
     let is_forced = format.is_some();
     let (format, parts) = open(path, format, selection)?;
@@ -124,11 +144,6 @@ pub fn read_sections(
         sections.iter_mut().for_each(|section| section.problems.push(problem.clone()));
     }
     if !format.is_binary() || !sections.is_empty() || selection.section.is_some() {
-        match &sections[..] {
-            [] => {}
-            [section] => check_selection(path, section, selection)?,
-            several => check_selection(path, &joined(several), selection)?,
-        }
         return Ok(sections);
     }
     let looks_like = match format.name {
@@ -141,12 +156,15 @@ pub fn read_sections(
 
 /// What can be selected from several sections.
 fn joined(sections: &[SolverFile]) -> SolverFile {
+    let (mut ids, mut names) = (BTreeSet::new(), BTreeSet::new());
+    let entities = sections.iter().flat_map(|s| &s.entities);
+    let components = sections.iter().flat_map(|s| &s.components);
     let longest = sections.iter().map(|s| &s.time).max_by_key(|time| time.len());
     SolverFile {
         section: "the file".into(),
-        entities: sections.iter().flat_map(|s| s.entities.iter().cloned()).collect(),
+        entities: entities.filter(|entity| ids.insert(entity.id)).cloned().collect(),
         without_data: sections.iter().flat_map(|s| s.without_data.iter().cloned()).collect(),
-        components: sections.iter().flat_map(|s| s.components.iter().cloned()).collect(),
+        components: components.filter(|name| names.insert(&***name)).cloned().collect(),
         time: longest.cloned().unwrap_or_default(),
         ..SolverFile::default()
     }

@@ -2,8 +2,8 @@
 //!
 //! Four rules: a cubic spline over the speeds, a monotone interpolation, the kinetic energy, and the motion: where the
 //! body force stops the body. `energy` solves the same with the declared force, which as a contact force absorbs the
-//! energy too early (W/E in `db ls`). A model uses the rule with the smallest errors of crush and energy when speeds were
-//! left out, never the spline, which need not be monotone; `--paper` uses the spline.
+//! energy too early (W/E in `db ls`). A model uses the motion, unless another rule has answers at more of the speeds that
+//! were left out; never the spline, which need not be monotone, but for `--paper`.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

@@ -278,7 +278,8 @@ impl<'a> Prediction<'a> {
         }
         let (crush_m, data_end_m) = (declared.end_m(), model.largest_crush_m());
         if is_beyond(crush_m, data_end_m) {
-            warnings.push(Warning::beyond_data(crush_m, data_end_m));
+            let by_speed_m = crush.monotone_m.filter(|_| !model.contains(v));
+            warnings.push(Warning::beyond_data(crush_m, data_end_m, by_speed_m));
         }
         // Between the training speeds no curve that was left out goes on there: a mass does that.
         let is_beyond = is_beyond(crush_m, data_end_m) && model.contains(v);

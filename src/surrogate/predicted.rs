@@ -125,7 +125,7 @@ pub struct Rebound {
     /// force and mass of the body.
     #[serde(rename = "stiffness_N_per_m")]
     pub stiffness_n_per_m: f64,
-    /// Mean magnitude of its error at the inner speeds that were left out, relative to FE's; absent of recorded cases.
+    /// Mean magnitude of its error at the inner speeds that were left out, relative to FE's; absent for recorded cases.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub left_out_error: Option<f64>,
 }

@@ -243,11 +243,15 @@ impl Warning {
         }
     }
 
-    pub(crate) fn beyond_data(crush_m: f64, data_end_m: f64) -> Self {
+    /// `by_speed_m`: what the runs' maximum crush over their speeds, continued, would give.
+    pub(crate) fn beyond_data(crush_m: f64, data_end_m: f64, by_speed_m: Option<f64>) -> Self {
+        let other =
+            by_speed_m.map(|m| format!("; their crush over the speed, continued, gives {m:.3} m"));
         Self {
             code: WarningCode::OutOfRange,
             message: format!(
-                "the maximum crush of {crush_m:.3} m lies beyond the {data_end_m:.3} m of the training runs: the force there is an assumption"
+                "the maximum crush of {crush_m:.3} m lies beyond the {data_end_m:.3} m of the training runs: the force there is an assumption{}",
+                other.unwrap_or_default()
             ),
         }
     }

@@ -180,12 +180,13 @@ impl ColumnStatistics {
         (self.count >= LEAST_NUMBERS).then_some(Z * self.sd? / (self.count as f64).sqrt())
     }
 
-    /// What the rows of which [`OVER_LIMITS`] is not known will leave of its half width, however many more there
-    /// are: at least so much with 97.5 % probability.
+    /// What the rows of which [`OVER_LIMITS`] is not known leave of its half width, however many more there are: half of
+    /// the least share of them that is likely.
     pub(crate) fn lasting_half_width(&self, rows: u64) -> f64 {
-        let Some(mean) = self.mean.filter(|_| self.column == OVER_LIMITS) else { return 0.0 };
-        let unknown = (rows - self.count) as f64 / rows as f64;
-        share_interval(unknown, rows).0 * mean.max(1.0 - mean)
+        if self.column != OVER_LIMITS || rows == 0 {
+            return 0.0;
+        }
+        0.5 * share_interval((rows - self.count) as f64 / rows as f64, rows).0
     }
 }
 
