@@ -1258,7 +1258,7 @@ fn h5py_reads_what_was_edited_in_place() {
     assert_eq!(count(), 16 * 6);
 }
 
-/// Runs of two designs in one group are told from one another by their peaks.
+/// Two designs in one group show in the order of their peaks.
 #[test]
 fn another_design_is_found() {
     let folder = tempfile::tempdir().unwrap();

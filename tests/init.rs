@@ -321,7 +321,7 @@ fn node(id: i64, title: &'static str, body: usize, mass: usize, shakes: f64) -> 
     Node { id, title, on: Some((body, mass)), shakes }
 }
 
-/// Another node follows the force better than that of the first body: those that the user names are taken.
+/// The nodes that the user names are taken, also where another one follows the force better.
 #[test]
 fn the_nodes_of_the_user_are_taken() {
     let crash =

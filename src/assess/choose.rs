@@ -106,8 +106,8 @@ pub(crate) fn choose(
     Some((default.0.into(), reason))
 }
 
-/// The models whose force follows the closing speed, the default first: the simplest one, but after the others what needs a
-/// stopped mass that the crush zone cannot hold.
+/// The models whose force follows the closing speed, the default first: by simplicity, but the crush law last if it needs
+/// more stopped mass than crush zones hold.
 pub(super) fn physical(set: &TrainingSet) -> Vec<&'static str> {
     let is_doubtful = set.stopped_mass().is_some_and(|m| !m.is_usual(set.masses.effective_kg()));
     let mut physical: Vec<_> = MODELS.iter().filter(|entry| entry.follows_closing).collect();

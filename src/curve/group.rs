@@ -19,7 +19,7 @@ const LEAST_RATIO: f64 = 0.9;
 const MOST_RATIO: f64 = 1.25;
 /// Rate effects grow with the speed: the bound is multiplied by the ratio of the speeds to this power.
 const RATE_POWER: f64 = 0.15;
-/// Correlation of the two curves: of one design 0.74 and more in FE runs, but any above 0 where folds move with the speed.
+/// Correlation of the two curves: of one design 0.74 and more in the bundled groups, down to 0 where folds move with the speed.
 const LEAST_CORRELATION: f64 = 0.0;
 
 /// Something unusual in a case compared with the others: its name, a code and words.

@@ -108,8 +108,8 @@ impl StoppedMass {
         (self.deflection_m[i], all_kg)
     }
 
-    /// Whether it is not more of the moving mass than crush zones with their equipment hold: more stands for what
-    /// else lies between contact force and body, such as an engine, or parts that turn or vibrate.
+    /// Whether crush zones with their equipment hold so much of the moving mass. More of it stands for what else lies
+    /// between contact force and body, such as an engine, or parts that turn or vibrate.
     pub(crate) fn is_usual(&self, moved_kg: f64) -> bool {
         self.in_all().1 <= USUAL_SHARE * moved_kg
     }
