@@ -493,6 +493,16 @@ fn a_manifest_that_moved_takes_its_cases_along_and_a_copy_does_not() {
     let report = studied.build();
     assert_eq!(Studied::outcomes(&report), BTreeSet::from(["built"]));
     assert_eq!(names(&here, "curves.h5").len(), 14);
+    // A third of the same study and group takes the place of the first, and says so.
+    let third = here.join("third.toml");
+    let text = fs::read_to_string(&first).unwrap();
+    let runs: Vec<&str> = text.split("[[run]]").collect();
+    fs::write(&third, runs[..3].join("[[run]]")).unwrap();
+    let output = crumple_in(&here, &format!("build {} -o curves.h5 --strict", third.display()));
+    assert_eq!(output.status.code(), Some(3));
+    let said = String::from_utf8(output.stderr).unwrap();
+    says(&said, "both studies have one name and group; with another name in [study]");
+    says(&said, &first.display().to_string());
     fs::remove_file(here.join("curves.h5")).unwrap();
     // In its place: one.
     studied.study = first.clone();

@@ -550,6 +550,14 @@ fn a_summary_alone_is_the_same() {
                     assert_eq!(values.len(), 201);
                     values.clear();
                 }
+                // The reference method does not know it of each interface.
+                if method == Method::Reference {
+                    assert!(i.damped_so_far_j.is_empty() && i.damped_j.is_none());
+                } else {
+                    assert_eq!(i.damped_so_far_j.len(), 201);
+                    assert_eq!(i.damped_so_far_j.last().copied(), i.damped_j);
+                }
+                i.damped_so_far_j.clear();
             }
             let (most, least) = (whole.ledger, summary.ledger);
             assert!(least.max_energy_error <= most.max_energy_error);

@@ -194,14 +194,23 @@ fn the_band_knows_where_it_is() {
     assert!((inner.span_m_per_s - 20.0 / 3.0).abs() < 1e-12);
     assert!((ends.span_m_per_s - 3.0).abs() < 1e-12);
     let at = |v: f64| curve(&model, v).provenance.band.unwrap();
-    for (v, gap) in [(8.0, 3.0), (12.9, 3.0), (13.0, 4.0), (15.0, 4.0), (17.5, 3.0), (20.0, 3.0)] {
-        let expected = inner.pointwise_share * (gap * 3.0 / 20.0_f64).powf(0.5);
+    for (v, gap, middle) in [
+        (8.0, 3.0, 8.5),
+        (12.9, 3.0, 11.5),
+        (13.0, 4.0, 15.0),
+        (15.0, 4.0, 15.0),
+        (17.5, 3.0, 18.5),
+        (20.0, 3.0, 18.5),
+    ] {
+        // The middles of the gaps are 10, 13.5 and 16.5.
+        let wider = (gap * 3.0 / 20.0) / (middle * 3.0 / 40.0_f64).sqrt();
+        let expected = inner.pointwise_share * wider.powf(0.5);
         assert!((at(v).pointwise_share / expected - 1.0).abs() < 1e-12, "{v}: {:?}", at(v));
         assert_eq!(at(v).span_m_per_s, gap);
     }
-    let edge = at(20.0).pointwise_share;
+    let edge = |v: f64| at(v.clamp(7.0, 20.0)).pointwise_share;
     for (v, distance) in [(6.0, 1.0), (22.0, 2.0), (24.0, 4.0), (60.0, 40.0)] {
-        let expected = (ends.pointwise_share * distance / 3.0).max(edge);
+        let expected = (ends.pointwise_share * distance / 3.0).max(edge(v));
         assert!((at(v).pointwise_share / expected - 1.0).abs() < 1e-12, "{v}: {:?}", at(v));
     }
     // The drawn edges are those of the share.
@@ -230,6 +239,8 @@ fn the_band_knows_where_it_is() {
         predict(&model, &Query { parameters, ..Query::at(12.0) }).unwrap()
     };
     assert!(ask(5.0).provenance.band.is_some());
+    // A thousandth of the largest is still that.
+    assert!(ask(10.009).provenance.band.is_some() && ask(10.011).provenance.band.is_none());
     let outside = ask(20.0);
     assert!(outside.provenance.band.is_none() && outside.force_low_n.is_none());
     assert!(outside.provenance.body_band.is_none() && outside.body_force_low_n.is_none());
@@ -295,9 +306,11 @@ fn student_t(n: usize) -> f64 {
 fn half_width_by_hand(cases: &[Case], rule: MaxCrushRule, force: ForceKind) -> f64 {
     let set = TrainingSet::new("made", cases).unwrap();
     let inner = 1..cases.len() - 1;
-    let gap =
-        |i: usize| cases[i + 1].conditions.speed.m_per_s - cases[i - 1].conditions.speed.m_per_s;
-    let mean_gap = inner.clone().map(gap).sum::<f64>() / inner.len() as f64;
+    let speed = |i: usize| cases[i].conditions.speed.m_per_s;
+    let gap = |i: usize| speed(i + 1) - speed(i - 1);
+    let middle = |i: usize| 0.5 * (speed(i + 1) + speed(i - 1));
+    let mean = |of: &dyn Fn(usize) -> f64| inner.clone().map(of).sum::<f64>() / inner.len() as f64;
+    let (mean_gap, mean_middle) = (mean(&gap), mean(&middle));
     let residuals = |i: usize| -> Vec<f64> {
         let mut others = cases.to_vec();
         let v = others.remove(i).conditions.speed.m_per_s;
@@ -325,7 +338,7 @@ fn half_width_by_hand(cases: &[Case], rule: MaxCrushRule, force: ForceKind) -> f
         let of = residuals(i);
         of.iter().map(|r| r * r).sum::<f64>() / of.len() as f64
     };
-    let over_gap = |i: usize| mean_square(i) * mean_gap / gap(i);
+    let over_gap = |i: usize| mean_square(i) * mean_gap / gap(i) * (middle(i) / mean_middle).sqrt();
     let stretches = inner.clone().map(|i| stretches(&residuals(i))).sum();
     student_t(stretches) * (inner.clone().map(over_gap).sum::<f64>() / inner.len() as f64).sqrt()
 }
@@ -350,7 +363,8 @@ fn the_body_force_has_a_band_of_its_own() {
     // A query's gap is narrower; the edges are those of the share, around each force.
     let found = curve(&model, 12.0);
     let at = found.provenance.body_band.unwrap();
-    let expected = inner.pointwise_share * (3.0 / inner.span_m_per_s).powf(0.5);
+    let wider = (3.0 / inner.span_m_per_s) / (11.5 * 3.0 / 40.0_f64).sqrt();
+    let expected = inner.pointwise_share * wider.powf(0.5);
     assert!((at.pointwise_share / expected - 1.0).abs() < 1e-12, "{at:?}");
     let (f, low, high) = (
         found.body_force_n.as_ref().unwrap(),
@@ -467,7 +481,7 @@ fn model_files_of_another_version_or_with_a_damaged_band_are_refused() {
     let model =
         train("made", &family(&[7.0, 10.0, 13.0]), Choice::Kind(ModelKind::rate())).unwrap();
     let mut json: Value = serde_json::from_slice(&model.to_json().unwrap()).unwrap();
-    assert_eq!(json["version"], 6);
+    assert_eq!(json["version"], 7);
     // As files of earlier programs, whose text nothing guards.
     assert!(json.as_object_mut().unwrap().remove("fingerprint").is_some());
     let path = std::path::Path::new("other.model");
@@ -480,9 +494,9 @@ fn model_files_of_another_version_or_with_a_damaged_band_are_refused() {
     json["version"] = 2.into();
     assert_eq!(
         read(&json).unwrap_err().to_string(),
-        "other.model: the model file has version 2, this program reads version 6: train the model again with crumple train"
+        "other.model: the model file has version 2, this program reads version 7: train the model again with crumple train"
     );
-    json["version"] = 6.into();
+    json["version"] = 7.into();
     for damaged in [serde_json::json!(0.0), serde_json::json!(-1.0)] {
         json["leave_one_out"]["band"]["span_m_per_s"] = damaged;
         let error = read(&json).unwrap_err().to_string();
@@ -1098,7 +1112,7 @@ fn a_front_in_two_stages_is_predicted_by_its_events() {
     let of = |name: &str| found.means.iter().find(|m| m.model == name).unwrap();
     let chosen = of(&found.chosen);
     let errors = [chosen.force_l1, chosen.velocity_l1, chosen.acceleration_l1];
-    assert!(errors.into_iter().zip([0.163, 0.033, 0.125]).all(|(e, most)| e <= most), "{errors:?}");
+    assert!(errors.into_iter().zip([0.163, 0.033, 0.126]).all(|(e, most)| e <= most), "{errors:?}");
     let linear = of("linear");
     assert!(chosen.force_l1 < 0.8 * linear.force_l1, "{errors:?}");
     // The fold begins at 0.36 m at 44 km/h and at 0.5 m at 56 km/h: that run decides.
@@ -1119,7 +1133,7 @@ fn bands_hold_at_narrow_intervals() {
     assert_eq!(subsets.len(), 1 + ModelKind::all(0).len());
     for of in subsets {
         let coverage = of["coverage"].as_f64().unwrap();
-        assert!((0.86..=0.93).contains(&coverage), "{of}");
+        assert!((0.855..0.945).contains(&coverage), "{of}");
     }
 }
 
@@ -1350,8 +1364,37 @@ fn the_model_file_is_described() {
     let keys = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
     let all = [keys(&json), keys(&json["cases"][0])].concat();
     assert!(all.len() > 20);
+    let version = format!("`crumple model`; {}", json["version"]);
+    assert!(described.contains(&version), "{version}");
     for key in all {
         assert!(described.contains(&format!("`{key}`")), "{key} is not described");
+    }
+}
+
+/// States of 0.1 ms hardly move where the body turns, and a file has six digits: whichever of them are nearest to the maximum, the
+/// curve of a run rebounds as the run did.
+#[test]
+fn fine_records_rebound_as_the_run_did() {
+    let mass_kg = 1.5e3;
+    for k in 0..40 {
+        let v = 9.0 + 0.005 * f64::from(k);
+        let mut case = case_every(0.1e-3, "fine", v, mass_kg, &|d, _| 7e5 + 1e6 * d);
+        let fine = &case.curves.sampled;
+        let digits = |values: &[f64]| -> Vec<f64> {
+            values.iter().map(|v| format!("{v:.5e}").parse().unwrap()).collect()
+        };
+        let (time_s, force_n) = (fine.time_s().to_vec(), fine.force_n().to_vec());
+        case.curves.sampled = Curve::new(time_s, digits(fine.deflection_m()), force_n).unwrap();
+        case.curves.closing_speed_m_per_s = digits(&case.curves.closing_speed_m_per_s);
+        let curve = crumple::curve::ForceCurve::recorded(&case).unwrap();
+        let stiffness = curve.unloading.stiffness_n_per_m().unwrap();
+        assert!((stiffness / 100e6 - 1.0).abs() < 0.1, "{v} m/s: {stiffness} N/m");
+        // But for the first states, over which the force begins, it rises less steeply than it unloads.
+        let (d, f) = (curve.loading.deflection_m(), curve.loading.force_n());
+        let rise =
+            |i: usize| if d[i - 1] > 0.01 { (f[i] - f[i - 1]) / (d[i] - d[i - 1]) } else { 0.0 };
+        let steepest = (1..d.len()).map(rise).fold(0.0, f64::max);
+        assert!(steepest < 100e6, "{v} m/s: {steepest} N/m");
     }
 }
 
@@ -1509,7 +1552,7 @@ fn a_crush_gives_its_speed() {
         (
             1,
             "--crush 3m",
-            "no speed between those of the runs gives a crush of 3 m: the model's crush goes from 0.1110 m at 12 km/h",
+            "no speed between those of the runs gives a crush of 3 m: the model's crush goes from 0.1111 m at 12 km/h",
         ),
         (1, "--crush 1mm", "no speed between those of the runs gives a crush"),
         (2, "--crush 0.5", "has no unit"),

@@ -202,7 +202,7 @@ fn every_kind_of_file_is_drawn() {
         ("result.csv --quantity crush", &["A1|wall", "deflection [m]"]),
         ("result.csv slower.csv", &["A1, result", "A1, slower", "speed [m/s]"]),
         // Small multiples beyond six, and what is chosen in one panel.
-        ("two-sets.toml two-sets.toml", &["B4", "two-sets", "two-sets.toml"]),
+        ("two-sets.toml two-sets.toml", &["B4", "two-sets.toml"]),
         ("two-sets.toml --body A1 --body B1", &["A1", "B1"]),
         ("two-sets.toml --quantity crush --interface A1|B1 --interface A1|A2", &["A1|A2", "force [MN]"]),
         ("train-set.toml --quantity crush", &["beyond the data of the curve"]),
@@ -236,6 +236,21 @@ fn every_kind_of_file_is_drawn() {
         crumple_ok(folder, &all);
         assert_eq!(fs::read_to_string(folder.join("a.svg")).unwrap(), svg);
         assert_eq!(fs::read(folder.join("a.png")).unwrap(), png);
+    }
+    // What a damper takes is its interface's, as in the table; the reference method knows the sum alone.
+    let scenario = fs::read_to_string(folder.join("scenario.toml")).unwrap();
+    let damper = "model = \"lead.model\", damping = { coefficient_N_s_per_m = [1e5] }";
+    let damped = scenario.replace("model = \"lead.model\"", damper);
+    for (text, apart) in [
+        (damped.clone(), false),
+        (damped.replacen("[run]", "[run]\nmethod = \"reference\"", 1), true),
+    ] {
+        fs::write(folder.join("damped.toml"), text).unwrap();
+        crumple_ok(folder, "plot damped.toml --quantity energy -o a.svg");
+        let svg = fs::read_to_string(folder.join("a.svg")).unwrap();
+        assert!(svg.contains("aria-label=\"A1|wall\""));
+        assert_eq!(svg.contains("rate, stopped mass, dampers, resistance"), apart);
+        assert!(!svg.contains("error of the method") && !svg.contains("aria-label=\"resistance"));
     }
 }
 
@@ -275,6 +290,20 @@ fn sweeps_are_drawn_from_csv_and_hdf5() {
         assert!(forces.len() > samples / 2, "{} different forces", forces.len());
         assert_eq!(a.contains("median") && a.contains("5 to 95 % of the runs"), has_range);
     }
+    // What is yes or no is drawn as a share, with its interval.
+    let limits =
+        "[limits]\nstandard = \"own\"\nedition = \"1\"\nmean_deceleration_g = 12.0\n\n[curves]";
+    let own = fs::read_to_string(folder.join("own.toml")).unwrap();
+    let judged = own.replace("\"5ms\"", "\"300ms\"").replacen("[curves]", limits, 1);
+    fs::write(folder.join("judged.toml"), judged).unwrap();
+    let plan = "[sweep]\nsamples = 200\nresults = [\"over_limits\"]\nvary = [ { what = \"speed\", train = \"A\", distribution = \"uniform\", from = \"30km/h\", to = \"40km/h\" }, { what = \"force\", curve = \"nose\", distribution = \"normal\", mean = 1, sd = 0.1 } ]\n";
+    fs::write(folder.join("plan.toml"), plan).unwrap();
+    crumple_ok(folder, "sweep judged.toml --plan plan.toml -o judged.csv -q");
+    crumple_ok(folder, "plot judged.csv --result over_limits -o c.svg");
+    let picture = fs::read_to_string(folder.join("c.svg")).unwrap();
+    says(&picture, "share of runs over a limit");
+    says(&picture, "95 % confidence interval");
+    assert!(!picture.contains("median"));
     // A choice of curves varies as well: rows of different curves have no common line, and the plan's names are known.
     let plan = "[sweep]\nvary = [ { what = \"curve\", curve = \"nose\", values = [\"nose\", \"soft\"] }, { what = \"speed\", train = \"A\", values = [\"30km/h\", \"40km/h\"] } ]\nresults = [\"max_deflection\", \"final_speed\"]\n";
     fs::write(folder.join("plan.toml"), plan).unwrap();

@@ -104,6 +104,48 @@ fn its_numbers_are_those_of_the_commands() {
     assert!(!page.contains("vehicle-pair"), "only the group that was asked for");
 }
 
+/// What a scenario states besides the sources of its curves is on its page.
+#[test]
+fn what_a_scenario_states_is_on_the_page() {
+    let folder = demo_folder();
+    let put = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    put("pull.csv", "d_m,force_N\n0,0\n0.1,1e6\n");
+    put(
+        "s.toml",
+        r#"
+        [run]
+        duration = "300ms"
+        [curves]
+        nose = { model = "lead.model", band = -1, max_crush = "spline", end = "hold" }
+        coupler = { stages = [ { stroke = "0.3m", from = "0.9MN" } ], unloading = "80MN/m", gap = "20mm", scale = 1.1, tension = "pull", damping = { speed_m_per_s = [0.0, 2.0], coefficient_N_s_per_m = [2e5, 1e5] } }
+        pull = { file = "pull.csv", force = "body", unloading = "20MN/m", law = "memory", end = "slope" }
+        zone = { stages = [ { stroke = "0.3m", from = "0.9MN" } ], unloading = "80MN/m" }
+        [[train]]
+        name = "A"
+        speed = "30km/h"
+        inner = "coupler"
+        resistance = { constant_m_per_s2 = 0.02, braking = 0.15 }
+        vehicles = [ { name = "A1", mass = "24t" }, { name = "A2", mass = "20t", rear = { mass = "2t", curve = "zone" } } ]
+        [wall]
+        [contact]
+        curve = "nose"
+        "#,
+    );
+    crumple_ok(folder.path(), "report s.toml -o r.html");
+    let page = fs::read_to_string(folder.path().join("r.html")).unwrap();
+    for text in [
+        "lower edge of its band; end hold; maximum crush by spline",
+        "gap 20 mm; unloading 80.0 MN&#x2f;m; force times 1.1; damper 200, 100 kN s&#x2f;m over 0 to 2 m&#x2f;s; tension pull",
+        "unloading 20.0 MN&#x2f;m; body force; end slope",
+        "Resistance of train A, per mass: 0.02 m&#x2f;s² + brakes with a friction coefficient of 0.15.",
+        "peak tension",
+        // With its crush zone.
+        ">20.00 t<",
+    ] {
+        says(&page, text);
+    }
+}
+
 #[test]
 fn names_of_users_are_text() {
     let folder = demo_folder();

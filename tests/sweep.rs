@@ -318,7 +318,22 @@ fn further_results_and_what_they_follow() {
         assert!(found("speed_m_per_s[A]", peak) > 0.98, "{report}");
         assert!(found("mass_kg[B2]", peak).abs() < 0.4, "{report}");
         says(&printed, "rank corr. mass_kg[B2]");
+        let share = &report["share_over_limits"];
+        assert_eq!((&share["over"], &share["unknown"]), (&over[0].into(), &unknown.into()));
+        assert_eq!(share["interval_95"].is_array(), unknown == 0, "{share}");
     }
+    // Of more quantities than a table has room for, --verbose shows what follows them.
+    let many: String = ["A1", "A2", "B1", "B2"]
+        .map(|name| format!("{{ what = \"mass\", vehicle = \"{name}\", distribution = \"uniform\", from = \"19t\", to = \"21t\" }}, "))
+        .concat();
+    let many = plan
+        .replace("samples = 60", "samples = 12")
+        .replace(", \"over_limits\"", "")
+        .replace("vary = [", &format!("vary = [ {many}{{ what = \"force\", curve = \"nose\", distribution = \"normal\", mean = 1, sd = 0.1 }}, {{ what = \"force\", curve = \"inner\", distribution = \"normal\", mean = 1, sd = 0.1 }},"))
+        .replace("{ what = \"mass\", vehicle = \"B2\", distribution = \"uniform\", from = \"19t\", to = \"21t\" } ]", "]");
+    folder.put("s.toml", &format!("{scenario}{many}"));
+    says(&folder.ok("sweep s.toml -o many.csv"), "quantities: with --verbose or --json");
+    says(&folder.ok("sweep s.toml -o many.csv --verbose"), "rank corr. force_factor[inner]");
     folder.put("s.toml", &format!("{scenario}{plan}"));
     let said = folder.fails(1, "sweep s.toml -o other.csv");
     says(&said, "sweep.results: over_limits needs limits: give the scenario [limits]");
@@ -606,6 +621,12 @@ fn items_that_fail_are_rows_with_their_reason() {
     // The same again is done, and --strict says that there are failures.
     let again = crumple_in(folder.path(), "sweep s.toml -q --strict -o out.csv");
     assert_eq!(again.status.code(), Some(3));
+    // The last shard has failures alone; it is one like the others, and joins them.
+    for shard in ["1", "2"] {
+        folder.ok(&format!("sweep s.toml -q --shard {shard}/2 -o p{shard}.csv"));
+    }
+    folder.ok("sweep merge -q p1.csv p2.csv -o joined.csv");
+    assert_eq!(folder.text("joined.csv"), folder.text("out.csv"));
     // None is done.
     let folder = Folder::new(
         "[sweep]\nvary = [ { what = \"speed\", train = \"A\", values = [\"0m/s\", \"-1m/s\"] } ]\n",

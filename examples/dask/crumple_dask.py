@@ -41,8 +41,24 @@ def run(*arguments, date=None):
 
 def _all(client, tasks):
     """Run tasks, each the arguments and a date, and return what they print."""
+    # Workers that were started elsewhere do not have this module.
+    client.upload_file(__file__)
     futures = [client.submit(run, *task, date=date, retries=RETRIES, pure=False) for task, date in tasks]
     return client.gather(futures)
+
+
+def _absolute(*paths):
+    """The working folder of a worker may be another one."""
+    return [pathlib.Path(path).resolve() for path in paths]
+
+
+def _name(entry):
+    """The name of a run as the program has it."""
+    name = entry.get("name", entry["path"])
+    for up in ("./", "../"):
+        while name.startswith(up):
+            name = name.removeprefix(up)
+    return name.strip("/").replace("/", "_")
 
 
 def _folder(output):
@@ -53,6 +69,7 @@ def _folder(output):
 
 def sweep(client, scenario, output, shards):
     """Run a sweep in so many shards and join them; a file that exists is complete and kept."""
+    scenario, output = _absolute(scenario, output)
     parts = [_folder(output) / f"part{k}of{shards}.csv" for k in range(1, shards + 1)]
     tasks = [("sweep", scenario, "--shard", f"{k}/{shards}", "-o", part) for k, part in enumerate(parts, 1)]
     _all(client, [(task, None) for task in tasks])
@@ -65,11 +82,12 @@ def sweep(client, scenario, output, shards):
 
 def build(client, study, output, shards):
     """Build a study in so many parts and join them."""
+    study, output = _absolute(study, output)
     # One date for all, as one process has it.
     date = int(os.environ.get("SOURCE_DATE_EPOCH", time.time()))
     text = pathlib.Path(study).read_bytes()
     entries = tomllib.loads(text.decode())["run"]
-    names = [entry.get("name", entry["path"].removeprefix("./").strip("/").replace("/", "_")) for entry in entries]
+    names = [_name(entry) for entry in entries]
     chosen = [[word for name in names[k::shards] for word in ("--run", name)] for k in range(min(shards, len(names)))]
     # Parts of another division, or of another study, hold other cases.
     name = f"of{len(chosen)}-{hashlib.sha256(text).hexdigest()[:12]}.h5"
@@ -87,6 +105,7 @@ def build(client, study, output, shards):
 
 def validate(client, database, output):
     """Validate every group of a database and write the document that `crumple validate --json` prints."""
+    database, output = _absolute(database, output)
     groups = list(json.loads(run("db", "ls", database))["groups"])
     documents = _all(client, [(("validate", database, "--group", group), None) for group in groups])
     # Each document holds one group: its text is between the brackets of the list.

@@ -156,6 +156,8 @@ def init(runs, output=None, **options):
     Returns what was found, and from what.
     """
     runs = [runs] if isinstance(runs, (str, os.PathLike)) else list(runs)
+    if not runs:
+        raise Error("there are no run folders: name at least one")
     return run("init", *_output(output), *_options(options), "--", *runs)
 
 

@@ -193,6 +193,9 @@ def test_databases_models_and_curves(tmp_path):
     with pytest.raises(crumple.Error, match="unexpected argument '--nodes'") as raised:
         crumple.init(tmp_path, nodes=1)
     assert "nsdm_seeds=3" in raised.value.__notes__[0]
+    # As of a pattern that fits nothing; not the working folder.
+    with pytest.raises(crumple.Error, match="no run folders"):
+        crumple.init([])
     with pytest.raises(ValueError):
         model.predict(-1.0)
     exported = curve.export(tmp_path / "curve.k", units="mm-t-s")

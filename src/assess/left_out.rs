@@ -9,7 +9,7 @@ use crate::dataset::{OTHER_MASS, TrainingCase, TrainingSet, grid, is_within, nea
 use crate::error::{Error, error};
 use crate::signal::l1_ratio;
 use crate::signal::peaks::matched_peaks;
-use crate::surrogate::band::{self, Residuals};
+use crate::surrogate::band::{self, Gap, Residuals};
 use crate::surrogate::leave_one_out::{Floor, LeftOut, PeakError};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::predict::Prediction;
@@ -47,7 +47,7 @@ pub(crate) struct LeftOutCase<'a> {
     /// Whether the rest has speeds on both sides.
     pub inner: bool,
     /// Over which it is predicted: the gap it leaves, or an end's distance to the others.
-    pub span_m_per_s: f64,
+    gap: Gap,
     /// FE's motion.
     pub reference: Reference,
 }
@@ -76,12 +76,9 @@ impl<'a> LeftOutCase<'a> {
         let others = rest.speeds_m_per_s();
         let inner = others.first().is_some_and(|&low| low < v)
             && others.last().is_some_and(|&high| v < high);
-        let span_m_per_s = if inner {
-            band::gap_m_per_s(&others, v).ok_or(NotLeftOut::TooFew { case: name() })?
-        } else {
-            band::distance_outside_m_per_s(&others, v)
-        };
-        Ok(Self { own, case, rest, inner, span_m_per_s, reference })
+        let gap = if inner { band::gap(&others, v) } else { band::outside(&others, v) };
+        let gap = gap.ok_or(NotLeftOut::TooFew { case: name() })?;
+        Ok(Self { own, case, rest, inner, gap, reference })
     }
 
     /// FE's own curves in the one-mass model: of the recipe's force, and of the body's motion
@@ -217,7 +214,7 @@ impl<'a> LeftOutCase<'a> {
         let from = along.iter().position(|&d| d >= first).unwrap_or(0);
         let of = |fe: &Envelope, predicted: &Envelope| {
             let mut ratios = band::ratios(&forces_n(fe, along), &forces_n(predicted, along));
-            Residuals::new(self.span_m_per_s, ratios.split_off(from), self.own.runs.len())
+            Residuals::new(self.gap, ratios.split_off(from), self.own.runs.len())
         };
         let declared = of(&self.own.envelope, &curve.envelope()?);
         let mut residuals = BTreeMap::from([(curve.provenance.force_kind, declared)]);

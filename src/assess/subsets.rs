@@ -120,7 +120,7 @@ fn subset(
         for (kind, residuals) in judged.iter().flat_map(|score| &score.residuals) {
             let scatter = scatter.and_then(|s| s.of_force(*kind, set.force_kind));
             let [band, _] = tables.bands(&of.model, *kind, scatter);
-            let band = band.filter(|band| residuals.span_m_per_s < band.span_m_per_s);
+            let band = band.filter(|band| residuals.is_over_less_than(*band));
             let share = band.and_then(|band| residuals.inside_of(band));
             inside.entry(of.model.clone()).or_default().extend(share);
         }

@@ -73,6 +73,8 @@ pub struct BuildReport {
     pub(crate) runs: Vec<BuiltRun>,
     /// Cases that the study no longer has.
     pub(crate) removed: Vec<CasePath>,
+    /// The manifest that some of these were built from, if it is another one that is still there.
+    pub(crate) removed_of: Option<String>,
     /// Cases of runs that have another name or group than before: from where to where.
     pub(crate) moved: Vec<(CasePath, CasePath)>,
     /// Groups that were built from the manifest when it had another study or group and other runs
@@ -176,6 +178,7 @@ pub(crate) fn build_runs(
         group: study.group().into(),
         runs,
         removed: previous.left,
+        removed_of: previous.left_of,
         moved,
         earlier: previous.earlier.into_iter().collect(),
         database,
@@ -264,6 +267,8 @@ struct Previous {
     pub of_run: HashMap<String, (CasePath, CasePath)>,
     /// Cases whose run the study no longer has.
     pub left: Vec<CasePath>,
+    /// Another manifest that is still there and that some of these were built from.
+    pub left_of: Option<String>,
     /// If the database has no case of the study: groups with cases that were built from the manifest
     /// when it belonged to another study or group; no run of this one has them.
     pub earlier: BTreeSet<String>,
@@ -318,7 +323,15 @@ impl Previous {
             };
             previous.earlier = built.iter().filter(is_ours).map(|c| c.id.group.clone()).collect();
         }
-        previous.left = source_hash.into_values().flatten().map(CasePath::of).collect();
+        let left: Vec<&Case> = source_hash.into_values().flatten().collect();
+        let now = study.path();
+        let is_other = |then: &&String| {
+            let path = Path::new(then);
+            **then != now && path.exists() && !file::is_same(path, Path::new(&now))
+        };
+        let origins = left.iter().filter_map(|case| case.provenance.origin.as_ref());
+        previous.left_of = origins.map(|origin| &origin.manifest).filter(is_other).min().cloned();
+        previous.left = left.into_iter().map(CasePath::of).collect();
         previous.left.sort();
         previous
     }

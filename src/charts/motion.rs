@@ -50,7 +50,7 @@ struct InterfaceMotion {
     /// Deflection in m, one value per time.
     deflection_m: Vec<f64>,
     force_n: Vec<f64>,
-    /// Stored and dissipated in J; empty where they are not known.
+    /// Stored, dissipated and, if that is known of each interface, damped in J; empty where they are not known.
     taken_j: Vec<f64>,
     /// Deflection in m up to which its curve has data.
     data_end_m: f64,
@@ -69,6 +69,8 @@ pub struct Motion {
     interfaces: Vec<InterfaceMotion>,
     /// Kinetic energy in J; empty where the masses are not known.
     kinetic_j: Vec<f64>,
+    /// What is neither kinetic nor taken by an interface.
+    rest: &'static str,
     /// Where the curves come from.
     notes: Vec<String>,
 }
@@ -168,7 +170,7 @@ impl Motion {
             return Err(other_columns());
         }
         let time_s = columns.swap_remove(0);
-        Ok(Self { time_s, bodies, interfaces, kinetic_j: Vec::new(), notes: Vec::new() })
+        Ok(Self { time_s, bodies, interfaces, kinetic_j: Vec::new(), rest: "", notes: Vec::new() })
     }
 
     /// Of a run of a scenario. `notes` say where its curves come from, a line each.
@@ -194,17 +196,24 @@ impl Motion {
                     name: interface.name.clone(),
                     deflection_m: history.deflection_m.clone(),
                     force_n: history.force_n.clone(),
-                    taken_j: history
-                        .stored_j
-                        .iter()
-                        .zip(&history.dissipated_j)
-                        .map(|(stored, dissipated)| stored + dissipated)
+                    taken_j: (0..history.stored_j.len())
+                        .map(|t| {
+                            let damped_j = history.damped_so_far_j.get(t).unwrap_or(&0.0);
+                            history.stored_j[t] + history.dissipated_j[t] + damped_j
+                        })
                         .collect(),
                     data_end_m: history.data_end_m,
                     is_usual: used.curve != PLATES,
                 })
                 .collect(),
             kinetic_j: (0..run.time_s.len()).map(kinetic).collect(),
+            rest: if run.interfaces.iter().any(|of| of.damped_so_far_j.is_empty()) {
+                "rate, stopped mass, dampers, resistance"
+            } else if run.ledger.resisted_j == 0.0 {
+                "error of the method"
+            } else {
+                "resistance"
+            },
             notes,
         }
     }
@@ -471,7 +480,7 @@ fn energy(name: &str, run: &Motion, names: &[String], is_named: bool) -> Result<
     let lost: Vec<f64> = (0..states).map(|t| start_j - run.kinetic_j[t] - all(t)).collect();
     // Below this it is the method's own error.
     if last(&lost) > 1e-3 * start_j {
-        parts.push(("rate, stopped mass, dampers, resistance".into(), lost));
+        parts.push((run.rest.into(), lost));
     }
     parts.push(("kinetic".into(), run.kinetic_j.clone()));
     let mut low = vec![0.0; states];

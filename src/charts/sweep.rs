@@ -4,9 +4,9 @@ use super::motion::SMALL;
 use crate::error::{Error, error};
 use crate::guess::hint;
 use crate::multibody::STANDARD_GRAVITY_M_PER_S2;
-use crate::plan::ResultName;
+use crate::plan::{OVER_LIMITS, ResultName};
 use crate::plot::{Axis, Band, Cell, Chart, Panel, Series, Shown};
-use crate::sweep::{ResultColumn, SweepColumns};
+use crate::sweep::{ResultColumn, SweepColumns, share_interval};
 
 /// More values than this were not written down as a grid.
 const MOST_VALUES: usize = 60;
@@ -254,6 +254,10 @@ fn add_line(
         return;
     }
     let middles: Vec<f64> = groups.iter().map(|(middle, _)| *middle).collect();
+    if has_range && result.name == OVER_LIMITS {
+        add_share(panel, result, middles, groups);
+        return;
+    }
     let of: Vec<Vec<f64>> = groups.iter().map(|(_, rows)| sorted(result, rows)).collect();
     let at = |share: f64| of.iter().map(|values| quantile(values, share)).collect::<Vec<f64>>();
     let name = if has_range { "median" } else { name };
@@ -269,6 +273,27 @@ fn add_line(
         });
     }
     panel.series.push(Series::line(name, look, middles, at(0.5)));
+}
+
+/// The share of the runs that are over a limit: a median of yes and no says nothing. Runs without a verdict may be either.
+fn add_share(
+    panel: &mut Panel,
+    result: &ResultColumn,
+    middles: Vec<f64>,
+    groups: &[(f64, Vec<usize>)],
+) {
+    let shares = groups.iter().map(|(_, rows)| {
+        let known = sorted(result, rows);
+        let (over, count) = (known.iter().sum::<f64>(), rows.len() as f64);
+        let most = over + count - known.len() as f64;
+        let interval = |runs: f64| share_interval(runs / count, rows.len() as u64);
+        (over / count, (interval(over).0, interval(most).1))
+    });
+    let (shares, (low, high)): (Vec<f64>, (Vec<f64>, Vec<f64>)) = shares.unzip();
+    panel.y = Axis::new("share of runs over a limit", "%", 1e2).over(0.0, 1.0);
+    let (name, x) = ("95 % confidence interval".into(), middles.clone());
+    panel.bands.push(Band { name, look: 0, x, low, high, is_stacked: false });
+    panel.series.push(Series::line("known to be over a limit", 0, middles, shares));
 }
 
 /// A map for each result: the mean over the rows of each cell, by the depth of a colour.

@@ -101,7 +101,13 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let of_group = siblings::remarks(report.database.cases(&report.group));
     let of_group: Vec<String> =
         of_group.into_iter().map(|(case, _, words)| format!("{case}: {words}")).collect();
-    outcome = outcome.max(options.warn_all(warnings.iter().chain(&of_group)));
+    let replaced = report.removed_of.as_ref().map(|other| {
+        format!(
+            "removed {}, built from {other}: both studies have one name and group; with another name in [study] of one of them a database keeps both",
+            removed(&report).join(", ")
+        )
+    });
+    outcome = outcome.max(options.warn_all(warnings.iter().chain(&of_group).chain(&replaced)));
     let database = output.display().to_string();
     let runs = report.runs.iter().map(|run| {
         let (word, error) = outcome_of(run);

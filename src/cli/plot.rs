@@ -362,9 +362,8 @@ fn of_runs(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
             let text = file::read(file, MOST_RESULT).map_err(|e| failed_at(file, e))?;
             Motion::of_csv(&text).map_err(|e| failed_at(file, e))?
         };
-        let is_taken = |name: &String| runs.iter().any(|(other, _)| other == name);
-        let name = Some(stem(file)).filter(|name| !is_taken(name));
-        runs.push((name.unwrap_or_else(|| file.display().to_string()), motion));
+        let is_alone = args.files.iter().filter(|other| stem(other) == stem(file)).count() == 1;
+        runs.push((if is_alone { stem(file) } else { file.display().to_string() }, motion));
     }
     let (quantity, ..) =
         QUANTITIES.iter().find(|(_, q, _)| *q == args.quantity).expect("one of the list");

@@ -165,7 +165,12 @@ fn print(
     let energy = Shown::energy(ledger.initial_kinetic_j);
     let interfaces = Table::of(&summary.interfaces)
         .column("interface", |i| i.name)
-        .column("peak force", |i| i.load_n().map_or("-".into(), |n| force.text(n)))
+        .column("peak force", |i| i.load_n().map_or("-".into(), |n| force.text(n)));
+    let interfaces = match summary.pulls() {
+        true => interfaces.column("peak tension", |i| force.text(i.history.peak_tension_n)),
+        false => interfaces,
+    };
+    let interfaces = interfaces
         .column("max crush", |i| format!("{:.3} m", i.history.max_deflection_m))
         .column("at", |i| format!("{:.1} ms", i.history.max_deflection_time_s * 1e3))
         .column("energy", |i| i.energy_j.map_or("-".into(), |j| energy.text(j)))
@@ -233,7 +238,8 @@ fn print_limits(out: &mut dyn Write, limits: &Limits<'_>) -> io::Result<()> {
         Some(trains) => format!(", of train {}", trains.join(", ")),
         None => String::new(),
     };
-    let occupants: String = limits.occupants.iter().map(|of| format!("{}\n", of.text())).collect();
+    let occupants: String =
+        limits.occupants.iter().map(|of| format!("{}\n", limits.occupants_text(of))).collect();
     writeln!(
         out,
         "over {} g ({}:{}{of}): {over}\n{occupants}{}",

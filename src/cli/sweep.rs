@@ -268,16 +268,21 @@ fn say(
     }
     let is_short = reached.is_some_and(|reached| !reached.is_reached);
     let outcome = match report.failed {
-        failed if failed > 0 && failed == report.rows => Outcome::Partly,
+        // A shard is a part: that all of its items fail says nothing of the sweep, and its rows are joined with the others.
+        failed if failed > 0 && failed == report.rows && report.shard == Shard::WHOLE => {
+            Outcome::Partly
+        }
         failed => Outcome::warned_if(failed + report.warned > 0 || is_short),
     };
     if is_stdout(output) {
         return Ok(outcome);
     }
-    let document = document! { #[serde(flatten)] report: report, until if_any: reached, seconds: seconds, output: output };
+    let share = ShareOverLimits::of(report, is_random);
+    let most_varied = if global.verbose { usize::MAX } else { MOST_VARIED };
+    let document = document! { #[serde(flatten)] report: report, share_over_limits if_any: share.as_ref(), until if_any: reached, seconds: seconds, output: output };
     global.show(&document, |out| {
-        output::table(out, statistics(report, is_grid))?;
-        if let Some(least) = varied(report).and(report.sensitivities.iter().map(|s| s.rows).min()) {
+        output::table(out, statistics(report, is_grid, most_varied))?;
+        if let Some(least) = varied(report, most_varied).and(report.sensitivities.iter().map(|s| s.rows).min()) {
             // Values drawn at the points of a grid are as random as those of a sample.
             let chance = match is_grid {
                 false => format!("; below {:.2} it may be chance", 2.0 / (least as f64).sqrt()),
@@ -287,11 +292,13 @@ fn say(
         } else if !report.sensitivities.is_empty() {
             writeln!(
                 out,
-                "rank correlations of more than {MOST_VARIED} varied quantities: with --json"
+                "rank correlations of more than {MOST_VARIED} varied quantities: with --verbose or --json"
             )?;
         }
         print_unknown(out, report)?;
-        print_share_over_limits(out, report, is_random)?;
+        if let Some(share) = &share {
+            writeln!(out, "over a limit: {}", share.text())?;
+        }
         if let Some(reached) = reached {
             writeln!(out, "{}", reached.text(report.rows))?;
         }
@@ -395,7 +402,7 @@ impl Reached {
 }
 
 /// Percentiles are those of a distribution: a grid has none.
-fn statistics(report: &Report, is_grid: bool) -> impl Into<Table> {
+fn statistics(report: &Report, is_grid: bool, most_varied: usize) -> impl Into<Table> {
     let number = |value: Option<f64>| value.map_or("-".into(), digits);
     let table =
         Table::of(&report.columns).column("column", |c| &c.column).column("min", |c| number(c.min));
@@ -408,7 +415,7 @@ fn statistics(report: &Report, is_grid: bool) -> impl Into<Table> {
     };
     let table = table.column("max", |c| number(c.max)).column("mean", |c| number(c.mean));
     let sensitivities = &report.sensitivities;
-    varied(report).unwrap_or_default().into_iter().fold(table, |table, varied| {
+    varied(report, most_varied).unwrap_or_default().into_iter().fold(table, |table, varied| {
         table.column(format!("rank corr. {varied}"), move |column| {
             let mut of = sensitivities.iter();
             let of = of.find(|of| of.varied == varied && of.result == column.column);
@@ -417,15 +424,15 @@ fn statistics(report: &Report, is_grid: bool) -> impl Into<Table> {
     })
 }
 
-/// Varied quantities that a table has room for; JSON has all.
+/// Varied quantities that a table has room for; with --verbose and as JSON there are all.
 const MOST_VARIED: usize = 6;
 
 /// What results may follow, if a table has room for it.
-fn varied(report: &Report) -> Option<Vec<&str>> {
+fn varied(report: &Report, most: usize) -> Option<Vec<&str>> {
     let mut varied: Vec<&str> = report.sensitivities.iter().map(|s| &*s.varied).collect();
     varied.sort_unstable();
     varied.dedup();
-    Some(varied).filter(|varied| (1..=MOST_VARIED).contains(&varied.len()))
+    Some(varied).filter(|varied| (1..=most).contains(&varied.len()))
 }
 
 /// Which columns' numbers are those of some rows only.
@@ -444,29 +451,47 @@ fn print_unknown(out: &mut dyn Write, report: &Report) -> io::Result<()> {
     writeln!(out, "numbers of some rows only: {}", shown.join(", "))
 }
 
-fn print_share_over_limits(
-    out: &mut dyn Write,
-    report: &Report,
-    is_random: bool,
-) -> io::Result<()> {
-    let column = report.columns.iter().find(|c| c.column == OVER_LIMITS);
-    let Some(column) = column.filter(|_| report.rows > 0) else { return Ok(()) };
-    let over = (column.mean.unwrap_or(0.0) * column.count as f64).round();
-    let percent = |runs: f64| 1e2 * runs / report.rows as f64;
-    write!(out, "over a limit: {over:.0} of {} (", counted(report.rows, "run"))?;
-    // A run over a limit is known sooner than one that keeps to all: the known ones are not a random sample.
-    let unknown = report.rows - column.count;
-    if unknown > 0 {
-        let (least, most) = (percent(over), percent(over + unknown as f64));
-        return writeln!(out, "{least:.1} to {most:.1} %: {unknown} are not known)");
+/// Of how many runs a vehicle is over a limit.
+#[derive(serde::Serialize)]
+struct ShareOverLimits {
+    over: u64,
+    /// Runs of which it is not known.
+    unknown: u64,
+    rows: u64,
+    /// What holds the share of all possible runs with 95 % probability, if these were drawn at random and each has a verdict.
+    #[serde(rename = "interval_95")]
+    interval: Option<(f64, f64)>,
+}
+
+impl ShareOverLimits {
+    fn of(report: &Report, is_random: bool) -> Option<Self> {
+        let column = report.columns.iter().find(|c| c.column == OVER_LIMITS)?;
+        let (rows, unknown) = (report.rows, report.rows - column.count);
+        if rows == 0 {
+            return None;
+        }
+        let over = (column.mean.unwrap_or(0.0) * column.count as f64).round();
+        // A run over a limit is known sooner than one that keeps to all: the known ones are not a random sample.
+        let interval =
+            (is_random && unknown == 0).then(|| share_interval(over / rows as f64, rows));
+        Some(Self { over: over as u64, unknown, rows, interval })
     }
-    write!(out, "{:.1} %", percent(over))?;
-    if is_random {
-        let (low, high) = share_interval(over / report.rows as f64, report.rows);
-        let (low, high) = (digits(1e2 * low), digits(1e2 * high));
-        write!(out, "; 95 % confidence interval {low} to {high} %")?;
+
+    fn text(&self) -> String {
+        let Self { over, unknown, rows, interval } = self;
+        let percent = |runs: u64| 1e2 * runs as f64 / *rows as f64;
+        let share = if *unknown > 0 {
+            let (least, most) = (percent(*over), percent(over + unknown));
+            format!("{least:.1} to {most:.1} %: {unknown} are not known")
+        } else {
+            let known = interval.map(|(low, high)| {
+                let (low, high) = (digits(1e2 * low), digits(1e2 * high));
+                format!("; 95 % confidence interval {low} to {high} %")
+            });
+            format!("{:.1} %{}", percent(*over), known.unwrap_or_default())
+        };
+        format!("{over} of {} ({share})", counted(*rows, "run"))
     }
-    writeln!(out, ")")
 }
 
 /// Three digits, as many as curves that are some per cent off deserve.

@@ -512,7 +512,8 @@ fn band_line(force: &str, band: &Band) -> String {
         LeftOutSpeeds::Inner => (
             "curve",
             format!(
-                "between training speeds {span} apart, otherwise scaled by the interval to the power {POWER_OF_GAP}"
+                "between training speeds {span} apart around {}, otherwise scaled by the interval between the roots of both speeds to the power {POWER_OF_GAP}",
+                km_per_h(band.around_m_per_s)
             ),
         ),
         LeftOutSpeeds::Ends => (

@@ -189,17 +189,22 @@ pub(crate) fn recorded_force(case: &Case) -> Option<RecordedForce> {
         force_n.extend([2.0 * means[k] - 0.5 * (at(k) + at(k + 1)), at(k + 1)]);
     }
     let (mut unloading_deflection_m, mut unloading_force_n) = (vec![d[end]], vec![top]);
-    let mut parted = None;
-    for i in end..d.len() - 1 {
-        if d[i + 1] >= d[i] {
+    let (mut parted, mut from) = (None, end);
+    for i in end + 1..d.len() {
+        if d[i] > d[from] {
             break;
         }
-        unloading_deflection_m.push(0.5 * (d[i] + d[i + 1]));
-        unloading_force_n.push(mean(i, i + 1));
-        if mean(i, i + 1) <= 0.0 {
-            parted = Some(i);
+        // Where the body turns it hardly moves, and the energies of two states say nothing of a force.
+        if d[from] - d[i] < LEAST_STEP * d[end] {
+            continue;
+        }
+        unloading_deflection_m.push(0.5 * (d[from] + d[i]));
+        unloading_force_n.push(mean(from, i));
+        if mean(from, i) <= 0.0 {
+            parted = Some(from);
             break;
         }
+        from = i;
     }
     let separation = parted.map(|from| separation_m_per_s(t, v, from));
     Some(RecordedForce {
@@ -211,16 +216,20 @@ pub(crate) fn recorded_force(case: &Case) -> Option<RecordedForce> {
     })
 }
 
+/// Shortest distance between states that are used, as a share of the maximum deflection: over a shorter one the digits of a file make steps of
+/// the force, and their slopes would pass for stiffness.
+const LEAST_STEP: f64 = 1.0 / 2000.0;
+
 /// States on the way to the `end` of the loading branch whose deflection advances, with the first
 /// and the last one.
 fn advancing_states(deflection_m: &[f64], end: usize) -> Vec<usize> {
     let mut states = vec![0];
-    let mut reached_m = 0.0;
+    let mut next_m = LEAST_STEP * deflection_m[end];
     for i in 1..end {
         let d = deflection_m[i];
-        if d > reached_m && d <= (1.0 - LAST_SHARE) * deflection_m[end] {
+        if d >= next_m && d <= (1.0 - LAST_SHARE) * deflection_m[end] {
             states.push(i);
-            reached_m = d;
+            next_m = d + LEAST_STEP * deflection_m[end];
         }
     }
     states.push(end);

@@ -3,7 +3,8 @@
 //! A crush zone comes to rest from its tip on. Contact force and body speed alone determine by momentum
 //! `m_s = M − (M v₀ − J)/v` with the impulse `J = ∫F dt` at each deflection, as long as `v` is not small.
 //! All runs of a group share one `λ = dm_s/dd`, constant between nodes, by least squares with smoothing. It
-//! is not negative, and never so large that the crush force `F − λv²` would become tensile.
+//! is not negative, and never so large that the crush force `F − λv²` would become tensile. Forces take it linear between the
+//! middles of the nodes.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -123,14 +124,27 @@ impl StoppedMass {
         }
     }
 
-    /// `λ`, stopped mass per deflection, in kg/m; beyond the last node 0.
+    /// `λ`, stopped mass per deflection, in kg/m; beyond the last node 0. Linear between the middles of the nodes, where [`at`](Self::at)
+    /// has steps of its slope: a step of `λ` at an inner node would be one in every force that is made of it.
     pub(crate) fn rate_kg_per_m(&self, deflection_m: f64) -> f64 {
         let nodes = &self.deflection_m;
-        if deflection_m >= nodes[nodes.len() - 1] {
+        let last = nodes.len() - 2;
+        if deflection_m >= nodes[last + 1] {
             return 0.0;
         }
+        let rate =
+            |i: usize| (self.stopped_kg[i + 1] - self.stopped_kg[i]) / (nodes[i + 1] - nodes[i]);
+        let middle = |i: usize| 0.5 * (nodes[i] + nodes[i + 1]);
         let i = piecewise::segment(nodes, deflection_m);
-        (self.stopped_kg[i + 1] - self.stopped_kg[i]) / (nodes[i + 1] - nodes[i])
+        let (a, b) = if deflection_m < middle(i) {
+            (i.saturating_sub(1), i)
+        } else {
+            (i, (i + 1).min(last))
+        };
+        if a == b {
+            return rate(a);
+        }
+        piecewise::by_share(&[middle(a), middle(b)], &[rate(a), rate(b)], 0, deflection_m)
     }
 
     /// Whether it is what a fit gives, which a file might not hold.
@@ -266,6 +280,12 @@ mod tests {
         assert_eq!((sound.at(0.05), sound.at(3.0)), (50.0, 200.0));
         assert_eq!((sound.rate_kg_per_m(0.15), sound.rate_kg_per_m(3.0)), (1000.0, 0.0));
         assert_eq!(sound.in_all(), (0.2, 200.0));
+        // Between the middles of the nodes it is linear.
+        let rate = |d: f64| made([0.0, 100.0, 300.0]).rate_kg_per_m(d).round();
+        assert_eq!(
+            [0.0, 0.05, 0.1, 0.125, 0.15, 0.19].map(rate),
+            [1e3, 1e3, 1.5e3, 1.75e3, 2e3, 2e3]
+        );
         assert!(!made([0.0, 200.0, 100.0]).is_sound() && !made([1.0, 2.0, 3.0]).is_sound());
         assert!(!sound.without_any().is_known());
     }

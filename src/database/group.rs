@@ -50,8 +50,9 @@ pub(super) fn stopped_mass(name: &str, cases: &[Case]) -> Option<StoppedMass> {
 
 fn of_stopped_mass(stopped: &StoppedMass) -> [(&'static str, AttrValue); 4] {
     let nodes = &stopped.deflection_m;
-    // λ from each node to the next one; 0 from the last.
-    let rates = nodes.iter().map(|&d| stopped.rate_kg_per_m(d)).collect();
+    // Slope of the stopped mass from each node to the next one; 0 from the last.
+    let pairs = nodes.windows(2).zip(stopped.stopped_kg.windows(2));
+    let rates = pairs.map(|(d, kg)| (kg[1] - kg[0]) / (d[1] - d[0])).chain([0.0]).collect();
     [
         (DEFLECTION, AttrValue::F64Array(nodes.clone())),
         (STOPPED, AttrValue::F64Array(stopped.stopped_kg.clone())),

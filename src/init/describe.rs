@@ -517,7 +517,9 @@ impl Facts<'_> {
 /// Why not the usual class, which keeps so much of the work.
 fn taken(kept: f64) -> String {
     let (usual, taken) = (measure::CLASSES[0], 100.0 * (1.0 - kept));
-    format!("the impacts are short: CFC {usual} would remove {taken:.1} % of the work of the force")
+    format!(
+        "the impacts are short or begin with a sharp peak: CFC {usual} would remove {taken:.1} % of the work of the force"
+    )
 }
 
 /// Speeds in a folder's name and the run's own deck that contradict the record.

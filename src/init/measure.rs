@@ -168,7 +168,7 @@ pub(super) fn agree(
         let (least, most) = (one[0].1, one[one.len() - 1].1);
         if !is_near(least, most, SAME_MASS) {
             warnings.push(format!(
-                "mass: the runs' masses by momentum lie between {} and {}, which their coarse records leave open: one mass is taken; give --mass if it is known",
+                "mass: the runs' masses by momentum lie between {} and {}, which their records leave open: one mass is taken; give --mass if it is known",
                 shown_mass(least),
                 shown_mass(most)
             ));

@@ -96,6 +96,11 @@ impl Magnitudes {
         })
     }
 
+    /// Whether units of inches or feet are possible: they are rare, so the folder's name must not contradict them.
+    fn may_be_customary(&self, units: &UnitSystem) -> bool {
+        self.impossible(units).is_none() && self.is_not_as_named(units).is_none()
+    }
+
     /// The quantity that is least usual, and how unusual all are together.
     fn unusual(&self, units: &UnitSystem) -> (f64, String) {
         let all = self.in_si(units);
@@ -175,10 +180,9 @@ fn systems(names: &[&str]) -> Vec<UnitSystem> {
 
 /// For each run whether it is possible in the usual system in which most runs are.
 pub(super) fn most_agree(runs: &[Magnitudes]) -> Vec<bool> {
-    let best = |names: &[&str]| {
+    let best = |names: &[&str], is_possible: fn(&Magnitudes, &UnitSystem) -> bool| {
         let agreeing = systems(names).into_iter().map(|units| {
-            let agree: Vec<bool> =
-                runs.iter().map(|run| run.impossible(&units).is_none()).collect();
+            let agree: Vec<bool> = runs.iter().map(|run| is_possible(run, &units)).collect();
             let agreeing = runs.iter().zip(&agree).filter(|(_, agrees)| **agrees);
             let unusual: Vec<f64> = agreeing.map(|(run, _)| run.unusual(&units).0).collect();
             (unusual.len(), unusual.iter().sum::<f64>(), agree)
@@ -187,7 +191,8 @@ pub(super) fn most_agree(runs: &[Magnitudes]) -> Vec<bool> {
             .reduce(|a, b| if b.0.cmp(&a.0).then(a.1.total_cmp(&b.1)).is_gt() { b } else { a });
         most.filter(|(count, ..)| *count > 0).map(|(.., agree)| agree)
     };
-    let best = best(&UnitSystem::USUAL).or_else(|| best(&UnitSystem::CUSTOMARY));
+    let best = best(&UnitSystem::USUAL, |run, units| run.impossible(units).is_none())
+        .or_else(|| best(&UnitSystem::CUSTOMARY, Magnitudes::may_be_customary));
     best.unwrap_or_else(|| vec![true; runs.len()])
 }
 
@@ -210,7 +215,7 @@ fn guessed(
         }
     }
     let mut customary = systems(&UnitSystem::CUSTOMARY);
-    customary.retain(|units| runs.iter().all(|run| run.impossible(units).is_none()));
+    customary.retain(|units| runs.iter().all(|run| run.may_be_customary(units)));
     let misnamed = |units: &UnitSystem| refused(units, &|run| run.is_not_as_named(units));
     let is_named = runs.iter().any(|run| run.named_m_per_s.is_some());
     if is_named && possible.iter().chain(&customary).any(|units| misnamed(units).is_none()) {

@@ -156,6 +156,9 @@ pub struct InterfaceHistory {
     /// Energy that is lost, in J.
     #[serde(skip)]
     pub dissipated_j: Vec<f64>,
+    /// What `damped_j` is so far; empty by the reference method.
+    #[serde(skip)]
+    pub damped_so_far_j: Vec<f64>,
     /// Energy that is stored at the end, in J.
     #[serde(rename = "stored_at_end_J")]
     pub stored_at_end_j: f64,
@@ -372,6 +375,7 @@ impl Run {
                 &mut i.largest_deflection_m,
                 &mut i.stored_j,
                 &mut i.dissipated_j,
+                &mut i.damped_so_far_j,
             ] {
                 values.reserve_exact(outputs);
             }

@@ -11,8 +11,10 @@ use crate::assess::ComparisonSettings;
 use crate::assess::train::{TrainComparison, compare_train};
 use crate::charts::{self, Motion, Quantity, train_speeds};
 use crate::error::Error;
-use crate::multibody::{Body, Ledger, Method, Run};
-use crate::scenario::{self, CurveOrigin, Limits, Prepared, Scenario, Sources, Summary};
+use crate::multibody::{Body, Ledger, Method, Resistance, Run};
+use crate::scenario::{
+    self, CurveOrigin, Limits, Prepared, Scenario, Sources, Summary, TrainTable,
+};
 use crate::table::Table;
 use crate::unit::{Shown, km_per_h};
 
@@ -69,7 +71,7 @@ pub(super) fn add(
     });
     add_verdicts(content, &name, &summary, uncertainty, &edges);
     let mut parts = vec![
-        Part::Text(conditions(&prepared, &read.run.duration.0, &run)),
+        Part::Text(conditions(&prepared, &read, &run)),
         Part::table("Vehicles", vehicles(&summary)),
     ];
     parts.push(Part::Text(VEHICLES.into()));
@@ -123,7 +125,10 @@ pub(super) fn add(
         impact: impact(&prepared),
         curves: origins
             .iter()
-            .map(|of| format!("{}: {}", of.curve, of.what))
+            .map(|of| match &*of.stated {
+                "" => format!("{}: {}", of.curve, of.what),
+                stated => format!("{}: {}, {stated}", of.curve, of.what),
+            })
             .collect::<Vec<String>>()
             .join("; "),
         name: name.clone(),
@@ -309,13 +314,12 @@ fn add_limits(
         verdict("unknown", format!("{than}: {close}"));
     }
     for of in &limits.occupants {
-        let state =
-            match (of.over.is_empty(), of.unknown.is_empty() && limits.beyond_data.is_empty()) {
-                (false, _) => "over",
-                (true, true) => "kept",
-                (true, false) => "unknown",
-            };
-        verdict(state, format!("occupants, {}", of.text()));
+        let state = match (of.over.is_empty(), of.unknown.is_empty()) {
+            (false, _) => "over",
+            (true, true) => "kept",
+            (true, false) => "unknown",
+        };
+        verdict(state, format!("occupants, {}", limits.occupants_text(of)));
     }
 }
 
@@ -332,7 +336,7 @@ fn impact(prepared: &Prepared) -> String {
 }
 
 /// The same, and how the motion was integrated.
-fn conditions(prepared: &Prepared, duration_s: &f64, run: &Run) -> String {
+fn conditions(prepared: &Prepared, scenario: &Scenario, run: &Run) -> String {
     let count = prepared.chain.bodies().len();
     let method = match prepared.settings.method {
         Method::Verlet => "velocity Verlet",
@@ -340,12 +344,30 @@ fn conditions(prepared: &Prepared, duration_s: &f64, run: &Run) -> String {
         Method::Reference => "the reference method",
     };
     format!(
-        "{}: {} on one line, over {:.0} ms by {method} in steps of {:.3} ms. Speeds are positive in the direction of the first train.",
+        "{}: {} on one line, over {:.0} ms by {method} in steps of {:.3} ms. Speeds are positive in the direction of the first train.{}",
         impact(prepared),
         if count == 1 { "1 body".into() } else { format!("{count} bodies") },
-        1e3 * duration_s,
-        1e3 * run.step_s
+        1e3 * scenario.run.duration.0,
+        1e3 * run.step_s,
+        scenario.train.iter().map(resistance).collect::<String>()
     )
+}
+
+/// What resists a train's motion.
+fn resistance(train: &TrainTable) -> String {
+    let Some(of) = train.resistance else { return String::new() };
+    let Resistance { constant_m_per_s2: a, linear_per_s: b, quadratic_per_m: c, braking } = of;
+    let terms = [(a, "m/s²", ""), (b, "1/s", " v"), (c, "1/m", " v²")];
+    let terms = terms.into_iter().filter(|(factor, ..)| *factor != 0.0);
+    let mut parts: Vec<String> =
+        terms.map(|(factor, unit, of)| format!("{factor} {unit}{of}")).collect();
+    if braking != 0.0 {
+        parts.push(format!("brakes with a friction coefficient of {braking}"));
+    }
+    match &*parts {
+        [] => String::new(),
+        _ => format!(" Resistance of train {}, per mass: {}.", train.name, parts.join(" + ")),
+    }
 }
 
 fn ledger(ledger: &Ledger) -> String {
@@ -398,9 +420,14 @@ fn interfaces(summary: &Summary<'_>) -> impl Into<Table> {
     let largest_n = summary.interfaces.iter().filter_map(|of| of.load_n()).fold(0.0, f64::max);
     let largest_j = summary.interfaces.iter().filter_map(|of| of.energy_j).fold(0.0, f64::max);
     let (force, energy) = (Shown::force(largest_n), Shown::energy(largest_j));
-    Table::of(&summary.interfaces)
+    let table = Table::of(&summary.interfaces)
         .column("interface", |of| of.name)
-        .column("peak force", move |of| of.load_n().map_or("–".into(), |n| force.text(n)))
+        .column("peak force", |of| of.load_n().map_or("–".into(), |n| force.text(n)));
+    let table = match summary.pulls() {
+        true => table.column("peak tension", |of| force.text(of.history.peak_tension_n)),
+        false => table,
+    };
+    table
         .column("maximum crush", |of| metres(of.history.max_deflection_m))
         .column("time of it", |of| format!("{:.1} ms", 1e3 * of.history.max_deflection_time_s))
         .column("energy dissipated or damped", |of| {

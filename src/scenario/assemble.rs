@@ -70,6 +70,7 @@ pub(super) fn assemble_at(
         );
     }
     warnings.extend(scenario.train.iter().filter_map(without_use));
+    warnings.extend(scenario.train.iter().filter_map(brakes_too_hard));
     let limits = scenario.limits.clone();
     let limited = match &limits {
         Some(limits) => limited(scenario, &vehicles, limits),
@@ -91,6 +92,20 @@ pub(super) fn assemble_at(
         warnings,
         of_one,
         origin,
+    })
+}
+
+/// Friction of wheels on dry rails is lower.
+const MOST_BRAKING: f64 = 0.5;
+
+/// Brakes that no rail holds: a percentage, most likely.
+fn brakes_too_hard(train: &TrainTable) -> Option<String> {
+    let braking = train.resistance?.braking;
+    (braking > MOST_BRAKING).then(|| {
+        format!(
+            "train \"{}\": braking = {braking} is a friction coefficient beyond that of wheels on rails, of 0.15 to 0.4: for 15 % write 0.15",
+            train.name
+        )
     })
 }
 

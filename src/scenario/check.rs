@@ -52,8 +52,8 @@ impl Scenario {
                 ));
             }
         }
-        check_names(self)?;
         check_models_of_ends(self)?;
+        check_names(self)?;
         check_contact(self)?;
         let curves = self.curves.len();
         if curves > MAX_CURVES {

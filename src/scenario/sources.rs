@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::assemble::LawCache;
-use super::{CheckedScenario, CurveTable, Scenario, StageTable, place};
+use super::{CheckedScenario, CurveTable, DampingTable, LawName, Scenario, StageTable, place};
 use crate::curve::{Case, Envelope, ForceCurve, ForceKind};
 use crate::database::Database;
 use crate::error::{Error, ErrorCode, KeyPath, error};
@@ -55,7 +55,7 @@ pub(crate) struct CurveOrigin {
     pub(crate) runs: usize,
     /// What leaving its speeds out came to, if that was done.
     pub(crate) left_out: Option<Means>,
-    /// Gap, unloading and stages as the scenario gives them.
+    /// Gap, unloading, stages and whatever else its table gives.
     pub(crate) stated: String,
 }
 
@@ -203,7 +203,7 @@ impl CurveTable {
         begins.into_iter().skip(1).collect()
     }
 
-    /// Gap, unloading, stages and factor, where they are given.
+    /// What its table states besides the source, so that two scenarios with one result have one text.
     fn stated(&self) -> String {
         let mut parts: Vec<String> = Vec::new();
         for (i, stage) in self.stages.iter().flatten().enumerate() {
@@ -219,6 +219,31 @@ impl CurveTable {
         parts.extend(self.gap.map(|gap| format!("gap {:.0} mm", 1e3 * gap.0)));
         parts.extend(self.unloading.map(|k| format!("unloading {}", Shown::one_stiffness(k.0))));
         parts.extend(self.scale.map(|factor| format!("force times {factor}")));
+        parts.extend(self.band.map(|member| match member {
+            -1.0 => "lower edge of its band".into(),
+            1.0 => "upper edge of its band".into(),
+            member => format!("at {member} of its band"),
+        }));
+        if let Some(DampingTable { speed_m_per_s, coefficient_n_s_per_m: c }) = &self.damping {
+            let over = match &**speed_m_per_s {
+                [low, .., high] => format!(" over {low} to {high} m/s"),
+                _ => String::new(),
+            };
+            let c: Vec<String> = c.iter().map(|c| (c / 1e3).to_string()).collect();
+            parts.push(format!("damper {} kN s/m{over}", c.join(", ")));
+        }
+        parts.extend(self.tension.as_ref().map(|curve| format!("tension {curve}")));
+        parts.extend(self.force.map(|force| format!("{} force", force.name())));
+        let law = match self.law {
+            LawName::Memory => None,
+            LawName::Elastic => Some("law elastic".into()),
+            LawName::Rate => Some("law rate".into()),
+        };
+        parts.extend(law);
+        parts.extend(self.end.map(|end| format!("end {}", format!("{end:?}").to_lowercase())));
+        parts.extend(self.max_crush.map(|rule| format!("maximum crush by {}", rule.name())));
+        let further = self.parameters.iter().map(|(name, value)| format!("{name} = {value}"));
+        parts.extend(further);
         parts.join("; ")
     }
 }

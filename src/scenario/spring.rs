@@ -247,7 +247,7 @@ impl Spring {
             let secant = secants.fold(0.0, f64::max);
             if asked < secant {
                 warnings.push(format!(
-                    "unloading {} is softer than the line from the origin to the stages' forces ({} from the end of the first on, more before): there it unloads along that line, since a softer one would generate energy",
+                    "unloading {} is softer than the line from the origin to the stages' forces ({} from the end of the first on, more before): there it unloads along that line, or more steeply where a force that steps up has absorbed less than that line would return",
                     Shown::one_stiffness(asked),
                     Shown::one_stiffness(secant)
                 ));

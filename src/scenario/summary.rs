@@ -27,6 +27,7 @@ pub(crate) struct Summary<'a> {
 #[derive(Serialize)]
 pub(crate) struct BodySummary<'a> {
     pub(crate) name: &'a str,
+    /// Of a vehicle with its crush zones.
     #[serde(skip)]
     pub(crate) mass_kg: f64,
     #[serde(skip)]
@@ -90,6 +91,13 @@ impl BodySummary<'_> {
     }
 }
 
+impl Summary<'_> {
+    /// Whether a coupling has pulled.
+    pub(crate) fn pulls(&self) -> bool {
+        self.interfaces.iter().any(|of| of.history.peak_tension_n > 0.0)
+    }
+}
+
 impl InterfaceSummary<'_> {
     /// The largest force; of plates, which are stopped at once, that would be their own impact and no load of a vehicle.
     pub(crate) fn load_n(&self) -> Option<f64> {
@@ -121,7 +129,8 @@ pub(crate) struct Limits<'a> {
     pub(crate) trains: &'a Option<Vec<String>>,
     /// Bodies whose mean deceleration is over it.
     pub(crate) over: Vec<&'a str>,
-    /// Bodies that are still loaded at the end: their mean may yet rise or fall.
+    /// Bodies that are still loaded at the end, so that their mean may yet rise or fall; all if an interface went beyond its
+    /// data.
     pub(crate) unknown: Vec<&'a str>,
     /// Limits on what occupants meet.
     pub(crate) occupants: Vec<OccupantLimit<'a>>,
@@ -142,9 +151,31 @@ impl Limits<'_> {
 
     /// Which bodies are over the limit of the mean deceleration, in words.
     pub(crate) fn text(&self) -> String {
-        match &*self.beyond_data {
-            [] => known(&self.over, &self.unknown),
-            beyond => format!("unknown: {} went beyond the data of its curve", beyond.join(", ")),
+        self.known(&self.over, &self.unknown)
+    }
+
+    /// The same of a limit on what occupants meet.
+    pub(crate) fn occupants_text(&self, of: &OccupantLimit<'_>) -> String {
+        let (what, unit) = match of.what {
+            "occupant_load_g" => ("occupant load", "g"),
+            _ => ("secondary impact", "m/s"),
+        };
+        format!("{what} above {} {unit}: {}", of.limit, self.known(&of.over, &of.unknown))
+    }
+
+    fn known(&self, over: &[&str], unknown: &[&str]) -> String {
+        if !self.beyond_data.is_empty() {
+            let beyond = self.beyond_data.join(", ");
+            return format!("unknown: {beyond} went beyond the data of its curve");
+        }
+        let known = match (over, unknown) {
+            ([], []) => "no vehicle".into(),
+            ([], _) => "no vehicle for which it is known".into(),
+            (over, _) => over.join(", "),
+        };
+        match unknown {
+            [] => known,
+            names => format!("{known}; the run ended before it was known for {}", names.join(", ")),
         }
     }
 }
@@ -156,32 +187,8 @@ pub(crate) struct OccupantLimit<'a> {
     pub(crate) what: &'static str,
     pub(crate) limit: f64,
     pub(crate) over: Vec<&'a str>,
-    /// Bodies whose run ended before it was known.
+    /// Bodies whose run ended before it was known, and all if an interface went beyond its data.
     pub(crate) unknown: Vec<&'a str>,
-}
-
-impl OccupantLimit<'_> {
-    /// In words.
-    pub(crate) fn text(&self) -> String {
-        let (what, unit) = match self.what {
-            "occupant_load_g" => ("occupant load", "g"),
-            _ => ("secondary impact", "m/s"),
-        };
-        format!("{what} above {} {unit}: {}", self.limit, known(&self.over, &self.unknown))
-    }
-}
-
-/// Bodies over a limit, and those of which it is not known.
-fn known(over: &[&str], unknown: &[&str]) -> String {
-    let known = match (over, unknown) {
-        ([], []) => "no vehicle".into(),
-        ([], _) => "no vehicle for which it is known".into(),
-        (over, _) => over.join(", "),
-    };
-    match unknown {
-        [] => known,
-        names => format!("{known}; the run ended before it was known for {}", names.join(", ")),
-    }
 }
 
 impl Prepared {
@@ -189,13 +196,22 @@ impl Prepared {
     pub(crate) fn summary<'a>(&'a self, run: &'a Run) -> Summary<'a> {
         let (bodies, interfaces) = (self.chain.bodies(), self.chain.interfaces());
         let is_crush_zone = |i: usize| !self.vehicles.contains(&i);
+        let is_zone_of = |zone: &str, vehicle: &str| {
+            zone.strip_prefix(vehicle).is_some_and(|end| [" front", " rear"].contains(&end))
+        };
         let of_body = |&i: &usize| {
             let (body, history) = (&bodies[i], &run.bodies[i]);
             let in_g = |a_m_per_s2: f64| a_m_per_s2 / STANDARD_GRAVITY_M_PER_S2;
             let peak = peak_deceleration(&run.time_s, &history.a_m_per_s2);
             BodySummary {
                 name: &body.name,
-                mass_kg: body.mass_kg,
+                mass_kg: body.mass_kg
+                    + bodies
+                        .iter()
+                        .enumerate()
+                        .filter(|(k, of)| is_crush_zone(*k) && is_zone_of(&of.name, &body.name))
+                        .map(|(_, of)| of.mass_kg)
+                        .sum::<f64>(),
                 initial_v_m_per_s: body.speed_m_per_s,
                 final_v_m_per_s: history.final_v_m_per_s,
                 mean_deceleration_m_per_s2: history.mean_deceleration_m_per_s2,
@@ -224,6 +240,9 @@ impl Prepared {
             let all = self.order.iter().zip(&bodies).filter(|(i, _)| self.limited.contains(i));
             all.map(|(_, body)| body)
         };
+        let beyond_data: Vec<&str> = run.beyond_data().map(|k| &*interfaces[k].name).collect();
+        // Beyond its data the force is an assumption, and with it all that follows.
+        let is_known = beyond_data.is_empty();
         let occupants = |limits: &LimitsTable| {
             type Met<'a> = fn(&BodySummary<'a>) -> Option<f64>;
             let speed = limits.secondary_impact.as_ref().map(|speed| speed.0);
@@ -236,10 +255,13 @@ impl Prepared {
                 what,
                 limit,
                 over: judged()
-                    .filter(|body| met(body).is_some_and(|met| met.abs() > limit))
+                    .filter(|body| is_known && met(body).is_some_and(|met| met.abs() > limit))
                     .map(|body| body.name)
                     .collect(),
-                unknown: judged().filter(|b| met(b).is_none()).map(|body| body.name).collect(),
+                unknown: judged()
+                    .filter(|body| !is_known || met(body).is_none())
+                    .map(|body| body.name)
+                    .collect(),
             };
             asked.map(judged).collect()
         };
@@ -252,13 +274,13 @@ impl Prepared {
             edition: &limits.edition,
             mean_deceleration_limit_g: limits.mean_deceleration_g,
             trains: &limits.trains,
-            over: judged().filter(|body| is_over(body)).map(|body| body.name).collect(),
+            over: judged().filter(|body| is_known && is_over(body)).map(|body| body.name).collect(),
             unknown: judged()
-                .filter(|body| body.still_loaded_at_end && !is_over(body))
+                .filter(|body| !is_known || body.still_loaded_at_end && !is_over(body))
                 .map(|body| body.name)
                 .collect(),
             occupants: occupants(limits),
-            beyond_data: run.beyond_data().map(|k| &*interfaces[k].name).collect(),
+            beyond_data,
             statement: format!(
                 "these values come from a one-dimensional model and say nothing about survival space; they are not evidence of conformity with {}:{}",
                 limits.standard, limits.edition

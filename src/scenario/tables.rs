@@ -247,8 +247,8 @@ pub(crate) struct VehicleTable {
     pub(crate) behind: Option<String>,
     /// Clear distance behind it, in place of the train's `gap`.
     pub(crate) gap: Option<LengthText>,
-    /// Model of both of its ends, in place of `front` and `rear`: the crush force between crush zone
-    /// and body, and the mass that is stopped.
+    /// Model of both of its ends, but for one that `front` or `rear` describes: the crush force between crush zone and
+    /// body, and the mass that is stopped.
     pub(crate) ends: Option<String>,
     /// The crush zone at its front (the end towards the train's nose), as a body of its own.
     pub(crate) front: Option<CrushZoneTable>,

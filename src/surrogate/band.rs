@@ -8,9 +8,12 @@
 //! how many curves it is based.
 //!
 //! Leaving out a speed opens a gap about twice as wide as a query encounters. So residuals are divided by the power 0.5
-//! of their gap, and the band is the result times the same power of the query's gap: the distance between the two
+//! of their gap, and the band is the result times the same power of the query's gap: that between the two
 //! training speeds around it; at a training speed, the wider of the two adjacent gaps. A left-out speed lies in the
 //! middle of its gap, so it does not show how fast errors decrease towards the gap's ends.
+//!
+//! Gaps count by the roots of their speeds, as forces follow them in the models `rate` and `crush-law`: over as many m/s slow
+//! runs differ more than fast ones. By the speeds themselves the bands of slow queries are too narrow, by their logarithms those of fast ones.
 //!
 //! If speeds have several runs, their scatter is a separate part: the deviation of a single run from the mean of its
 //! kind does not depend on the gap. A left-out residual is that of interpolation plus the scatter of the runs it is measured
@@ -33,7 +36,7 @@ pub(crate) const LEVEL: f64 = 0.9;
 const WINDOW: f64 = 0.05;
 /// Between training speeds errors grow with this power of the gap, as the spread of a random walk does: a smooth change
 /// alone would give 1 or more; folds peculiar to each run, 0. With it, in subsets of lead-car-wall, vehicle-pair and
-/// staged-lead-wall, the bands of every model hold 86 to 93 % of FE's points over gaps narrower than the mean of those
+/// staged-lead-wall, the bands of every model hold 86 to 94 % of FE's points over gaps narrower than the mean of those
 /// left out (`crumple validate curves.h5 --group lead-car-wall --subsets`, and the other two).
 pub(crate) const POWER_OF_GAP: f64 = 0.5;
 /// Bands wider than this are damage, not measurement.
@@ -91,6 +94,10 @@ pub struct Band {
     /// query lies between, and the widths scale with its power 0.5; `ends`: distance to the
     /// nearest training speed, and they are in proportion to it.
     pub span_m_per_s: f64,
+    /// Of `inner`: middle of those two speeds; over equal distances the widths are in proportion to its power −0.25. 0 for
+    /// `ends`.
+    #[serde(default)]
+    pub(crate) around_m_per_s: f64,
     /// Half width at any one deflection, as a share of the local level of the force.
     pub pointwise_share: f64,
     /// Half width that holds for the whole curve.
@@ -148,11 +155,38 @@ fn without(whole: f64, part: f64) -> f64 {
     (whole * whole - part * part).max(0.0).sqrt()
 }
 
+/// Over which speeds a curve is predicted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Gap {
+    /// As for [`Band::span_m_per_s`].
+    pub span_m_per_s: f64,
+    /// As for [`Band::around_m_per_s`].
+    pub around_m_per_s: f64,
+}
+
+impl Gap {
+    fn between(low: f64, high: f64) -> Self {
+        Self { span_m_per_s: high - low, around_m_per_s: 0.5 * (low + high) }
+    }
+
+    /// By how much the errors over it are larger than over another.
+    fn over(self, other: Self, left_out: LeftOutSpeeds) -> f64 {
+        let wider = self.span_m_per_s / other.span_m_per_s;
+        let faster = self.around_m_per_s / other.around_m_per_s;
+        match left_out {
+            // √b − √a is about (b − a)/(2√middle).
+            LeftOutSpeeds::Inner if faster > 0.0 && faster.is_finite() => {
+                (wider / faster.sqrt()).powf(left_out.power())
+            }
+            _ => wider.powf(left_out.power()),
+        }
+    }
+}
+
 /// Residuals of one left-out curve relative to the local level of the prediction.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Residuals {
-    /// Over which it was predicted, as for [`Band::span_m_per_s`].
-    pub span_m_per_s: f64,
+    pub gap: Gap,
     pub ratios: Vec<f64>,
     /// How many runs the left-out curve is the mean of.
     pub runs: usize,
@@ -161,8 +195,8 @@ pub(crate) struct Residuals {
 }
 
 impl Residuals {
-    pub(crate) fn new(span_m_per_s: f64, ratios: Vec<f64>, runs: usize) -> Self {
-        Self { stretches: stretches(&ratios), span_m_per_s, ratios, runs }
+    pub(crate) fn new(gap: Gap, ratios: Vec<f64>, runs: usize) -> Self {
+        Self { stretches: stretches(&ratios), gap, ratios, runs }
     }
 
     /// Share of the points within a half width.
@@ -173,7 +207,13 @@ impl Residuals {
 
     /// Share of the points within a band, over their own span.
     pub(crate) fn inside_of(&self, band: Band) -> Option<f64> {
-        Some(self.inside(band.over(self.span_m_per_s)?.share_of_mean(self.runs)))
+        Some(self.inside(band.over(self.gap)?.share_of_mean(self.runs)))
+    }
+
+    /// Whether its gap is narrower than that of a band.
+    pub(crate) fn is_over_less_than(&self, band: Band) -> bool {
+        let Band { span_m_per_s, around_m_per_s, .. } = band;
+        self.gap.over(Gap { span_m_per_s, around_m_per_s }, band.left_out) < 1.0
     }
 
     /// Of one point, so that every curve weighs the same.
@@ -205,31 +245,30 @@ pub(crate) fn ratios(reference_n: &[f64], predicted_n: &[f64]) -> Vec<f64> {
     reference_n.iter().zip(predicted_n).zip(level(predicted_n)).map(ratio).collect()
 }
 
-/// Distance of the two neighbouring training speeds that `v` lies between, of the outermost two
-/// outside of all; `None` for fewer than two speeds. `speeds` do not fall.
+/// The two neighbouring training speeds that `v` lies between, the outermost two outside of all; `None` for fewer than two
+/// speeds. `speeds` do not fall.
 ///
 /// At a training speed it is the wider of the gaps that end there: left-out speeds lie in the
 /// middle of their gaps and do not show how fast the error decreases towards the ends of one.
-pub(crate) fn gap_m_per_s(speeds: &[f64], v: f64) -> Option<f64> {
+pub(crate) fn gap(speeds: &[f64], v: f64) -> Option<Gap> {
     let mut speeds = speeds.to_vec();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
     let gaps = || speeds.windows(2);
-    let width = |gap: &[f64]| gap[1] - gap[0];
+    let of = |gap: &[f64]| Gap::between(gap[0], gap[1]);
+    let wider = |a: Gap, b: Gap| if b.over(a, LeftOutSpeeds::Inner) > 1.0 { b } else { a };
     let is_around = |gap: &&[f64]| {
         (gap[0] <= v || is_same_speed(gap[0], v)) && (v <= gap[1] || is_same_speed(gap[1], v))
     };
     let outermost = if v < *speeds.first()? { gaps().next() } else { gaps().next_back() };
-    gaps().filter(is_around).map(width).reduce(f64::max).or(outermost.map(width))
+    gaps().filter(is_around).map(of).reduce(wider).or(outermost.map(of))
 }
 
-/// How far `v` lies outside of training speeds, which do not fall; 0 between them.
-pub(crate) fn distance_outside_m_per_s(speeds: &[f64], v: f64) -> f64 {
-    let (Some(&low), Some(&high)) = (speeds.first(), speeds.last()) else { return 0.0 };
-    if is_same_speed(low, v) || is_same_speed(high, v) {
-        0.0
-    } else {
-        (low - v).max(v - high).max(0.0)
-    }
+/// How far `v` lies outside of training speeds, which do not fall; `None` between them.
+pub(crate) fn outside(speeds: &[f64], v: f64) -> Option<Gap> {
+    let (&low, &high) = speeds.first().zip(speeds.last())?;
+    let span_m_per_s = (low - v).max(v - high);
+    let is_outside = span_m_per_s > 0.0 && !is_same_speed(low, v) && !is_same_speed(high, v);
+    is_outside.then_some(Gap { span_m_per_s, around_m_per_s: 0.0 })
 }
 
 /// Local level of a force at even deflections: its mean over ±5 % of the curve.
@@ -282,12 +321,15 @@ impl Band {
         let t_of_curves = student_t(curves.len())?;
         let t_of_points = student_t(degrees_of_freedom(left_out, curves))?;
         let n = curves.len() as f64;
-        let span_m_per_s = curves.iter().map(|r| r.span_m_per_s).sum::<f64>() / n;
+        let mean = |of: fn(&Gap) -> f64| curves.iter().map(|r| of(&r.gap)).sum::<f64>() / n;
+        let gap = Gap {
+            span_m_per_s: mean(|gap| gap.span_m_per_s),
+            around_m_per_s: mean(|gap| gap.around_m_per_s),
+        };
         let over_span = |of: &dyn Fn(&[f64]) -> f64, scatter: Option<f64>| {
             let of = |r: &&Residuals| {
                 let of_scatter = scatter.map_or(0.0, |s| s * s / r.runs as f64);
-                (of(&r.ratios) - of_scatter)
-                    / (r.span_m_per_s / span_m_per_s).powf(2.0 * left_out.power())
+                (of(&r.ratios) - of_scatter) / r.gap.over(gap, left_out).powi(2)
             };
             (curves.iter().map(of).sum::<f64>() / n).max(0.0).sqrt()
         };
@@ -297,7 +339,8 @@ impl Band {
             level: LEVEL,
             curves: curves.len(),
             left_out,
-            span_m_per_s,
+            span_m_per_s: gap.span_m_per_s,
+            around_m_per_s: gap.around_m_per_s,
             pointwise_share: t_of_points * over_span(&squares, scatter.map(|s| s.force_share)),
             simultaneous_share: t_of_curves
                 * over_span(&largest, scatter.map(|s| s.largest_force_share)),
@@ -345,12 +388,14 @@ impl Band {
         self.of_interpolation().and(self.scatter.map(mean)).pointwise_share
     }
 
-    /// The same band over another span; `None` if the scaled widths are not finite numbers.
-    pub(crate) fn over(self, span_m_per_s: f64) -> Option<Self> {
-        let factor = (span_m_per_s / self.span_m_per_s).powf(self.left_out.power());
+    /// The same band over another gap; `None` if the scaled widths are not finite numbers.
+    pub(crate) fn over(self, gap: Gap) -> Option<Self> {
+        let Self { span_m_per_s, around_m_per_s, .. } = self;
+        let factor = gap.over(Gap { span_m_per_s, around_m_per_s }, self.left_out);
         let interpolation = self.of_interpolation();
         let band = Self {
-            span_m_per_s,
+            span_m_per_s: gap.span_m_per_s,
+            around_m_per_s: gap.around_m_per_s,
             pointwise_share: factor * interpolation.pointwise_share,
             simultaneous_share: factor * interpolation.simultaneous_share,
             ..interpolation
@@ -368,6 +413,7 @@ impl Band {
             && of_scatter.into_iter().all(sound)
             && self.span_m_per_s > 0.0
             && self.span_m_per_s.is_finite()
+            && (0.0..f64::INFINITY).contains(&self.around_m_per_s)
     }
 
     /// Lowest and highest force at each of a curve's even deflections, in N; never below 0.
@@ -382,11 +428,8 @@ impl Band {
 /// Outside of them it follows the ends, growing with the distance, but never narrower than
 /// just inside; `None` if nothing left out covers it.
 pub(crate) fn at(inner: Option<Band>, ends: Option<Band>, speeds: &[f64], v: f64) -> Option<Band> {
-    let inside = inner.zip(gap_m_per_s(speeds, v)).and_then(|(band, gap)| band.over(gap));
-    let distance = distance_outside_m_per_s(speeds, v);
-    if distance == 0.0 {
-        return inside;
-    }
+    let inside = inner.zip(gap(speeds, v)).and_then(|(band, gap)| band.over(gap));
+    let Some(distance) = outside(speeds, v) else { return inside };
     let outside = ends?.over(distance)?;
     Some(match inside {
         Some(inside) if inside.pointwise_share > outside.pointwise_share => inside,
@@ -402,7 +445,7 @@ fn degrees_of_freedom(left_out: LeftOutSpeeds, curves: &[&Residuals]) -> usize {
     }
 }
 
-/// The band that the curves other than `i` give over its span, with its degrees of freedom.
+/// The band that the curves other than `i` give over its gap, with its degrees of freedom.
 fn without_own(
     left_out: LeftOutSpeeds,
     curves: &[Residuals],
@@ -411,7 +454,7 @@ fn without_own(
 ) -> Option<(Band, usize)> {
     let others: Vec<&Residuals> =
         curves.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, r)| r).collect();
-    let band = Band::without_coverage(left_out, &others, scatter)?.over(curves[i].span_m_per_s)?;
+    let band = Band::without_coverage(left_out, &others, scatter)?.over(curves[i].gap)?;
     Some((band, degrees_of_freedom(left_out, &others)))
 }
 
@@ -487,8 +530,13 @@ mod tests {
     use super::LeftOutSpeeds::{Ends, Inner};
     use super::*;
 
+    /// A gap around 8 m/s.
+    fn over(span_m_per_s: f64) -> Gap {
+        Gap { span_m_per_s, around_m_per_s: 8.0 }
+    }
+
     fn curve(span_m_per_s: f64, ratios: &[f64]) -> Residuals {
-        Residuals::new(span_m_per_s, ratios.to_vec(), 1)
+        Residuals::new(over(span_m_per_s), ratios.to_vec(), 1)
     }
 
     #[test]
@@ -536,7 +584,7 @@ mod tests {
         let grown = 0.1 * 2.0_f64.powf(POWER_OF_GAP);
         let curves = [curve(3.0, &[0.1, 0.1]), curve(6.0, &[grown, grown])];
         let band = Band::of(Inner, &curves, None).unwrap();
-        let share = |band: Band, span: f64| band.over(span).unwrap().pointwise_share;
+        let share = |band: Band, span: f64| band.over(over(span)).unwrap().pointwise_share;
         assert!((share(band, 3.0) - 2.92 * 0.1).abs() < 1e-12);
         assert!((share(band, 6.0) - 2.92 * grown).abs() < 1e-12);
         assert!((share(band, 1.5) - 2.92 * 0.1 / 2.0_f64.powf(POWER_OF_GAP)).abs() < 1e-12);
@@ -544,6 +592,10 @@ mod tests {
         // and outside of the one that it gives at 3.
         let wide = [curve(3.0, &[0.1, 0.1]), curve(6.0, &[0.7, 1.1])];
         assert_eq!(coverage(Inner, &wide, 1, None), Some(0.5));
+        // Twice as fast: the roots of the speeds lie closer by the root of 2.
+        let faster = Gap { span_m_per_s: 3.0, around_m_per_s: 16.0 };
+        let there = band.over(faster).unwrap().pointwise_share;
+        assert!((there / share(band, 3.0) - 2.0_f64.powf(-0.25)).abs() < 1e-12);
         // Outside in proportion.
         let ends = Band::of(Ends, &curves[..1], None).unwrap();
         assert!((share(ends, 9.0) - 3.0 * 6.3138 * 0.1).abs() < 1e-12);
@@ -552,12 +604,12 @@ mod tests {
     #[test]
     fn a_gap_is_that_of_the_neighbouring_training_speeds() {
         let speeds = [5.0, 8.0, 8.0, 12.0, 13.0];
-        let gap = |v: f64| gap_m_per_s(&speeds, v).unwrap();
+        let gap = |v: f64| gap(&speeds, v).unwrap().span_m_per_s;
         assert_eq!([gap(5.0), gap(6.0), gap(7.9), gap(9.0), gap(12.5)], [3.0, 3.0, 3.0, 4.0, 1.0]);
         assert_eq!([gap(8.0), gap(8.0000001), gap(12.0)], [4.0; 3], "the wider at a speed itself");
         assert_eq!([gap(1.0), gap(13.0), gap(99.0)], [3.0, 1.0, 1.0], "outermost");
-        assert_eq!(gap_m_per_s(&[5.0, 5.0], 5.0), None);
-        let outside = |v: f64| distance_outside_m_per_s(&speeds, v);
+        assert_eq!(super::gap(&[5.0, 5.0], 5.0), None);
+        let outside = |v: f64| outside(&speeds, v).map_or(0.0, |gap| gap.span_m_per_s);
         assert_eq!([outside(3.0), outside(5.0), outside(9.0), outside(15.0)], [2.0, 0.0, 0.0, 2.0]);
         assert_eq!(outside(13.000001), 0.0, "rounding is not extrapolation");
     }
@@ -631,17 +683,18 @@ mod tests {
         near(band.interpolation_share(), t2 * 0.04);
         near(band.pointwise_share, (t2 * 0.04_f64).hypot(t3 * 0.03));
         near(band.share_of_mean(9), (t2 * 0.04_f64).hypot(t3 * 0.01));
-        let wide = band.over(8.0).unwrap();
+        let wide = band.over(over(8.0)).unwrap();
         near(wide.interpolation_share(), t2 * 0.04 * 2.0_f64.powf(POWER_OF_GAP));
         assert_eq!(wide.scatter, band.scatter);
-        near(band.over(1e-18).unwrap().pointwise_share, t3 * 0.03);
+        near(band.over(over(1e-18)).unwrap().pointwise_share, t3 * 0.03);
         // Residuals below the scatter leave nothing to interpolation, and no scatter changes nothing.
         let small = [curve(4.0, &[0.01; 2]), curve(4.0, &[0.01; 2])];
         let band = Band::of(Inner, &small, Some(scatter)).unwrap();
         assert_eq!((band.interpolation_share(), band.coverage), (0.0, Some(1.0)));
         let none = ForceScatter { force_share: 0.0, largest_force_share: 0.0, ..scatter };
         let (with, alone) = (Band::of(Inner, &small, Some(none)), Band::of(Inner, &small, None));
-        let (with, alone) = (with.unwrap().over(7.0).unwrap(), alone.unwrap().over(7.0).unwrap());
+        let (with, alone) =
+            (with.unwrap().over(over(7.0)).unwrap(), alone.unwrap().over(over(7.0)).unwrap());
         assert_eq!(with.pointwise_share, alone.pointwise_share);
     }
 }

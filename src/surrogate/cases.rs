@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::CaseCurve;
 use super::cached::Cached;
+use super::response::Response;
 use crate::curve::ForceKind;
 use crate::dataset::{STEPS, TrainingCase, grid};
 use crate::error::Error;
@@ -109,6 +110,8 @@ pub(super) struct Curves {
     pub body: Vec<CaseCurve>,
     /// Of the curves of the declared force and of the body's, once it was requested.
     pub kinks: [Cached<SlopeJump>; 2],
+    /// Of each of the body's curves, once it was requested.
+    pub responses: Vec<Cached<Response>>,
 }
 
 /// How far single points of the curves lie above or below both of their neighbours, in N.
@@ -124,9 +127,11 @@ impl Curves {
         let with = |force: fn(&ModelCase) -> &[f64]| -> Result<Vec<_>, _> {
             cases.iter().filter(|c| !force(c).is_empty()).map(|c| c.curve(force(c))).collect()
         };
+        let body = with(|c| &c.body_force_n)?;
         Ok(Self {
             declared: with(|c| &c.force_n)?,
-            body: with(|c| &c.body_force_n)?,
+            responses: vec![Cached::default(); body.len()],
+            body,
             kinks: Default::default(),
         })
     }

@@ -49,6 +49,7 @@ pub(crate) mod predicted;
 mod query;
 mod rate;
 pub(crate) mod recorded;
+mod response;
 mod speed_of_crush;
 mod spikes;
 pub(crate) mod warning;

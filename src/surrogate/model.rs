@@ -12,6 +12,7 @@ use super::forest::ForestSurrogate;
 use super::leave_one_out::Validation;
 use super::max_crush::MaxCrushRule;
 use super::models::{MODELS, ModelKind};
+use super::response::with_response;
 use super::{CaseCurve, QueryPoint, Surrogate, Warning, WarningCode};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{ForceKind, Masses};
@@ -24,6 +25,8 @@ use crate::unit::{SpeedKind, UnitSystem};
 const MOST_NAMED: usize = 8;
 /// A nearest training speed further away than this share of the speed causes a warning.
 const FAR_OUTSIDE_SHARE: f64 = 0.25;
+/// Parameters outside the training cases' by up to this share of the largest are taken for theirs.
+const NEARLY_INSIDE: f64 = 1e-3;
 /// A surrogate fitted to a group, for the declared force and for the body's.
 #[derive(Clone, Debug)]
 pub struct Model {
@@ -257,7 +260,10 @@ impl Model {
             let (low, high) =
                 (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
             let asked = at.features[k];
-            (!(low..=high).contains(&asked)).then_some((feature, asked, low, high))
+            // 32 t are those of a run whose mass by momentum is 31.99 t.
+            let slack = NEARLY_INSIDE * low.abs().max(high.abs());
+            let inside = low - slack..=high + slack;
+            (!inside.contains(&asked)).then_some((feature, asked, low, high))
         })
     }
 
@@ -266,15 +272,18 @@ impl Model {
         self.fitted.force_n(&self.curves.declared, at, deflection_m)
     }
 
-    /// The forces in N that move the body: of its motion, or the declared ones if the model
-    /// has no others.
+    /// The forces in N that move the body, at deflections from 0 on that are close enough to follow its motion: of its motion, or
+    /// the declared ones if the model has no others.
     pub fn body_force_n(&self, at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         match &self.fitted_body {
-            Some(body) => {
-                let contact = body.answers_from_contact();
-                let curves = if contact { &self.curves.declared } else { &self.curves.body };
-                body.force_n(curves, at, deflection_m)
+            Some(body) if body.answers_from_contact() => {
+                let law_n =
+                    |at: &QueryPoint<'_>| body.force_n(&self.curves.declared, at, deflection_m);
+                let mass_kg = self.masses().effective_kg();
+                let Curves { body: runs, responses, .. } = &self.curves;
+                with_response(runs, responses, mass_kg, at, deflection_m, law_n)
             }
+            Some(body) => body.force_n(&self.curves.body, at, deflection_m),
             None => self.force_n(at, deflection_m),
         }
     }

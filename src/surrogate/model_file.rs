@@ -26,7 +26,7 @@ use crate::unit::{Speed, SpeedKind, UnitSystem};
 /// Value of a model file's `format`.
 const FORMAT: &str = "crumple model";
 /// Version of the model files that this program writes and reads.
-pub(super) const VERSION: u32 = 6;
+pub(super) const VERSION: u32 = 7;
 /// Maximum number of bytes of a model file: a forest of 50 trees has some millions, one of 200 runs a hundred.
 const MAX_BYTES: u64 = 1 << 30;
 

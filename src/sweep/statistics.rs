@@ -196,7 +196,10 @@ pub(crate) fn share_interval(share: f64, count: u64) -> (f64, f64) {
     let centre = share + Z * Z / (2.0 * n);
     let half = Z * (share * (1.0 - share) / n + Z * Z / (4.0 * n * n)).sqrt();
     let scale = 1.0 + Z * Z / n;
-    ((centre - half).max(0.0) / scale, (centre + half) / scale)
+    // At both ends the difference would be a rounding error.
+    let low = if share > 0.0 { (centre - half).max(0.0) / scale } else { 0.0 };
+    let high = if share < 1.0 { ((centre + half) / scale).min(1.0) } else { 1.0 };
+    (low, high)
 }
 
 /// The number that a word of a message is, without the punctuation about it; names with digits are not numbers.
@@ -412,6 +415,9 @@ mod tests {
         assert!((found[1].rank_correlation - expected).abs() < 1e-12, "{found:?}");
         let (low, high) = share_interval(0.0, 20);
         assert!(low == 0.0 && (high - 0.161).abs() < 1e-3, "{high}");
+        for count in [7, 100, 300, 2410] {
+            assert_eq!((share_interval(0.0, count).0, share_interval(1.0, count).1), (0.0, 1.0));
+        }
         // None of 20 over a limit: the true share may be 16 % all the same.
         let none: &dyn Fn(u32) -> f64 = &|_| 0.0;
         let verdicts = Column { count: 20, ..column((&OVER_LIMITS, &none)) };

@@ -109,6 +109,16 @@ impl Binder<'_> {
                 let known = trains.iter().map(|t| t.name.as_str());
                 let at = known.clone().position(|t| t == name);
                 let at = at.ok_or_else(|| unknown("train", "train", name, known))?;
+                let has_value = |v: &Vary| {
+                    v.what == What::Speed && !v.factor && v.train.as_deref() == Some(name)
+                };
+                let stands = trains[at].speed.0 == 0.0;
+                if vary.factor && stands && !self.plan.vary.iter().any(has_value) {
+                    return Err(error!(
+                        Sweep at "factor",
+                        "train \"{name}\" stands, so a factor on its speed has no effect: give speeds instead"
+                    ));
+                }
                 self.one("speed_m_per_s", "speed_factor", name, Target::Speed(at))
             }
             What::Mass => self.masses(),

@@ -355,7 +355,7 @@ def model(name, fitted):
                 "deflection_m": deflection, "force_N": [0.0, 2e6, 1e6, 3e6],
                 "body_force_N": [0.0, 1.9e6, 1e6, 2.9e6], "closing_speed_m_per_s": [speed, 6.0, 4.0, 0.0]}
     return json.dumps({
-        "format": "crumple model", "version": 6, "written_by": "crumple", "group": "g", "speed_kind": "wall",
+        "format": "crumple model", "version": 7, "written_by": "crumple", "group": "g", "speed_kind": "wall",
         "force_kind": "contact", "mass_kg": 24e3, "other_mass_kg": None, "training_hash": "0",
         "cases": [case(8.0), case(12.0)], "options": {"model": name}, "max_crush_rule": "motion",
         "fitted": fitted, "fitted_body": fitted}).encode()

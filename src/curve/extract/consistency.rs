@@ -143,7 +143,7 @@ pub(super) fn filter(class: u32, filtered: &Curve, recorded_n: &[f64]) -> Option
     let kept = cfc::work_kept(&force[states.clone()], &recorded[..states.len()], &path[states]);
     (kept < cfc::KEPT).then(|| {
         format!(
-            "filter: CFC{class} removes {:.1} % of the work of the force, because the impact is short: use a higher class, or filter = \"none\"",
+            "filter: CFC{class} removes {:.1} % of the work of the force, because the impact is short or begins with a sharp peak: use a higher class, or filter = \"none\"",
             100.0 * (1.0 - kept)
         )
     })
@@ -239,7 +239,7 @@ impl<'a> Motion<'a> {
                 return Err(ImpossibleRun::of_histories(found, OTHER_FILES));
             }
             remarks.warn(format!(
-                "{found}: the times of force and motion differ, the force acts on another body, or the recipe lacks part of it"
+                "{found}: the times of force and motion differ, the force acts on another body, the recipe lacks part of it, or a heavy crush zone stops long before the body"
             ));
         }
         let peak_n = force_n[..=self.end].iter().copied().fold(0.0, f64::max);

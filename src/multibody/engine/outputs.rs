@@ -19,12 +19,13 @@ type OfInterface = fn(&mut InterfaceHistory) -> &mut Vec<f64>;
 /// The histories that are kept. The moving mean needs the speeds in any case.
 fn kinds(record: Record) -> (&'static [OfBody], &'static [OfInterface]) {
     const OF_BODY: [OfBody; 3] = [|b| &mut b.v_m_per_s, |b| &mut b.x_m, |b| &mut b.a_m_per_s2];
-    const OF_INTERFACE: [OfInterface; 5] = [
+    const OF_INTERFACE: [OfInterface; 6] = [
         |i| &mut i.deflection_m,
         |i| &mut i.force_n,
         |i| &mut i.largest_deflection_m,
         |i| &mut i.stored_j,
         |i| &mut i.dissipated_j,
+        |i| &mut i.damped_so_far_j,
     ];
     match record {
         Record::Histories => (&OF_BODY, &OF_INTERFACE),
@@ -193,7 +194,7 @@ impl Engine<'_> {
         recorder.recent.keep(first + 1, n, |c| larger(f[c], least));
     }
 
-    /// Largest deflections, what is stored and what is dissipated, as kinds from `first` on.
+    /// Largest deflections, what is stored, dissipated and damped, as kinds from `first` on.
     #[inline(always)]
     fn record_energies<const N: usize>(&self, first: usize, recorder: &mut OutputRecorder) {
         let n = self.fixed.layout.known::<N>();
@@ -205,6 +206,8 @@ impl Engine<'_> {
         recent.keep(first, n, |c| largest_m[c]);
         recent.keep(first + 1, n, |c| larger(stored(c), [0.0; LANES]));
         recent.keep(first + 2, n, |c| lost_j[c]);
+        let damped_j = self.losses.damped_of_j.values(n);
+        recent.keep(first + 3, n, |c| damped_j[c]);
     }
 
     /// Fills in what is known at the end of the run.
