@@ -147,6 +147,11 @@ impl StoppedMass {
         piecewise::by_share(&[middle(a), middle(b)], &[rate(a), rate(b)], 0, deflection_m)
     }
 
+    /// Where `λ` bends, in m.
+    pub(crate) fn bends_m(&self) -> impl Iterator<Item = f64> {
+        self.deflection_m.windows(2).map(|nodes| 0.5 * (nodes[0] + nodes[1]))
+    }
+
     /// Whether it is what a fit gives, which a file might not hold.
     pub(crate) fn is_sound(&self) -> bool {
         let Self { deflection_m: d, stopped_kg: m, residual_kg } = self;

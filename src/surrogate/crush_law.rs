@@ -107,7 +107,8 @@ impl CrushLaw {
     /// The crush forces `F_c − λu²` of the contact curves, over their deflections.
     fn crush_forces(&self, contact: &[CaseCurve]) -> Vec<CaseCurve> {
         let of = |curve: &CaseCurve| {
-            curve.map_forces(|d, force_n| {
+            // Between two points the force is a line, and λ must not bend.
+            curve.with_points(self.stopped.bends_m()).map_forces(|d, force_n| {
                 let u = curve.closing_at(d);
                 (force_n - self.stopped.rate_kg_per_m(d) * u * u).max(0.0)
             })
@@ -257,6 +258,37 @@ mod tests {
                 let expected = case.force_at(d) - law.stopped.rate_kg_per_m(d) * u * u;
                 // Between the points of a curve λu² is not on a line.
                 assert!((found / expected - 1.0).abs() < 1e-7, "{found} N, {expected} N at {d} m");
+            }
+        }
+    }
+
+    /// Between its points a run comes out, too: λ bends there, and what it adds must be what was taken.
+    #[test]
+    fn a_run_comes_out_between_its_points() {
+        let thinned = |speed: f64| {
+            let made::Motion { deflection_m, contact_n, closing_m_per_s, .. } = made::motion(speed);
+            let thin = |values: Vec<f64>| values.into_iter().step_by(40).collect::<Vec<f64>>();
+            let (d, f, u) = (thin(deflection_m), thin(contact_n), thin(closing_m_per_s));
+            CaseCurve::new(speed, vec![], d, f, u).unwrap()
+        };
+        let cases = [5.0, 8.0].map(thinned);
+        let stopped = StoppedMass {
+            deflection_m: vec![0.0, 0.011, 0.023, 0.05, 0.1],
+            stopped_kg: vec![0.0, 150.0, 160.0, 250.0, 300.0],
+            residual_kg: 1.0,
+        };
+        let law = CrushLaw::of(stopped, &cases);
+        for case in &cases {
+            // Beyond the last node nothing more is stopped, at once.
+            for i in
+                (1..1000).filter(|i| (case.end_m() * f64::from(*i) / 1000.0 - 0.1).abs() > 0.002)
+            {
+                let d = case.end_m() * f64::from(i) / 1000.0;
+                let u = case.closing_at(d);
+                let crush_n = law.standing_n(&cases, case.speed_m_per_s, &[d])[0] * law.factor(u);
+                let found = crush_n + law.stopped.rate_kg_per_m(d) * u * u;
+                let off = found / case.force_at(d) - 1.0;
+                assert!(off.abs() < 3e-4, "{off} at {d} m, {} m/s", case.speed_m_per_s);
             }
         }
     }

@@ -50,6 +50,19 @@ impl CaseCurve {
         Self { envelope, ..self.clone() }
     }
 
+    /// The same curve with further points on its lines, at these deflections in m.
+    pub(crate) fn with_points(&self, at_m: impl Iterator<Item = f64>) -> Self {
+        let mut d = self.envelope.deflection_m().to_vec();
+        // The first and the last point stay.
+        let inside = LEAST_WAY_M..self.end_m() - LEAST_WAY_M;
+        d.extend(at_m.filter(|at_m| inside.contains(at_m)));
+        d.sort_by(f64::total_cmp);
+        d.dedup_by(|next, d| *next - *d < LEAST_WAY_M);
+        let force_n = d.iter().map(|&d| self.force_at(d)).collect();
+        let envelope = Envelope::new(d, force_n).unwrap_or_else(|_| self.envelope.clone());
+        Self { envelope, ..self.clone() }
+    }
+
     /// The same forces and speeds at the deflections that a growing map makes of its own.
     pub(crate) fn placed(&self, to_m: impl Fn(f64) -> f64) -> Option<Self> {
         let placed = |e: &Envelope| {
