@@ -143,12 +143,12 @@ fn begun_s(time_s: &[f64], force_n: &[f64], k: usize) -> f64 {
     time_s[k] - share.min(1.0) * (time_s[k] - time_s[k - 1])
 }
 
-/// Between outputs further apart than this, in s, speeds do not go along lines.
-const COARSEST_S: f64 = 0.02;
+/// Between outputs further apart than this, in s, speeds are not straight lines.
+const MOST_INTERVAL_S: f64 = 0.02;
 
 /// When the mean speed of the first train no longer exceeds that of the second, or 0 against a wall.
 pub(super) fn common_speed_time_s(prepared: &Prepared, run: &Run) -> Option<f64> {
-    if prepared.settings.output_interval_s > COARSEST_S {
+    if prepared.settings.output_interval_s > MOST_INTERVAL_S {
         return None;
     }
     let bodies = prepared.chain.bodies();

@@ -203,7 +203,7 @@ impl CurveTable {
         begins.into_iter().skip(1).collect()
     }
 
-    /// What its table states besides the source, so that two scenarios with one result have one text.
+    /// What its table states besides the source: designs that differ in it are distinguished on a page.
     fn stated(&self) -> String {
         let mut parts: Vec<String> = Vec::new();
         for (i, stage) in self.stages.iter().flatten().enumerate() {
