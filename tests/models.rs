@@ -1101,6 +1101,32 @@ fn left_out_speeds_of_the_bundled_groups() {
     assert!(covered.iter().all(|c| (0.85..=0.95).contains(c)), "{covered:?}");
 }
 
+/// The contact force of these runs is largest at the contact and falls from there. A prediction rises from 0 within its first interval; its first peak
+/// is FE's at the speed of a run, and between the speeds off by as much as the rest of the curve.
+#[test]
+fn the_peak_at_the_contact_is_kept() {
+    let group = "lead-car-wall";
+    let cases = databases().cases(group);
+    let set = TrainingSet::new(group, cases).unwrap();
+    let first_peak = |curve: &PredictedCurve| curve.force_n[1];
+    for kind in ["linear", "rate", "crush-law"] {
+        let kind = ModelKind::named(kind, 0).unwrap();
+        let model = Model::fit(&set, kind).unwrap();
+        for case in &set.cases {
+            let off = first_peak(&curve(&model, case.speed_m_per_s)) / case.envelope.force_n()[0];
+            assert!((off - 1.0).abs() < 1e-5, "{} at {}: {off}", model.name(), case.name);
+        }
+    }
+    for i in 1..cases.len() - 1 {
+        let others: Vec<Case> = [&cases[..i], &cases[i + 1..]].concat();
+        let others = TrainingSet::new(group, &others).unwrap();
+        let model = Model::fit(&others, ModelKind::named("crush-law", 0).unwrap()).unwrap();
+        let case = &set.cases[i];
+        let off = first_peak(&curve(&model, case.speed_m_per_s)) / case.envelope.force_n()[0];
+        assert!((off - 1.0).abs() < 0.06, "{}: {off}", case.name);
+    }
+}
+
 /// A front whose second stage begins at another deflection at each speed.
 #[test]
 fn a_front_in_two_stages_is_predicted_by_its_events() {

@@ -11,7 +11,8 @@ from crumple import _crumple
 class RegressionForest(RegressorMixin, BaseEstimator):
     """A forest of regression trees, the one that crumple's models use.
 
-    Parameters are named as in scikit-learn's RandomForestRegressor: `max_features` is a number, or None for all;
+    Parameters are named as in scikit-learn's RandomForestRegressor: `max_features` is a number, a share (a float), "sqrt", "log2", or
+    None for all;
     `random_thresholds` draws one threshold per feature (extra-trees). The same `random_state` gives the same forest on any
     number of threads. After `fit` there are `n_features_in_` and `feature_importances_`.
     """
@@ -42,9 +43,20 @@ class RegressionForest(RegressorMixin, BaseEstimator):
         seed = int(check_random_state(self.random_state).randint(np.iinfo(np.int32).max))
         self.forest_ = _crumple.Forest.fit(
             np.ascontiguousarray(X).tobytes(), X.shape[1], np.ascontiguousarray(y).tobytes(), self.n_estimators, seed,
-            self.max_depth, self.min_samples_leaf, self.max_features, self.bootstrap, self.random_thresholds,
+            self.max_depth, self.min_samples_leaf, self._features_of(X.shape[1]), self.bootstrap, self.random_thresholds,
         )
         return self
+
+    def _features_of(self, n):
+        """`max_features` as a number, or None for all of `n`."""
+        given = self.max_features
+        if given is None or isinstance(given, (int, np.integer)):
+            return given
+        if isinstance(given, float) and 0 < given <= 1:
+            return max(1, int(given * n))
+        if given in ("sqrt", "log2"):
+            return max(1, int(n**0.5 if given == "sqrt" else np.log2(n)))
+        raise ValueError(f'max_features is {given!r}: expected a number, a share above 0 up to 1.0, "sqrt", "log2" or None')
 
     def predict(self, X):
         """Mean over the trees, of shape (samples,)."""

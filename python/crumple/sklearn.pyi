@@ -8,7 +8,7 @@ class RegressionForest(RegressorMixin, BaseEstimator):
     n_estimators: int
     max_depth: int | None
     min_samples_leaf: int
-    max_features: int | None
+    max_features: int | float | str | None
     bootstrap: bool
     random_thresholds: bool
     random_state: int | np.random.RandomState | None
@@ -19,7 +19,7 @@ class RegressionForest(RegressorMixin, BaseEstimator):
         *,
         max_depth: int | None = None,
         min_samples_leaf: int = 1,
-        max_features: int | None = None,
+        max_features: int | float | str | None = None,
         bootstrap: bool = True,
         random_thresholds: bool = False,
         random_state: int | np.random.RandomState | None = None,

@@ -266,6 +266,16 @@ def test_the_forest_is_an_estimator():
         assert forest.score(frame, y) > 0.97 and math.isclose(forest.feature_importances_.sum(), 1.0)
         again = pickle.loads(pickle.dumps(forest))
         assert np.array_equal(again.predict(frame), forest.predict(frame))
+    x = random.uniform(size=(50, 9))
+
+    def predicted(features):
+        return RegressionForest(5, max_features=features, random_state=0).fit(x, x[:, 0]).predict(x)
+
+    for features, same in (("sqrt", 3), ("log2", 3), (0.5, 4), (0.01, 1), (1.0, None)):
+        assert np.array_equal(predicted(features), predicted(same)), features
+    for features in ("all", 0.0, 1.5):
+        with pytest.raises(ValueError, match="expected a number, a share"):
+            predicted(features)
 
 
 def test_cases_are_read_one_by_one(monkeypatch):

@@ -192,7 +192,7 @@ impl<'a> LeftOutCase<'a> {
                 .rebound
                 .zip(self.own.motion.rebound_speed_m_per_s)
                 .map(|(predicted, fe)| predicted.speed_m_per_s / fe - 1.0),
-            peaks: peak_errors(&along, &reference, &predicted),
+            peaks: peak_errors(&self.own.envelope, &envelope),
             velocity_l1: body.velocity_l1,
             acceleration_l1: body.acceleration_l1,
             acceleration_unfiltered_l1: body.acceleration_unfiltered_l1,
@@ -283,9 +283,14 @@ impl LeftOutRun<'_> {
     }
 }
 
-/// The first two peaks of FE's force and the predicted peaks nearest to them.
-fn peak_errors(along: &[f64], reference: &[f64], predicted: &[f64]) -> Vec<PeakError> {
-    matched_peaks(along, reference, predicted)
+/// The first two peaks of FE's force and the predicted peaks nearest to them, up to FE's maximum crush; at the points of both curves, between
+/// which neither has one.
+fn peak_errors(reference: &Envelope, predicted: &Envelope) -> Vec<PeakError> {
+    let mut along = [reference.deflection_m(), predicted.deflection_m()].concat();
+    along.retain(|d| *d <= reference.end_m());
+    along.sort_by(f64::total_cmp);
+    along.dedup();
+    matched_peaks(&along, &forces_n(reference, &along), &forces_n(predicted, &along))
         .into_iter()
         .map(|peak| {
             let (deflection_m, force_n) = peak.reference;

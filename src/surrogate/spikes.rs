@@ -12,7 +12,8 @@ const ROUNDS: usize = 100;
 const PROBES: f64 = 4_000.0;
 
 /// Forces of a physical loading branch: 0 at 0, never negative, and no point that stands
-/// alone as none of a training curve does.
+/// alone as none of a training curve does. A force that begins with a step reaches its first value at the second point, so that its first
+/// peak is kept.
 pub(super) fn without_spikes(
     model: &Model,
     deflection_m: &[f64],
@@ -61,6 +62,7 @@ pub(super) fn without_spikes(
             break;
         }
     }
+    force_n[1] = force_n[1].max(force_n[0]);
     force_n[0] = 0.0;
     Ok(force_n)
 }
