@@ -189,10 +189,15 @@ fn energy_audits_of_all_groups() {
     }
     assert_eq!(cases, 20);
     let check = crumple_ok(folder.path(), "db check curves.h5");
-    // At 3 km/h a step is a good part of the crush.
+    // At low speeds a quarter of a step is more than 1 % of the crush.
     let findings: Vec<&str> = check.lines().collect();
-    assert!(findings[0].starts_with("vehicle-pair/3kmh: contact: it lies within 0.63 mm"));
-    assert_eq!(findings[1..], ["20 cases checked, 1 finding"], "{check}");
+    for (found, case) in findings
+        .iter()
+        .zip(["3kmh: contact: it lies within 0.16 mm", "6kmh: contact: it lies within 0.31 mm"])
+    {
+        assert!(found.starts_with(&format!("vehicle-pair/{case}")), "{check}");
+    }
+    assert_eq!(findings[2..], ["20 cases checked, 2 findings"], "{check}");
 }
 
 /// The full runs give the curves of the thinned ones, bit for bit.

@@ -680,6 +680,23 @@ fn a_straight_branch_of_many_points_is_the_line() {
     }
 }
 
+/// The same crash of a body that weighs 1/100 and 1/10 000: its mean is the same, but for when it begins.
+#[test]
+fn mean_decelerations_are_those_of_any_mass() {
+    let mean = |factor: f64| {
+        let unloading = Unloading::Memory { stiffness_n_per_m: 80.0 * MEGA * factor };
+        let law = ForceLaw::new(constant(4e5 * factor), unloading, EnvelopeEnd::Hold);
+        let body = Body::new("A", 1270.0 * factor, 10.0);
+        let chain = Chain::new(vec![body], vec![Interface::new("A|wall", law, 0.0)]).unwrap();
+        run(&chain, &settings()).bodies[0].mean_deceleration_m_per_s2
+    };
+    let whole = mean(1.0);
+    assert!(whole > 100.0, "{whole}");
+    for factor in [1e-2, 1e-4] {
+        assert!((mean(factor) / whole - 1.0).abs() < 0.02, "{} against {whole}", mean(factor));
+    }
+}
+
 /// A contact ends where its force does, whatever happens then: a curve that falls to zero, an
 /// elastic curve that goes back over a stretch without force, a damper that opens before its
 /// spring, neighbours that press with the same force.

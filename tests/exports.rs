@@ -629,6 +629,36 @@ fn a_force_at_contact_keeps_its_energy() {
     assert!((energy / (0.9 * 2.47e6) - 1.0).abs() < 1e-3, "{energy}");
 }
 
+/// A constant force: a target that unloads with the steepest rise reaches it on the line of the unloading, which is said; for one that returns
+/// all energy the line is steep.
+#[test]
+fn what_a_rise_from_the_origin_changes_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    fs::write(here.join("tube.csv"), "d_m,F_N\n0,3e5\n0.1,3e5\n0.2,3e5\n0.4,3e5\n").unwrap();
+    let of = "tube.csv --speed 10m/s --kind wall --mass 2.4t --unloading 10MN/m --tail none";
+    for (output, raised) in
+        [("a.k", 0.039), ("a.rad", 0.039), ("a.mat", 0.0), ("a.cmd", 0.0), ("a.inp", 0.0)]
+    {
+        let args = format!("export {of} -o {output} -v --units SI");
+        let args = if output == "a.mat" { args.replace(" --units SI", "") } else { args };
+        let said = String::from_utf8(crumple_in(here, &args).stderr).unwrap();
+        let is_said = said.contains("the force begins with 0.300 MN, which the file reaches on a line of 10.4 MN/m from the origin; its forces are 3.9 % larger");
+        assert_eq!(is_said, raised > 0.0, "{output}: {said}");
+        if ["a.cmd", "a.inp"].contains(&output) {
+            continue;
+        }
+        let (read, _) = read(&here.join(output), &ReadOptions::default()).unwrap();
+        let read = crumple::curve::Envelope::new(read.deflection_m, read.force_n).unwrap();
+        assert!(
+            (read.force_at(0.2) / 3e5 - 1.0 - raised).abs() < 1.5e-3,
+            "{output}: {}",
+            read.force_at(0.2)
+        );
+        assert!((read.work_to(0.4) / 1.2e5 - 1.0).abs() < 2e-3, "{output}");
+    }
+}
+
 /// A recorded curve that begins with a force, as of crushed honeycomb, keeps it: in files that can begin so as it is, in others
 /// with its energy.
 #[test]

@@ -9,7 +9,7 @@ use crumple::database::Database;
 use crumple::formats::{ReadOptions, read};
 
 use crate::common::{
-    build_fixture, crumple_fails, crumple_ok, demo_folder, python_of, run_python, says,
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, python_of, run_python, says,
 };
 
 fn clients(arguments: &[&Path]) -> Value {
@@ -57,6 +57,30 @@ fn signals_of_mdf_files_are_rated() {
     says(&error, "run.mf4: there is no channel \"a A9\": name one of \"time [s]\", \"x A1 [m]\"");
     let error = crumple_fails(here, 1, &["rate", "run.mf4", "run.mf4"]);
     says(&error, "run.mf4: there are several columns: name one of");
+}
+
+/// Between the common times of a recipe a record may have peaks that they do not show: exports of those times say so.
+#[test]
+fn what_common_times_leave_out_is_said() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let said = |output: &str| {
+        let more: Vec<&str> = output.split(' ').collect();
+        let exported = crumple_in(here, &[&["export"], &CASE[..], &["-v", "-o"], &more].concat());
+        String::from_utf8(exported.stderr).unwrap()
+    };
+    assert!(!said("case.mf4").contains("common times"));
+    let study = here.join("fe/lead-car-wall/study.toml");
+    let text = fs::read_to_string(&study).unwrap();
+    let coarse =
+        text.replace("states = 400, interval_ms = 0.75", "states = 100, interval_ms = 3.0");
+    assert_ne!(text, coarse);
+    fs::write(&study, coarse).unwrap();
+    crumple_ok(here, "build fe/lead-car-wall/study.toml -o curves.h5 -q");
+    for (to, output) in [("mdf", "coarse.mf4"), ("iso-mme", "coarse")] {
+        let said = said(&format!("{output} --to {to}"));
+        says(&said, "36kmh: it has the force at the recipe's common times, which differs by up to");
+    }
 }
 
 /// asammdf finds every channel of a case and of a run, with its unit and values.

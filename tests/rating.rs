@@ -92,6 +92,17 @@ fn runs_are_rated_by_the_acceptance_rule() {
             && said.contains("EN 15227:2020+A1:2024"),
         "{said}"
     );
+    // A run that ends before the crush does has no crush to judge.
+    let whole = std::fs::read_to_string(folder.join("one.csv")).unwrap();
+    let lines: Vec<&str> = whole.lines().take(40).collect();
+    std::fs::write(folder.join("cut.csv"), lines.join("\n") + "\n").unwrap();
+    for (a, b, who) in [("one", "cut", "prediction"), ("cut", "cut", "reference")] {
+        let output = crumple_in(folder, &format!("rate {a}.csv {b}.csv --strict"));
+        assert_eq!(output.status.code(), Some(3));
+        let said = String::from_utf8(output.stderr).unwrap();
+        says(&said, &format!("the {who} ends while these are still being crushed"));
+        says(&String::from_utf8(output.stdout).unwrap(), "; fails: ");
+    }
     // An interface that one of both lacks, and what is for single signals.
     let less: String = std::fs::read_to_string(folder.join("one.csv")).unwrap();
     let header: Vec<&str> = less.lines().next().unwrap().split(',').collect();

@@ -32,7 +32,8 @@ maximum crush, and then rise with the unloading stiffness. --tail changes this.
 
 ONNX: input is records, double, N x 2: speed_m_per_s, deflection_m (then the model's further
 parameters); output is force_N, float, N x 1. Splits are evaluated in double; the force is rounded to float (6e-8).
-It is the forest alone: before contact (deflection_m <= 0) and beyond the maximum crush of predict the force is yours to set.")]
+It is the forest alone: before contact (deflection_m <= 0) and beyond the maximum crush of predict the force is yours to set,
+and it keeps isolated points that predict takes out (docs/forest.md).")]
 pub(super) struct Args {
     /// Predicted curve (JSON of crumple predict), model (of crumple train), curve database, or a measured
     /// or legacy curve's file (crumple db add --list)

@@ -34,6 +34,10 @@ pub(super) struct Args {
     /// between the vehicles of a train
     #[arg(long)]
     scenario: bool,
+
+    /// Write vehicles of one mass, whose runs are faster, where the models know their ends
+    #[arg(long, requires = "scenario")]
+    one_mass: bool,
     #[command(flatten)]
     given: GivenArgs,
 }
@@ -87,7 +91,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
 
 fn scenario(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
     let place = if is_stdout(output) { Path::new("scenario.toml") } else { output };
-    let proposal = init::propose_scenario(&args.inputs, place)?;
+    let proposal = init::propose_scenario(&args.inputs, place, args.one_mass)?;
     let text = proposal.to_toml();
     let outcome = options.warn_all(proposal.missing.iter().map(|what| format!("fill in {what}")));
     if is_stdout(output) {

@@ -346,8 +346,20 @@ fn rate_runs(reference: &Path, prediction: &Path, options: GlobalOptions) -> Com
             reference.display()
         ));
     };
+    let outcome = options.warn_all(["reference", "prediction"].into_iter().enumerate().filter_map(
+        |(of, who)| {
+            let is_cut = |s: &&StageAcceptance| s.counts && [s.reference, s.prediction][of].is_cut;
+            let cut: Vec<&str> = found.stages.iter().filter(is_cut).map(|s| &*s.stage).collect();
+            (!cut.is_empty()).then(|| {
+                format!(
+                    "the {who} ends while these are still being crushed, so crush and energy are not final: {}",
+                    cut.join(", ")
+                )
+            })
+        },
+    ));
     options.show(&found, |out| print_runs(out, &found))?;
-    Ok(Outcome::Clean)
+    Ok(outcome)
 }
 
 fn print_runs(out: &mut dyn Write, found: &RunAcceptance) -> io::Result<()> {

@@ -84,6 +84,12 @@ impl ImpossibleRun {
         Self { found, cause: Cause::Histories(cause) }
     }
 
+    /// The same with another cause: a force before the contact that was found.
+    pub(crate) fn by_earlier_force(self) -> Self {
+        let cause = "likely a force before the contact that was found, which the curve leaves out: contact_time in the run takes it in";
+        Self::of_histories(self.found, cause)
+    }
+
     /// What was found, without its cause.
     pub(crate) fn found(&self) -> &str {
         &self.found

@@ -164,6 +164,7 @@ fn recorded(
         manifest_speed_m_per_s: Some(impact.speed.m_per_s),
         deck_speed: None,
         contact_threshold: contact::THRESHOLD,
+        of_impulse: false,
         stated: Stated { contact, accept_energy: impact.accept_energy, ..Stated::default() },
         others: &Vec::new,
     };

@@ -22,7 +22,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
     let mut notes = Vec::new();
     let mut together = String::new();
     for (k, curve) in curves.iter().enumerate() {
-        let curve = &curve.begun_at_origin()?;
+        let curve = &curve.begun_at_origin(true, &mut notes)?;
         let spline = Spline::of(curve, units, options.id + k as u32)?;
         notes.push(curve.restitution_note("Adams", TargetUnloading::Elastic));
         match extension {

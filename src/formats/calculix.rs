@@ -19,7 +19,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
     let mut lines = String::new();
     let mut notes = Vec::new();
     for (k, curve) in curves.iter().enumerate() {
-        let curve = &curve.begun_at_origin()?;
+        let curve = &curve.begun_at_origin(true, &mut notes)?;
         let id = options.id + k as u32;
         let given = curve.deflection_m().len();
         let loading = thinned(&curve.loading, MOST_ROWS - 1, curve.end)?;

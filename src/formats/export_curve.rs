@@ -34,6 +34,9 @@ pub struct ExportCurve {
     pub ordinal: usize,
 }
 
+/// Share of the energy that a rise from the origin to the first force may change unsaid.
+const RAMP: f64 = 1e-3;
+
 /// How a target releases the energy stored at the maximum crush.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum TargetUnloading {
@@ -120,15 +123,35 @@ impl ExportCurve {
     }
 
     /// The same curve for tools that need the origin: a force at contact is reached as steeply as the curve rises or unloads,
-    /// with the same energy.
+    /// for an elastic target so steeply that hardly any energy is missing, with the same energy. The notes say what that changes.
     ///
     /// # Errors
     /// If the result is not a valid curve.
-    pub(crate) fn begun_at_origin(&self) -> Result<Self, Error> {
-        Ok(match from_origin(&self.loading, self.end, self.stiffness_n_per_m())? {
-            Some((loading, end)) => self.clone().through(loading, end),
-            None => self.clone(),
-        })
+    pub(crate) fn begun_at_origin(
+        &self,
+        is_elastic: bool,
+        notes: &mut Vec<String>,
+    ) -> Result<Self, Error> {
+        let first_n = self.force_n()[0];
+        let steep = match is_elastic {
+            true => first_n.powi(2) / (2.0 * RAMP * self.loading.work_to(self.max_crush_m())),
+            false => 0.0,
+        };
+        let slope = self.stiffness_n_per_m().max(steep);
+        let Some((loading, end)) = from_origin(&self.loading, self.end, slope)? else {
+            return Ok(self.clone());
+        };
+        let raised = loading.force_n()[end] / self.end_n() - 1.0;
+        if raised > RAMP {
+            notes.push(format!(
+                "{}: the force begins with {}, which the file reaches on a line of {} from the origin; its forces are {:.1} % larger, so that the energy up to the maximum crush is the same",
+                self.headline(),
+                Shown::one_force(first_n),
+                Shown::one_stiffness(loading.force_n()[1] / loading.deflection_m()[1]),
+                100.0 * raised
+            ));
+        }
+        Ok(self.clone().through(loading, end))
     }
 
     /// What softening has changed, in one line.

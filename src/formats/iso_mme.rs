@@ -93,7 +93,8 @@ pub(super) fn write_case(case: &Case) -> Result<Exported, Error> {
             format!("recipe {}", case.provenance.recipe),
         ],
     };
-    folder(&test, &channels)
+    let notes = super::sampled_note(case).into_iter().collect();
+    Ok(Exported { notes, ..folder(&test, &channels)? })
 }
 
 /// The interval of even times.

@@ -11,7 +11,7 @@ pub(crate) fn write(curves: &[ExportCurve]) -> Result<Exported, Error> {
     let mut bytes = Vec::new();
     let mut notes = Vec::new();
     for (k, curve) in curves.iter().enumerate() {
-        let curve = &curve.begun_at_origin()?;
+        let curve = &curve.begun_at_origin(true, &mut notes)?;
         // The first curve has the plain names, which the others number.
         let named = |name: &str| if k == 0 { name.into() } else { format!("{name}_{}", k + 1) };
         let reach = curve.loading.end_m();

@@ -3,8 +3,8 @@
 //! Blocks follow each other: a name such as `##CG`, the length, the number of links, the links, the data. Every record
 //! holds the time and one double per channel.
 
-use super::Exported;
 use super::export_curve::plain;
+use super::{Exported, sampled_note};
 use crate::curve::body::body_force_n;
 use crate::curve::{Case, ForceKind};
 use crate::error::Error;
@@ -46,7 +46,8 @@ pub(super) fn write_case(case: &Case) -> Result<Exported, Error> {
     facts.push("sign: deflection and force positive in compression, time 0 is the first contact; inertia is the force that moves the body".into());
     let bytes = file(&facts.join("\n"), &format!("{group}/{name}"), sampled.time_s(), &channels);
     let name: String = format!("{group}-{name}").chars().map(plain).collect();
-    Ok(Exported { files: vec![(format!("{name}.mf4"), bytes)], ..Exported::default() })
+    let notes = sampled_note(case).into_iter().collect();
+    Ok(Exported { files: vec![(format!("{name}.mf4"), bytes)], notes, ..Exported::default() })
 }
 
 /// A file with these channels.

@@ -27,8 +27,9 @@ use std::path::Path;
 use crate::curve::{Case, ForceKind, Tail};
 use crate::error::{Error, error};
 use crate::guess;
+use crate::signal::interpolate;
 use crate::surrogate::{Model, PredictedCurve, Query};
-use crate::unit::UnitSystem;
+use crate::unit::{Shown, UnitSystem};
 pub use export_curve::ExportCurve;
 pub(crate) use export_curve::TargetUnloading;
 pub use fmu::{FmiVersion, Spring, archive, binaries};
@@ -251,6 +252,25 @@ pub struct Exported {
     pub notes: Vec<String>,
     /// Warnings of the curves that were made for it.
     pub warnings: Vec<String>,
+}
+
+/// Where an export of the common times of a recorded case is off by more than 1 % of its largest force.
+fn sampled_note(case: &Case) -> Option<String> {
+    let (common, own) = (&case.curves.sampled, &case.curves.original);
+    let (from_s, to_s) = (common.time_s().first()?, common.time_s().last()?);
+    let states = || own.time_s().iter().zip(own.force_n());
+    let (time_s, force_n): (Vec<f64>, Vec<f64>) =
+        states().filter(|(t, _)| (from_s..=to_s).contains(t)).unzip();
+    let lines_n = interpolate(common.time_s(), common.force_n(), &time_s).ok()?;
+    let off_n = force_n.iter().zip(&lines_n).map(|(own, line)| (own - line).abs());
+    let (off_n, largest_n) = (off_n.fold(0.0, f64::max), case.peak_force_n());
+    (off_n > 0.01 * largest_n).then(|| {
+        format!(
+            "{}: it has the force at the recipe's common times, which differs by up to {} from the record's own states (crumple db export --originals writes those)",
+            case.id.name,
+            Shown::one_force(off_n)
+        )
+    })
 }
 
 impl Exported {

@@ -189,10 +189,7 @@ impl Facts<'_> {
     /// The filter, and for each run a time at which it has to be cut for it: a solver's last state
     /// often comes right after the one before.
     fn filter(&self) -> (Proposed<Filter>, Vec<Option<f64>>) {
-        let means = self.recipe.force.as_ref().and_then(|force| {
-            let source = self.records.first()?.run.sources.force(force.file)?;
-            source.means.as_deref()
-        });
+        let means = self.records.first().and_then(|record| record.force_means.as_deref());
         let coarsest = self.impacts().map(|(_, impact)| impact.interval_s).fold(0.0, f64::max);
         let proposed = measure::filter(means, coarsest);
         let none = vec![None; self.records.len()];

@@ -46,7 +46,8 @@ impl Impact {
         let mut contact_s = time_s[0];
         if !force_n.is_empty() {
             let threshold_n = contact::threshold_n(&force_n, contact::THRESHOLD);
-            let onset = contact::onset(&force_time_s, &force_n, threshold_n);
+            let of_impulse = record.force_means.is_some();
+            let onset = contact::onset(&force_time_s, &force_n, threshold_n, of_impulse);
             contact_s = onset.map_or(contact_s, |onset| onset.time_s.max(contact_s));
         }
         let before = time_s.partition_point(|&t| t <= contact_s).saturating_sub(1);

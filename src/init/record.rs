@@ -42,9 +42,11 @@ pub(super) struct Record {
     pub velocities: Vec<Vec<f64>>,
     /// Displacement of the node, less the other node's.
     pub travel: Vec<f64>,
-    /// Empty if the recipe has no contact force, as the next two.
+    /// Empty if the recipe has no contact force, as the next three.
     pub force_time: Vec<f64>,
     pub force: Vec<f64>,
+    /// Why its forces are means over their intervals, if they are.
+    pub force_means: Option<String>,
     /// At the motion's times.
     impulse: Vec<f64>,
     /// The force's file, if it ends before the motion.
@@ -88,7 +90,7 @@ impl Record {
         }
         let (mut time, mut all) = (picked(&read.time, &states), read.time.len());
         let (mut force_time, mut force, mut impulses) = (Vec::new(), Vec::new(), Vec::new());
-        let mut force_ends = None;
+        let (mut force_ends, mut force_means) = (None, None);
         if let Some(chosen) = &recipe.force {
             let unusable = |why: String| Reason::Unusable { why };
             let source = run.sources.force(chosen.file);
@@ -118,6 +120,7 @@ impl Record {
             let last = force_time[force_time.len() - 1];
             let reach = last + 0.5 * (last - force_time[force_time.len() - 2]);
             let kept = time.iter().take_while(|&&t| t <= reach).count();
+            force_means.clone_from(&source.means);
             force_ends = (kept + FURTHER < time.len()).then(|| source.shown());
             for values in [&mut time, &mut travel, &mut impulses].into_iter().chain(&mut velocities)
             {
@@ -136,6 +139,7 @@ impl Record {
             travel,
             force_time,
             force,
+            force_means,
             impulse: impulses,
             force_ends,
             damage,

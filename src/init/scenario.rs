@@ -19,6 +19,8 @@ use crate::unit::{SpeedKind, km_per_h};
 
 /// Vehicles of a train that has a curve between them.
 const VEHICLES: usize = 3;
+const GAP: &str =
+    "guessed: no clear distance between the vehicles: put yours, between the surfaces that meet";
 /// Parameters that vehicles give by themselves.
 const MASSES: [&str; 2] = ["mass_kg", "other_mass_kg"];
 
@@ -30,6 +32,8 @@ pub(crate) struct ScenarioProposal {
     pub trains: Vec<ProposedTrain>,
     /// Whether a rigid wall takes the place of the second train.
     pub wall: bool,
+    /// Whether the vehicles have ends from the models, else one mass each and the curves between them.
+    pub ends: bool,
     /// Length of the run in s.
     pub(crate) duration_s: Proposed<f64>,
     pub missing: Vec<String>,
@@ -66,6 +70,7 @@ pub(crate) struct ProposedVehicle {
 pub(crate) fn propose_scenario(
     models: &[PathBuf],
     place: &Path,
+    one_mass: bool,
 ) -> Result<ScenarioProposal, Error> {
     if !(1..=2).contains(&models.len()) {
         return Err(error!(
@@ -96,6 +101,8 @@ pub(crate) fn propose_scenario(
         })
         .collect();
     let wall = nose.speed_kind == SpeedKind::Wall;
+    let knows_ends = |model: &Model| model.crush_law.is_some() && model.features.is_empty();
+    let ends = !one_mass && inner.is_some_and(|inner| knows_ends(nose) && knows_ends(inner));
     let speed = speed(nose);
     let mut trains = vec![train("A", speed, nose.mass_kg, nose, inner)];
     if !wall {
@@ -105,7 +112,7 @@ pub(crate) fn propose_scenario(
         trains.push(train("B", stands, mass_kg, nose, inner));
     }
     let proposal =
-        ScenarioProposal { curves, trains, wall, duration_s: duration(nose, inner), missing };
+        ScenarioProposal { curves, trains, wall, ends, duration_s: duration(nose, inner), missing };
     scenario::parse(place, &proposal.to_toml())?;
     Ok(proposal)
 }
@@ -202,7 +209,11 @@ impl ScenarioProposal {
         text.blank();
         text.line("[curves]");
         for curve in &self.curves {
-            curve.write(&mut text);
+            curve.write(&mut text, self.ends);
+        }
+        if self.ends {
+            text.blank();
+            text.comment("Vehicles have the ends that the models know, the most accurate way; crumple init --scenario --one-mass writes vehicles of one mass, which run faster.");
         }
         for train in &self.trains {
             self.train(&mut text, train);
@@ -214,7 +225,9 @@ impl ScenarioProposal {
         }
         text.blank();
         text.line("[contact]");
-        text.line("curve = \"nose\"");
+        if !self.ends {
+            text.line("curve = \"nose\"");
+        }
         text.comment("guessed: the noses touch at the start; a clear distance between them only delays the crash");
         text.line("gap = \"0mm\"");
         text.done()
@@ -225,16 +238,24 @@ impl ScenarioProposal {
         text.line("[[train]]");
         text.line(&format!("name = {}", quoted(train.name)));
         text.value("speed", &train.speed_m_per_s, |v| quoted(&speed_text(*v)));
-        if self.curves.len() > 1 {
+        if self.ends {
+            text.comment(GAP);
+            text.line("gap = \"0mm\"");
+        } else if self.curves.len() > 1 {
             text.line("inner = \"inner\"");
         } else {
             text.comment("for more vehicles: inner = \"…\" with a curve of [curves] between them");
         }
         text.line("vehicles = [");
-        for vehicle in &train.vehicles {
+        for (k, vehicle) in train.vehicles.iter().enumerate() {
+            let ends = match (self.ends, k) {
+                (false, _) => "",
+                (true, 0) => ", front = { curve = \"nose\" }, rear = { curve = \"inner\" }",
+                (true, _) => ", ends = \"inner\"",
+            };
             let mass = vehicle.mass_kg.value().map_or(String::new(), |kg| measure::text(*kg));
             text.line(&format!(
-                "    {{ name = {}, mass = {} }},    # {}",
+                "    {{ name = {}, mass = {}{ends} }},    # {}",
                 quoted(&vehicle.name),
                 quoted(&mass),
                 vehicle.mass_kg
@@ -245,7 +266,7 @@ impl ScenarioProposal {
 }
 
 impl ProposedCurve {
-    fn write(&self, text: &mut Text) {
+    fn write(&self, text: &mut Text, ends: bool) {
         let [low, high] = self.range_m_per_s.map(km_per_h);
         text.comment(&format!(
             "model of {}, trained from {low} to {high} ({} speeds)",
@@ -257,8 +278,8 @@ impl ProposedCurve {
             text.comment("parameters of one of the runs");
             keys += &format!(", parameters = {}", inline(&self.parameters));
         }
-        if self.name == "inner" {
-            text.comment("guessed: no clear distance between the vehicles: put yours, between the surfaces that meet");
+        if self.name == "inner" && !ends {
+            text.comment(GAP);
             keys += ", gap = \"0mm\"";
         }
         text.line(&format!("{} = {{ {keys} }}", self.name));

@@ -18,8 +18,6 @@ pub(super) const MOTION: &str = "nodout";
 /// Forces that a recipe can name, what acts between bodies before what acts within one.
 pub(super) const FORCES: [&str; 4] = ["rwforc", "rcforc", "secforc", "rbdout"];
 const ENERGY: &str = "glstat";
-/// What a text says that was made of a T01.
-const MADE_OF_T01: &str = "OpenRadioss";
 
 /// A file, or a section of one, with histories that a recipe can name.
 #[derive(Clone, Debug)]
@@ -216,11 +214,11 @@ fn is_looked_at(path: &Path) -> bool {
 
 /// Why the forces of a section are means over their output intervals, if they are.
 fn means(file: &SolverFile, is_text: bool) -> Option<String> {
-    let version = file.version.as_deref().unwrap_or_default();
     if file.format == "t01" {
         return Some("a T01 holds impulses, so each force is a mean over two intervals".into());
     }
-    version.contains(MADE_OF_T01).then(|| {
+    file.differentiates_impulses().then(|| {
+        let version = file.version.as_deref().unwrap_or_default();
         let says = if is_text { "its second line reads" } else { "its version is" };
         format!("{says} \"{version}\": a mean over two intervals of a T01's impulse")
     })

@@ -115,7 +115,7 @@ pub struct BodyHistory {
     /// Speed at the end of the run, in m/s.
     pub final_v_m_per_s: f64,
     /// Mean of `−a` while the body's net contact force acts for the first time, until it ends or
-    /// changes its sign. Up to 1 kN, longer than a look of 0.25 ms, it does not act; contacts that
+    /// changes its sign. Up to 1 kN, of a body below 1 t 1 m/s², longer than a look of 0.25 ms, it does not act; contacts that
     /// change the speed by less than 0.5 % of the largest change do not count.
     pub mean_deceleration_m_per_s2: f64,
     /// That net contact force still acts when the run ends: the mean is of a part.

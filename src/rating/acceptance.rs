@@ -60,6 +60,8 @@ pub(crate) struct StageResult {
     pub mean_force_n: f64,
     /// When it first had a force.
     pub begin_s: Option<f64>,
+    /// Whether the record ends while the displacement grows: neither it nor the energy is final.
+    pub is_cut: bool,
 }
 
 impl StageRecord<'_> {
@@ -75,11 +77,20 @@ impl StageRecord<'_> {
         let displacement_m = d.get(top).copied().unwrap_or_default().max(0.0);
         let until_top = work(top);
         let begin = f.iter().position(|force| *force != 0.0);
+        let begin_s = begin.and_then(|k| self.time_s.get(k.saturating_sub(1))).copied();
+        let speed = |from_s: f64, from_m: f64, to: usize| {
+            (d[to] - from_m).max(0.0) / (self.time_s[to] - from_s)
+        };
+        let is_cut = top > 0 && top == last && {
+            let last_m_per_s = speed(self.time_s[top - 1], d[top - 1].max(0.0), top);
+            begin_s.is_some_and(|from_s| last_m_per_s > STILL * speed(from_s, 0.0, top))
+        };
         StageResult {
+            is_cut,
             dissipated_j: work(last),
             displacement_m,
             mean_force_n: if displacement_m > 0.0 { until_top / displacement_m } else { 0.0 },
-            begin_s: begin.and_then(|k| self.time_s.get(k.saturating_sub(1))).copied(),
+            begin_s,
         }
     }
 }
@@ -115,6 +126,8 @@ pub(crate) struct RunAcceptance {
     pub passes: bool,
 }
 
+/// A displacement that grows by less than this share of its mean speed has come to its end.
+const STILL: f64 = 0.01;
 /// Share of the reference's energy below which a stage does not count.
 const LEAST_SHARE: f64 = 0.01;
 
@@ -189,7 +202,9 @@ pub(crate) fn accept(
     let passes = same_sequence
         && missing.is_empty()
         && energy_error.abs() <= LIMIT
-        && counting.iter().all(|stage| stage.acceptance.passes);
+        && counting.iter().all(|stage| {
+            stage.acceptance.passes && !stage.reference.is_cut && !stage.prediction.is_cut
+        });
     Some(RunAcceptance {
         standard: STANDARD,
         limit: LIMIT,
@@ -207,7 +222,7 @@ pub(crate) fn accept(
 mod tests {
     use super::*;
 
-    const TIMES: [f64; 4] = [0.0, 0.1, 0.2, 0.3];
+    const TIMES: [f64; 5] = [0.0, 0.1, 0.2, 0.3, 0.4];
 
     fn stage<'a>(name: &'a str, d: &'a [f64], f: &'a [f64]) -> StageRecord<'a> {
         StageRecord { name, time_s: &TIMES, deflection_m: d, force_n: f }
@@ -216,14 +231,14 @@ mod tests {
     /// By hand: a triangle up to 1 m and 2 N, elastic back to half of it.
     #[test]
     fn energies_displacements_and_sequences() {
-        let (d, f) = ([-0.5, 0.0, 1.0, 0.5], [0.0, 0.0, 2.0, 0.0]);
+        let (d, f) = ([-0.5, 0.0, 1.0, 0.5, 0.5], [0.0, 0.0, 2.0, 0.0, 0.0]);
         let one = stage("a", &d, &f).result();
         assert_eq!((one.dissipated_j, one.displacement_m, one.mean_force_n), (0.5, 1.0, 1.0));
         assert_eq!(one.begin_s, Some(0.1));
         // 8 % further, 8 % weaker: the energies until there are nearly the same.
-        let (d2, f2) = ([-0.5, 0.0, 1.08, 0.54], [0.0, 0.0, 1.84, 0.0]);
-        let later = ([0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, 1.0]);
-        let first = ([0.0, 1.0, 1.0, 1.0], [0.5, 1.0, 1.0, 1.0]);
+        let (d2, f2) = ([-0.5, 0.0, 1.08, 0.54, 0.54], [0.0, 0.0, 1.84, 0.0, 0.0]);
+        let later = ([0.0, 0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 0.0, 1.0, 1.0]);
+        let first = ([0.0, 1.0, 1.0, 1.0, 1.0], [0.5, 1.0, 1.0, 1.0, 1.0]);
         let reference = [stage("a", &d, &f), stage("b", &later.0, &later.1)];
         let close = [stage("a", &d2, &f2), stage("b", &later.0, &later.1)];
         let found = accept(&reference, &close, 0.01).unwrap();
@@ -238,6 +253,11 @@ mod tests {
         let found = accept(&reference, &close[..1], 0.01).unwrap();
         assert!(!found.passes && found.missing == ["b"], "{found:?}");
         assert!(accept(&reference, &[], 0.01).is_none());
+        // Cut while the last stage grows, in one of the runs.
+        let cut = StageRecord { deflection_m: &later.0[..4], force_n: &later.1[..4], ..close[1] };
+        let found = accept(&reference, &[close[0], cut], 0.01).unwrap();
+        assert!(!found.passes && found.stages[1].prediction.is_cut, "{found:?}");
+        assert!(found.stages[1].acceptance.passes && !found.stages[0].prediction.is_cut);
         // At the bound, and beyond.
         assert!(Acceptance::of(0.1, -0.1, 0.1).passes && !Acceptance::of(0.0, 0.0, 0.1001).passes);
     }

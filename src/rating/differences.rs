@@ -243,6 +243,8 @@ pub(crate) struct Deceleration {
     pub from_s: Option<f64>,
     /// Time at which it ends, in s.
     pub to_s: Option<f64>,
+    /// Last time before that at which −a exceeds 5 % of its largest value, in s.
+    pub above_to_s: Option<f64>,
     /// Whether the interval ends while −a still exceeds 5 % of its largest value: the mean then
     /// covers only part of the deceleration.
     pub is_cut: bool,
@@ -266,6 +268,7 @@ impl Deceleration {
         let length = deceleration[first..].iter().take_while(|&&d| d > 0.0).count();
         let after = first + length;
         let last = after - 1;
+        let above_to = (first..after).rev().find(|&k| above(&deceleration[k]));
         let mut area = integral(&time_s[first..after], &deceleration[first..after]);
         let (from_s, mut to_s) = (time_s[first], time_s[last]);
         // The zero lies between two samples.
@@ -280,6 +283,7 @@ impl Deceleration {
             mean: Some(mean),
             from_s: Some(from_s),
             to_s: Some(to_s),
+            above_to_s: above_to.map(|k| time_s[k]),
             is_cut: after == deceleration.len() && above(&deceleration[last]),
             largest_120ms_mean,
         }

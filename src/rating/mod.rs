@@ -29,6 +29,7 @@ use differences::{
 };
 pub(crate) use iso18571::Iso18571;
 use iso18571::iso18571;
+use signal::LEAST_SAMPLES;
 pub(crate) use signal::{INTERVAL_S, Pair, Signal};
 
 /// What two signals are.
@@ -211,6 +212,15 @@ pub(crate) fn rate(
         warnings: Vec::new(),
     };
     rating.warnings = warnings(&rating, r, settings);
+    for (who, signal) in [("reference", reference), ("prediction", prediction)] {
+        let within = signal.samples_within(rating.from_s, rating.to_s);
+        if within < LEAST_SAMPLES {
+            rating.warnings.push(format!(
+                "the {who} has {within} samples from {} s to {} s, so lines between them are rated: check the interval, and the units of its times (,time=ms after the file's name)",
+                rating.from_s, rating.to_s
+            ));
+        }
+    }
     Ok(rating)
 }
 
@@ -233,6 +243,9 @@ fn first_peaks(pair: &Pair) -> Vec<Peak> {
 
 /// A part of the reference up to this share may be left out unsaid.
 const UNRATED: f64 = 0.05;
+
+/// A contact that fades takes less.
+const TAIL_S: f64 = 0.020;
 
 fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Vec<String> {
     let mut warnings = Vec::new();
@@ -278,6 +291,15 @@ fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Ve
                 "the {who} is never decelerated: an acceleration is negative while the body is slowed down, so scale it by -1 if it has the opposite sign"
             ));
         }
+        if let (Some(above_to_s), Some(to_s)) = (of.above_to_s, of.to_s)
+            && to_s - above_to_s > TAIL_S
+        {
+            warnings.push(format!(
+                "the {who} is decelerated by less than 5 % of its largest value from {:.1} to {:.1} ms, which is in its mean deceleration: if that is braking or friction, end the interval before (--to)",
+                1e3 * above_to_s,
+                1e3 * to_s
+            ));
+        }
         if of.is_cut {
             warnings.push(format!(
                 "the {who} is still decelerated at {:.1} ms, where the interval ends: its mean deceleration covers the time up to then",
@@ -300,6 +322,40 @@ mod tests {
 
     fn plain(reference: &Signal, prediction: &Signal) -> Rating {
         rate(reference, prediction, &RatingSettings::default()).unwrap()
+    }
+
+    /// 100 m/s² for 50 ms; then nothing, or brakes of 1 m/s², whose deceleration does not end.
+    #[test]
+    fn braking_after_the_contact_is_said() {
+        let pulse =
+            |after: f64| signal((0..200).map(|i| if i < 50 { -100.0 } else { -after }).collect());
+        let settings =
+            RatingSettings { quantity: Quantity::Acceleration, ..RatingSettings::default() };
+        let of = |after: f64| rate(&pulse(0.0), &pulse(after), &settings).unwrap();
+        assert_eq!(of(0.0).warnings, [""; 0]);
+        let braking = of(1.0);
+        assert!(braking.deceleration.unwrap().prediction.mean.unwrap() < 30.0);
+        assert_eq!(
+            braking.warnings,
+            [
+                "the prediction is decelerated by less than 5 % of its largest value from 49.9 to 199.0 ms, which is in its mean deceleration: if that is braking or friction, end the interval before (--to)"
+            ]
+        );
+    }
+
+    #[test]
+    fn an_interval_of_few_samples_is_said() {
+        let coarse = Signal::new("a", (0..40).map(|i| 0.1 * f64::from(i)).collect(), vec![1.0; 40]);
+        let coarse = coarse.unwrap();
+        let settings = RatingSettings { to_s: Some(0.1), ..RatingSettings::default() };
+        let warnings = rate(&coarse, &coarse, &settings).unwrap().warnings;
+        assert_eq!(warnings.len(), 2, "{warnings:?}");
+        assert!(
+            warnings[1].starts_with("the prediction has 2 samples from 0 s to 0.1 s"),
+            "{warnings:?}"
+        );
+        let settings = RatingSettings { to_s: Some(0.4), ..settings };
+        assert_eq!(rate(&coarse, &coarse, &settings).unwrap().warnings, [""; 0]);
     }
 
     proptest! {

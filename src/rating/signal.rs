@@ -8,7 +8,7 @@ use crate::signal::{CfcError, cfc, interpolate};
 /// Interval of ISO/TS 18571: 10 kHz.
 pub(crate) const INTERVAL_S: f64 = 1e-4;
 /// Minimum number of samples of a signal: fewer are points, not a history.
-const LEAST_SAMPLES: usize = 5;
+pub(crate) const LEAST_SAMPLES: usize = 5;
 /// Most common samples: 500 s, far beyond any collision.
 const MOST_COMMON: f64 = 5e6;
 /// Larger magnitudes are not measured values, and their squares would overflow.
@@ -103,6 +103,11 @@ impl Signal {
     /// First and last time, in s.
     pub(crate) fn range_s(&self) -> (f64, f64) {
         (self.time_s[0], self.time_s[self.time_s.len() - 1])
+    }
+
+    /// How many of its samples lie from one time to another.
+    pub(crate) fn samples_within(&self, from_s: f64, to_s: f64) -> usize {
+        self.time_s.iter().filter(|t| (from_s..=to_s).contains(t)).count()
     }
 
     /// The signal after a CFC filter without phase shift, at its own times.

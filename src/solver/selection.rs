@@ -239,4 +239,9 @@ impl SolverFile {
     pub fn history(&self, entity: Option<EntityId>, component: &str) -> Option<&History> {
         self.histories.iter().find(|h| h.entity == entity && &*h.component == component)
     }
+
+    /// Whether its forces are central differences of impulses: those of a T01, or of a text that says that it was made of one.
+    pub(crate) fn differentiates_impulses(&self) -> bool {
+        self.format == "t01" || self.version.as_ref().is_some_and(|v| v.contains("OpenRadioss"))
+    }
 }

@@ -100,6 +100,7 @@ impl LocatedRun<'_> {
             manifest_speed_m_per_s: entry.speed.map(|s| s.0),
             deck_speed: self.deck_speed(units),
             contact_threshold: study.manifest.recipe.contact_threshold.unwrap_or(THRESHOLD),
+            of_impulse: files.contact_force().is_some_and(SolverFile::differentiates_impulses),
             stated: study.stated(entry),
             others: &others,
         };
@@ -394,6 +395,13 @@ impl<'a> RunFiles<'a> {
                 None => None,
             },
         })
+    }
+
+    /// The file of the contact force, if there is one.
+    fn contact_force(&self) -> Option<&SolverFile> {
+        let is_contact = matches!(self.recipe.force, ForceSource::Contact { .. });
+        let own = is_contact.then_some(&self.force);
+        self.contact.as_ref().or(own).map(|read| &read.file)
     }
 
     /// The history that the force is, or is made of.

@@ -40,8 +40,12 @@ pub(super) fn without_spikes(
         for curve in curves.iter().step_by(curves.len().div_ceil(20).max(1)) {
             // Far finer steps than the curve's own find no other kinks.
             let probes = (2.0 * curve.end_m() / step).clamp(2.0, PROBES) as usize;
-            for k in 0..probes {
-                let d = step + (curve.end_m() - 2.0 * step).max(0.0) * k as f64 / probes as f64;
+            let even = (0..probes)
+                .map(|k| step + (curve.end_m() - 2.0 * step).max(0.0) * k as f64 / probes as f64);
+            // A point at a corner stands out most.
+            let corners = curve.envelope().deflection_m().iter().copied();
+            let corners = corners.filter(|&d| d >= step && d + step <= curve.end_m());
+            for d in even.chain(corners.take(PROBES as usize)) {
                 let [a, b, c] = [d - step, d, d + step].map(|d| curve.force_at(d));
                 most = most.max(stands_out(a, b, c));
             }

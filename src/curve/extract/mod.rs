@@ -109,7 +109,17 @@ pub(crate) fn curve_of(
             remarks.warn(format!("accept_energy: {}", impossible.found()));
             claim.balance()
         }
-        Err(impossible) => return Err(impossible.into()),
+        Err(impossible) => {
+            let says = |what: &str| remarks.warnings.iter().any(|w| w.starts_with(what));
+            // What is left out has slowed the bodies down.
+            let is_second_hit = says("contact: ignored")
+                && recorded_m_per_s.is_some_and(|v| {
+                    (v / record.first_rate_m_per_s.abs() - 1.0).abs() > SECOND_HIT
+                });
+            return Err(
+                if is_second_hit { impossible.by_earlier_force() } else { impossible }.into()
+            );
+        }
     };
     remarks.append(accepted(along_time)?);
     remarks.append(accepted(mass)?);
@@ -148,6 +158,8 @@ fn filter(class: u32, record: &mut Record) -> Result<Notes, ExtractError> {
     Ok(remarks)
 }
 
+/// By this share a force before the contact has changed the speed, if it is more than noise.
+const SECOND_HIT: f64 = 0.05;
 /// Most by which the work of a contact force may exceed the kinetic energy, as its ratio: crush zones of a tenth of the vehicle
 /// and some more are stopped by it before the body is.
 const MOST_CONTACT_WORK: f64 = 1.15;
@@ -281,6 +293,8 @@ pub struct Setup<'a> {
     pub deck_speed: Option<(f64, String)>,
     /// Share of the peak force above which a record is in contact.
     pub contact_threshold: f64,
+    /// Whether the force that shows the contact is the central difference of an impulse.
+    pub of_impulse: bool,
     /// Settings of the record in the run's entry.
     pub stated: Stated,
     /// Names and speeds of the study's other runs, to name what was mistaken for what.

@@ -18,6 +18,8 @@ const LEFT_OUT: f64 = 0.001;
 /// Share of the recipe's states that a record may lack without a warning; also the share of the record, at its end, that
 /// must be without force for the contact to be over.
 const SHORT: f64 = 0.02;
+/// Rates that differ by less are one: nothing has slowed the bodies down.
+const SAME_RATE: f64 = 0.002;
 /// A force below this share of the largest counts as none.
 const NO_FORCE: f64 = 0.01;
 
@@ -29,6 +31,8 @@ pub(crate) struct Record {
     pub force_n: Vec<f64>,
     /// Rate of the first state of the motion, before any cut.
     pub first_rate_m_per_s: f64,
+    /// If the force begins after the motion: how far the bodies have moved until then since they had that rate.
+    pub slowed_over_m: Option<f64>,
     /// Name of the velocity that the files do not have: the rate is then a derivative.
     pub missing_velocity: Option<String>,
     pub force_kind: ForceKind,
@@ -106,6 +110,7 @@ impl Record {
         let mut remarks = Notes::default();
         let mut record = Self {
             first_rate_m_per_s: motion.rate_m_per_s[0],
+            slowed_over_m: None,
             time_s: motion.time_s,
             deflection_m: motion.deflection_m,
             rate_m_per_s: motion.rate_m_per_s,
@@ -149,8 +154,14 @@ impl Record {
         let at = |values: &[f64]| {
             interpolate(&record.time_s, values, &time_s).map_err(|_| ExtractError::NoOverlap)
         };
+        let earlier = record.time_s.partition_point(|&t| t < time_s[0]);
+        let is_free = |&i: &usize| {
+            (record.rate_m_per_s[i] / record.first_rate_m_per_s - 1.0).abs() < SAME_RATE
+        };
+        let free_m = (0..earlier).rev().find(is_free).map(|i| record.deflection_m[i]);
         (record.deflection_m, record.rate_m_per_s) =
             (at(&record.deflection_m)?, at(&record.rate_m_per_s)?);
+        record.slowed_over_m = free_m.map(|free_m| (record.deflection_m[0] - free_m).abs());
         (record.time_s, record.force_n) = (time_s, force_n);
         Ok((record, remarks))
     }

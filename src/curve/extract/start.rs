@@ -28,8 +28,8 @@ pub(super) struct Start {
 enum StartBy {
     /// The manifest's contact time or gap.
     Manifest,
-    /// The first state, which is in contact already; the crush before it.
-    FirstState { missing_m: f64 },
+    /// The first state, which is in contact already; the crush before it, at least and at most.
+    FirstState { missing_m: (f64, f64) },
     /// A crossing within an output interval of this length.
     Crossing { interval_s: f64 },
     /// The deceleration of the body, which starts later: reported where it is found.
@@ -108,30 +108,39 @@ impl Start {
             }
             StartBy::Crossing { interval_s } if step_m(interval_s) > CERTAIN_SHARE * crush_m => {
                 remarks.warn(format!(
-                    "contact: it lies within {:.2} mm, between the last state without force and the first above the threshold, so the crush is uncertain by up to {:.1} % (contact_time or gap in the run, or contact_threshold in the recipe, sets it)",
+                    "contact: it lies within {:.2} mm between two states, so the crush is uncertain by up to {:.1} % (contact_time or gap in the run, or contact_threshold in the recipe, sets it)",
                     step_m(interval_s) * 1e3,
                     100.0 * step_m(interval_s) / crush_m
                 ));
             }
             StartBy::FirstState { missing_m }
                 if setup.stated.offset_m > 0.0
-                    && (missing_m - setup.stated.offset_m).abs() > MISSING_SHARE * crush_m =>
+                    && (missing_m.0 - setup.stated.offset_m)
+                        .max(setup.stated.offset_m - missing_m.1)
+                        > MISSING_SHARE * crush_m =>
             {
                 remarks.warn(format!(
-                    "contact: offset = {:.1} mm, but judging by its first state, the record, which starts in contact, lacks {:.1} mm of the crush",
+                    "contact: offset = {:.1} mm, but judging by its first state, the record, which starts in contact, lacks {} of the crush",
                     setup.stated.offset_m * 1e3,
-                    missing_m * 1e3
+                    shown_missing(missing_m)
                 ));
             }
             StartBy::FirstState { missing_m }
-                if missing_m > MISSING_SHARE * crush_m && setup.stated.offset_m == 0.0 =>
+                if missing_m.1 > MISSING_SHARE * crush_m && setup.stated.offset_m == 0.0 =>
             {
+                let (least_m, most_m) = missing_m;
+                let why = match least_m < most_m {
+                    true => {
+                        ": over the first length the bodies slow down before the force begins, the second is all that they move until then"
+                    }
+                    false => "",
+                };
                 remarks.warn(format!(
-                    "contact: the record starts at {}, in contact: the first {:.1} mm of the crush ({:.1} %) are missing; set offset = \"{:.1}mm\" in the run, or provide the earlier states",
+                    "contact: the record starts at {}, in contact: the first {} of the crush ({:.1} %) are missing{why}; set offset = \"{:.1}mm\" in the run, or provide the earlier states",
                     milliseconds(self.time_s),
-                    missing_m * 1e3,
-                    100.0 * missing_m / (crush_m + missing_m),
-                    missing_m * 1e3
+                    shown_missing(missing_m),
+                    100.0 * least_m / (crush_m + least_m),
+                    least_m * 1e3
                 ));
             }
             StartBy::FirstState { .. } => remarks.note(
@@ -172,12 +181,21 @@ impl Start {
     }
 }
 
-/// The crush before a record that begins in contact: its first displacement, or, where that counts
-/// from the first state, what the body travels until then.
-fn missing_m(record: &Record) -> f64 {
-    match record.deflection_m[0].abs() {
+/// The crush before a record that begins in contact, at least and at most: its first displacement, or, where that counts from the first
+/// state, what the body travels until then. If the motion was recorded before the force, the bodies have slowed down over part of
+/// it at least; a nose is stopped before the body is.
+fn missing_m(record: &Record) -> (f64, f64) {
+    let most_m = match record.deflection_m[0].abs() {
         0.0 => (record.rate_m_per_s[0] * record.time_s[0]).abs(),
         displacement_m => displacement_m,
+    };
+    (record.slowed_over_m.map_or(most_m, |slowed_m| slowed_m.min(most_m)), most_m)
+}
+
+fn shown_missing((least_m, most_m): (f64, f64)) -> String {
+    match least_m < most_m {
+        true => format!("{:.1} to {:.1} mm", least_m * 1e3, most_m * 1e3),
+        false => format!("{:.1} mm", most_m * 1e3),
     }
 }
 
@@ -200,7 +218,7 @@ fn onset(
     setup: &Setup<'_>,
 ) -> Result<contact::Onset, ExtractError> {
     let threshold_n = contact::threshold_n(force_n, setup.contact_threshold);
-    contact::onset(time_s, force_n, threshold_n).ok_or(ExtractError::NoContact)
+    contact::onset(time_s, force_n, threshold_n, setup.of_impulse).ok_or(ExtractError::NoContact)
 }
 
 /// When the bodies have moved towards each other by `gap_m` from the first state, in the
@@ -333,7 +351,10 @@ impl ImpactSpeed {
         let mut remarks = Notes::default();
         let differ = |a: f64, b: f64| (a - b).abs() > SAME_SPEED * a.max(b);
         let first = record.first_rate_m_per_s.abs();
-        let recorded = record.missing_velocity.is_none().then(|| record.rate_m_per_s[before].abs());
+        // In contact from the first common state on, but not in the motion's own first one.
+        let is_slowed = before == 0 && record.slowed_over_m.is_some();
+        let of_state = if is_slowed { first } else { record.rate_m_per_s[before].abs() };
+        let recorded = record.missing_velocity.is_none().then_some(of_state);
         if let Some(recorded) = recorded
             && differ(first, recorded)
         {

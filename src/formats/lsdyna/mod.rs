@@ -57,7 +57,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
     let mut notes = Vec::new();
     line!(lines, "*KEYWORD");
     for (k, curve) in curves.iter().enumerate() {
-        let curve = &curve.begun_at_origin()?;
+        let curve = &curve.begun_at_origin(false, &mut notes)?;
         let units = curve.predicted.provenance.study_units;
         let units = InUnits(options.units.or(units).unwrap_or(UnitSystem::SI));
         // Of the loading branch and of the material; that of the unloading is one more.

@@ -4,7 +4,7 @@
 //! that close and open within a step give these instants. Everything else is seen at looks, a quarter of a millisecond apart
 //! at most, so that nothing depends on the interval of the outputs.
 //!
-//! - A net force up to 1 kN counts as none, as in finding the contact of FE runs. Vehicles that touch without closing are
+//! - A net force up to 1 kN, of a body below 1 t up to 1 m/s² of its mass, counts as none. Vehicles that touch without closing are
 //!   reached by a precursor that grows from rounding, and where neighbours come to press equally, the force dies away
 //!   without an end.
 //! - The force may fall below that for less than a look.
@@ -17,7 +17,7 @@ use super::chain::Chain;
 use super::rows::{LANES, LaneIndex, Layout, Row, Rows, each, larger};
 use super::run::{InterfaceHistory, Record, Run};
 use occupant::Flight;
-use spans::{LEAST_N, Look, Phase, Spans};
+use spans::{LEAST_M_PER_S2, LEAST_N, Look, Phase, Spans};
 pub(super) use spans::{LOOK_S, Moment};
 
 /// What happens in a run between its outputs.
@@ -61,7 +61,7 @@ impl EventRecorder {
         let none = || of(&|_| 0.0);
         let events: Vec<BodyEvents> = (bodies.iter())
             .map(|body| BodyEvents {
-                least_a: LEAST_N / body.mass_kg,
+                least_a: (LEAST_N / body.mass_kg).min(LEAST_M_PER_S2),
                 phase: Phase::Free,
                 spans: Spans::default(),
             })

@@ -9,6 +9,8 @@
 /// and where neighbours come to press equally, the force dies away without an end. What is back
 /// at the next look has not ended.
 pub(super) const LEAST_N: f64 = 1e3;
+/// Of a light body less counts: what it decelerates by a tenth of g.
+pub(super) const LEAST_M_PER_S2: f64 = 1.0;
 const LEAST_SHARE: f64 = 0.005;
 /// By so much a span has to be larger than those before it to be kept, so that few are.
 const LARGER: f64 = 1.1;
