@@ -645,6 +645,7 @@ fn what_a_rise_from_the_origin_changes_is_said() {
         let said = String::from_utf8(crumple_in(here, &args).stderr).unwrap();
         let is_said = said.contains("the force begins with 0.300 MN, which the file reaches on a line of 10.4 MN/m from the origin; its forces are 3.9 % larger");
         assert_eq!(is_said, raised > 0.0, "{output}: {said}");
+        assert_eq!(said.contains("the force begins with"), is_said, "{output}: {said}");
         if ["a.cmd", "a.inp"].contains(&output) {
             continue;
         }

@@ -79,7 +79,10 @@ fn what_common_times_leave_out_is_said() {
     crumple_ok(here, "build fe/lead-car-wall/study.toml -o curves.h5 -q");
     for (to, output) in [("mdf", "coarse.mf4"), ("iso-mme", "coarse")] {
         let said = said(&format!("{output} --to {to}"));
-        says(&said, "36kmh: it has the force at the recipe's common times, which differs by up to");
+        says(
+            &said,
+            "36kmh: the file has the force at the recipe's common times, which differs by up to",
+        );
     }
 }
 

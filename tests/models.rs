@@ -1368,7 +1368,7 @@ fn predicted_curves_are_physically_sound() {
                     let corner = |&d: &f64| {
                         standing(&[d - step, d, d + step].map(|d| c.envelope.force_at(d)))
                     };
-                    let phases = (0..8).map(|k| phase(f64::from(k) / 8.0));
+                    let phases = (0..64).map(|k| phase(f64::from(k) / 64.0));
                     let end = corner(&(c.envelope.end_m() - step));
                     corners.map(corner).chain(phases).fold(end, f64::max)
                 });
@@ -1606,14 +1606,14 @@ fn two_speeds_get_the_default() {
         let database = Database::read(&database).unwrap();
         let cases = database.cases(group);
         let set = TrainingSet::new(group, cases).unwrap();
-        let (mut of_default, mut of_linear, mut others) = (0.0, 0.0, 0);
+        let (mut of_default, mut of_linear) = (0.0, 0.0);
         for low in 0..cases.len() {
             for high in low + 2..cases.len() {
                 let two = [cases[low].clone(), cases[high].clone()];
                 let fitted = |choice| train(group, &two, choice).unwrap();
                 let auto = Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None };
                 let auto = fitted(auto);
-                others += usize::from(auto.name() != "crush-law");
+                assert_eq!(auto.name(), "crush-law");
                 let linear = fitted(Choice::Kind(ModelKind::linear()));
                 for case in &set.cases[low + 1..high] {
                     let error = |model: &Model| force_error(model, case);
@@ -1623,8 +1623,6 @@ fn two_speeds_get_the_default() {
             }
         }
         assert!(of_default <= 0.75 * of_linear, "{group}: {of_default} and {of_linear}");
-        // The runs at 3 and 25 km/h of vehicle-pair do not agree on a stopped mass.
-        assert_eq!(others, usize::from(group == "vehicle-pair"), "{group}");
     }
 }
 

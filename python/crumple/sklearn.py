@@ -1,5 +1,7 @@
 """The regression forest and the blend of curves as scikit-learn estimators. Need scikit-learn 1.6 or later."""
 
+from numbers import Integral, Real
+
 import numpy as np
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils import check_random_state
@@ -50,9 +52,9 @@ class RegressionForest(RegressorMixin, BaseEstimator):
     def _features_of(self, n):
         """`max_features` as a number, or None for all of `n`."""
         given = self.max_features
-        if given is None or isinstance(given, (int, np.integer)):
+        if given is None or isinstance(given, Integral):
             return given
-        if isinstance(given, float) and 0 < given <= 1:
+        if isinstance(given, Real) and 0 < given <= 1:
             return max(1, int(given * n))
         if given in ("sqrt", "log2"):
             return max(1, int(n**0.5 if given == "sqrt" else np.log2(n)))

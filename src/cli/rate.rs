@@ -393,6 +393,11 @@ fn print_runs(out: &mut dyn Write, found: &RunAcceptance) -> io::Result<()> {
     if !found.missing.is_empty() {
         writeln!(out, "not in both: {}", found.missing.join(", "))?;
     }
+    let is_cut = |s: &&StageAcceptance| s.counts && (s.reference.is_cut || s.prediction.is_cut);
+    let cut: Vec<&str> = found.stages.iter().filter(is_cut).map(|s| &*s.stage).collect();
+    if !cut.is_empty() {
+        writeln!(out, "not final in one of the runs: {}", cut.join(", "))?;
+    }
     let verdict = if found.passes { "passes" } else { "fails" };
     writeln!(
         out,

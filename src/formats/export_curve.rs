@@ -142,7 +142,7 @@ impl ExportCurve {
             return Ok(self.clone());
         };
         let raised = loading.force_n()[end] / self.end_n() - 1.0;
-        if raised > RAMP {
+        if raised > 2.0 * RAMP {
             notes.push(format!(
                 "{}: the force begins with {}, which the file reaches on a line of {} from the origin; its forces are {:.1} % larger, so that the energy up to the maximum crush is the same",
                 self.headline(),

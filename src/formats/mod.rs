@@ -266,7 +266,7 @@ fn sampled_note(case: &Case) -> Option<String> {
     let (off_n, largest_n) = (off_n.fold(0.0, f64::max), case.peak_force_n());
     (off_n > 0.01 * largest_n).then(|| {
         format!(
-            "{}: it has the force at the recipe's common times, which differs by up to {} from the record's own states (crumple db export --originals writes those)",
+            "{}: the file has the force at the recipe's common times, which differs by up to {} from the record's own states (crumple db export --originals writes those of a database)",
             case.id.name,
             Shown::one_force(off_n)
         )

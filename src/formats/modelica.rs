@@ -61,7 +61,7 @@ fn combi_table(curves: &[ExportCurve], stem: &str) -> Result<Exported, Error> {
     let mut notes = Vec::new();
     line!(lines, "#1");
     for (k, curve) in curves.iter().enumerate() {
-        let curve = &curve.begun_at_origin(false, &mut notes)?;
+        let curve = &curve.begun_at_origin(true, &mut notes)?;
         let suffix = if k == 0 { String::new() } else { format!("_{}", k + 1) };
         for (key, value) in curve.facts() {
             line!(lines, "# {key}: {}", title(&value, COMMENT_WIDTH));

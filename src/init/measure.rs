@@ -42,12 +42,18 @@ impl Impact {
         // Turned so that the impulse is positive.
         let impulse = integral(&record.force_time, &record.force).last().copied();
         let sign = if impulse.is_some_and(|impulse| impulse < 0.0) { -1.0 } else { 1.0 };
-        let force_n: Vec<f64> = record.force.iter().map(|f| sign * f * units.force()).collect();
+        let mut force_n: Vec<f64> = record.force.iter().map(|f| sign * f * units.force()).collect();
         let mut contact_s = time_s[0];
         if !force_n.is_empty() {
             let threshold_n = contact::threshold_n(&force_n, contact::THRESHOLD);
-            let of_impulse = record.force_means.is_some();
-            let onset = contact::onset(&force_time_s, &force_n, threshold_n, of_impulse);
+            let onset = contact::onset(&force_time_s, &force_n, threshold_n);
+            let from_rest = force_time_s[0] == 0.0 && record.travel[0] == 0.0;
+            let onset = match &record.force_means {
+                Some(_) => onset.map(|onset| {
+                    onset.by_impulse(&force_time_s, &mut force_n, threshold_n, from_rest)
+                }),
+                None => onset,
+            };
             contact_s = onset.map_or(contact_s, |onset| onset.time_s.max(contact_s));
         }
         let before = time_s.partition_point(|&t| t <= contact_s).saturating_sub(1);

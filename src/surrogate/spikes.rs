@@ -28,6 +28,8 @@ pub(super) fn without_spikes(
         ));
     }
     let mut force_n: Vec<f64> = force_n.into_iter().map(|f| f.max(0.0)).collect();
+    force_n[1] = force_n[1].max(force_n[0]);
+    force_n[0] = 0.0;
     let step = deflection_m[1] - deflection_m[0];
     // How far a point lies above both of its neighbours, or below both.
     let stands_out = |before: f64, at: f64, after: f64| {
@@ -66,7 +68,5 @@ pub(super) fn without_spikes(
             break;
         }
     }
-    force_n[1] = force_n[1].max(force_n[0]);
-    force_n[0] = 0.0;
     Ok(force_n)
 }

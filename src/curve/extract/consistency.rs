@@ -356,7 +356,7 @@ pub(super) fn sampling(original: &Curve, sampled: &Curve) -> Notes {
     }
     if let Some(off) = off_at(original, sampled.time_s()).filter(|&off| off > SAMPLED_OFF) {
         remarks.warn(format!(
-            "sampling: the common times, one every {:.3} ms, change the curve by {:.1} % of its mean force; the record's own are kept, too (original; in a study shorten interval_ms)",
+            "sampling: the common times, one every {:.3} ms, change the curve by {:.1} % of its mean force: in a study shorten interval_ms (the database keeps the record's own states as well)",
             interval_ms(sampled.time_s(), sampled.time_s().len() - 1),
             off * 100.0
         ));

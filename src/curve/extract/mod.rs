@@ -66,7 +66,7 @@ pub(crate) fn curve_of(
     setup: &Setup<'_>,
 ) -> Result<Extracted, ExtractError> {
     // Before the filter, which without phase shift begins ahead of the contact.
-    let start = remarks.take(Start::find(setup, &record)?);
+    let start = remarks.take(Start::find(setup, &mut record)?);
     let accepted = |checked: Result<Notes, energy::ImpossibleRun>| match checked {
         Err(impossible) if setup.stated.accept_energy => {
             Ok(Notes::warning(format!("accept_energy: {}", impossible.found())))
@@ -89,8 +89,9 @@ pub(crate) fn curve_of(
     motion.is_free()?;
     remarks.append(motion.flight(&record));
     let (along_time, mass) = (motion.momentum(), motion.mass(&record));
+    let is_slowed = contact.time_s <= record.time_s[0] && record.slowed_over_m.is_some();
+    let before = (!is_slowed).then_some(contact.before);
     let FromContact { curve: original, closing_m_per_s: closing, .. } = contact;
-    let before = contact.before;
     let ImpactSpeed { speed, by, recorded_m_per_s } =
         remarks.take(ImpactSpeed::of(setup, &record, before)?);
     let claim = energy::StatedConditions {
@@ -113,9 +114,8 @@ pub(crate) fn curve_of(
             let says = |what: &str| remarks.warnings.iter().any(|w| w.starts_with(what));
             // What is left out has slowed the bodies down.
             let is_second_hit = says("contact: ignored")
-                && recorded_m_per_s.is_some_and(|v| {
-                    (v / record.first_rate_m_per_s.abs() - 1.0).abs() > SECOND_HIT
-                });
+                && recorded_m_per_s
+                    .is_some_and(|v| v < (1.0 - SECOND_HIT) * record.first_rate_m_per_s.abs());
             return Err(
                 if is_second_hit { impossible.by_earlier_force() } else { impossible }.into()
             );

@@ -158,10 +158,12 @@ impl Record {
         let is_free = |&i: &usize| {
             (record.rate_m_per_s[i] / record.first_rate_m_per_s - 1.0).abs() < SAME_RATE
         };
-        let free_m = (0..earlier).rev().find(is_free).map(|i| record.deflection_m[i]);
+        let free_m = (1..earlier).rev().find(is_free).map(|i| record.deflection_m[i]);
         (record.deflection_m, record.rate_m_per_s) =
             (at(&record.deflection_m)?, at(&record.rate_m_per_s)?);
-        record.slowed_over_m = free_m.map(|free_m| (record.deflection_m[0] - free_m).abs());
+        let is_slower = record.rate_m_per_s[0].abs() < record.first_rate_m_per_s.abs();
+        record.slowed_over_m =
+            free_m.filter(|_| is_slower).map(|free_m| (record.deflection_m[0] - free_m).abs());
         (record.time_s, record.force_n) = (time_s, force_n);
         Ok((record, remarks))
     }

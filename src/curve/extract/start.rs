@@ -38,7 +38,10 @@ enum StartBy {
 
 impl Start {
     /// Where the manifest says, else where the force does.
-    pub(crate) fn find(setup: &Setup<'_>, record: &Record) -> Result<(Self, Notes), ExtractError> {
+    pub(crate) fn find(
+        setup: &Setup<'_>,
+        record: &mut Record,
+    ) -> Result<(Self, Notes), ExtractError> {
         match setup.stated.contact {
             Some(StatedContact::Time { s: time_s }) => {
                 if !record.holds(time_s) {
@@ -60,12 +63,12 @@ impl Start {
     }
 
     /// Where the contact force begins, if the recipe names one; else the record's.
-    fn in_force(record: &Record, setup: &Setup<'_>) -> Result<(Self, Notes), ExtractError> {
+    fn in_force(record: &mut Record, setup: &Setup<'_>) -> Result<(Self, Notes), ExtractError> {
         let mut remarks = Notes::default();
-        let onset = match record.contact.as_ref() {
-            Some(contact) => onset(&contact.time_s, &contact.values, setup)?,
-            None => onset(&record.time_s, &record.force_n, setup)?,
-        };
+        let (onset, force_n) = onset(record, setup)?;
+        if record.contact.is_none() {
+            record.force_n = force_n;
+        }
         let of_body = record.contact.is_none() && record.force_kind == ForceKind::Body;
         if of_body {
             let earlier = match onset.interval_s {
@@ -108,7 +111,7 @@ impl Start {
             }
             StartBy::Crossing { interval_s } if step_m(interval_s) > CERTAIN_SHARE * crush_m => {
                 remarks.warn(format!(
-                    "contact: it lies within {:.2} mm between two states, so the crush is uncertain by up to {:.1} % (contact_time or gap in the run, or contact_threshold in the recipe, sets it)",
+                    "contact: between two states it is uncertain by {:.2} mm, and so the crush by up to {:.1} % (contact_time or gap in the run, or contact_threshold in the recipe, sets it)",
                     step_m(interval_s) * 1e3,
                     100.0 * step_m(interval_s) / crush_m
                 ));
@@ -129,18 +132,21 @@ impl Start {
                 if missing_m.1 > MISSING_SHARE * crush_m && setup.stated.offset_m == 0.0 =>
             {
                 let (least_m, most_m) = missing_m;
-                let why = match least_m < most_m {
-                    true => {
-                        ": over the first length the bodies slow down before the force begins, the second is all that they move until then"
-                    }
-                    false => "",
+                let share = |m: f64| 100.0 * m / (crush_m + m);
+                let (shares, offset) = match least_m < most_m {
+                    true => (
+                        format!("{:.1} to {:.1} %", share(least_m), share(most_m)),
+                        "the bodies slow down over the first distance before the force is recorded, and move by the second; set offset in the run to what is missing".into(),
+                    ),
+                    false => (
+                        format!("{:.1} %", share(most_m)),
+                        format!("set offset = \"{:.1}mm\" in the run", most_m * 1e3),
+                    ),
                 };
                 remarks.warn(format!(
-                    "contact: the record starts at {}, in contact: the first {} of the crush ({:.1} %) are missing{why}; set offset = \"{:.1}mm\" in the run, or provide the earlier states",
+                    "contact: the record starts at {}, in contact: the first {} of the crush ({shares}) are missing; {offset}, or provide the earlier states",
                     milliseconds(self.time_s),
-                    shown_missing(missing_m),
-                    100.0 * least_m / (crush_m + least_m),
-                    least_m * 1e3
+                    shown_missing(missing_m)
                 ));
             }
             StartBy::FirstState { .. } => remarks.note(
@@ -201,7 +207,7 @@ fn shown_missing((least_m, most_m): (f64, f64)) -> String {
 
 /// When the force begins, if the manifest states another contact.
 fn found_elsewhere(record: &Record, stated_s: f64, setup: &Setup<'_>) -> Option<String> {
-    let found = onset(&record.time_s, &record.force_n, setup).ok()?;
+    let (found, _) = onset(record, setup).ok()?;
     let is_elsewhere = (found.time_s - stated_s).abs() > found.interval_s.unwrap_or(0.0);
     is_elsewhere.then(|| {
         format!(
@@ -212,13 +218,21 @@ fn found_elsewhere(record: &Record, stated_s: f64, setup: &Setup<'_>) -> Option<
     })
 }
 
-fn onset(
-    time_s: &[f64],
-    force_n: &[f64],
-    setup: &Setup<'_>,
-) -> Result<contact::Onset, ExtractError> {
-    let threshold_n = contact::threshold_n(force_n, setup.contact_threshold);
-    contact::onset(time_s, force_n, threshold_n, setup.of_impulse).ok_or(ExtractError::NoContact)
+/// By the contact force, if the recipe names one; else by the record's. With the force that it was found in, in which an impulse's has
+/// its values at the contact.
+fn onset(record: &Record, setup: &Setup<'_>) -> Result<(contact::Onset, Vec<f64>), ExtractError> {
+    let (time_s, mut force_n) = match &record.contact {
+        Some(contact) => (&contact.time_s, contact.values.clone()),
+        None => (&record.time_s, record.force_n.clone()),
+    };
+    let threshold_n = contact::threshold_n(&force_n, setup.contact_threshold);
+    let onset = contact::onset(time_s, &force_n, threshold_n).ok_or(ExtractError::NoContact)?;
+    let from_rest = record.time_s[0] == 0.0 && record.deflection_m[0] == 0.0;
+    let onset = match setup.of_impulse {
+        true => onset.by_impulse(time_s, &mut force_n, threshold_n, from_rest),
+        false => onset,
+    };
+    Ok((onset, force_n))
 }
 
 /// When the bodies have moved towards each other by `gap_m` from the first state, in the
@@ -342,18 +356,17 @@ pub(super) struct ImpactSpeed {
 
 impl ImpactSpeed {
     /// The manifest's speed, else the record's, else the deck's. Where two of them differ, both
-    /// are reported. `before`: the last state that contact has not changed.
+    /// are reported. `before`: the last state that contact has not changed; none if it is in the motion, before the
+    /// force begins.
     pub(crate) fn of(
         setup: &Setup<'_>,
         record: &Record,
-        before: usize,
+        before: Option<usize>,
     ) -> Result<(Self, Notes), ExtractError> {
         let mut remarks = Notes::default();
         let differ = |a: f64, b: f64| (a - b).abs() > SAME_SPEED * a.max(b);
         let first = record.first_rate_m_per_s.abs();
-        // In contact from the first common state on, but not in the motion's own first one.
-        let is_slowed = before == 0 && record.slowed_over_m.is_some();
-        let of_state = if is_slowed { first } else { record.rate_m_per_s[before].abs() };
+        let of_state = before.map_or(first, |state| record.rate_m_per_s[state].abs());
         let recorded = record.missing_velocity.is_none().then_some(of_state);
         if let Some(recorded) = recorded
             && differ(first, recorded)

@@ -59,13 +59,9 @@ impl ReadCurve {
                     .map(|(t, f)| (t[1] - t[0]) * (f[0] + f[1]))
                     .sum();
                 f.iter_mut().for_each(|f| *f *= impulse.signum());
-                let onset =
-                    onset(&time_s, &f, threshold_n(&f, THRESHOLD), false).ok_or_else(|| {
-                        error!(
-                            CurveFile,
-                            "its force never rises: there is no contact in this record"
-                        )
-                    })?;
+                let onset = onset(&time_s, &f, threshold_n(&f, THRESHOLD)).ok_or_else(|| {
+                    error!(CurveFile, "its force never rises: there is no contact in this record")
+                })?;
                 let first = time_s.iter().position(|t| *t >= onset.time_s).unwrap_or(0);
                 let rest = &d[first..];
                 let farthest = rest.iter().fold(0.0, |a: f64, v| {
