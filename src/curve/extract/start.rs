@@ -111,7 +111,7 @@ impl Start {
             }
             StartBy::Crossing { interval_s } if step_m(interval_s) > CERTAIN_SHARE * crush_m => {
                 remarks.warn(format!(
-                    "contact: between two states it is uncertain by {:.2} mm, and so the crush by up to {:.1} % (contact_time or gap in the run, or contact_threshold in the recipe, sets it)",
+                    "contact: between two states it is uncertain by about {:.2} mm, and so the crush by {:.1} % (contact_time or gap in the run, or contact_threshold in the recipe, sets it)",
                     step_m(interval_s) * 1e3,
                     100.0 * step_m(interval_s) / crush_m
                 ));
