@@ -156,6 +156,8 @@ impl Onset {
             force_n[i] = first_ns / step_s(i);
             return Self { time_s: time_s[i], interval_s: (i > 0).then_some(step_s(i)), ..self };
         };
+        // No earlier than where the line begins: nothing pulls.
+        let share = if rise_n > 0.0 { share.max(1.5 - second_n / rise_n) } else { share };
         (force_n[i], force_n[i + 1]) = (line_n(0.0), line_n(1.0));
         let interval_s = Some(SHARE_OFF * step_s(i));
         Self { time_s: time_s[i] + share * step_s(i), interval_s, ..self }
@@ -294,6 +296,8 @@ mod tests {
             let (rising, force_n) = of(begins_s, &|t| 5e6 * t * t);
             assert!((rising.time_s - begins_s).abs() < 5e-6, "{rising:?}");
             let i = (begins_s / 1e-3) as usize + 1;
+            let share = (rising.time_s - time_s[i - 1]) / 1e-3;
+            assert!((1.0 - share) * force_n[i - 1] + share * force_n[i] > -1e-3, "{force_n:?}");
             let expected_n = 1e7 * (time_s[i] - begins_s);
             assert!((force_n[i] / expected_n - 1.0).abs() < 0.02, "{} N", force_n[i]);
         }
