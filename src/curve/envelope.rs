@@ -134,7 +134,7 @@ impl Envelope {
         }
         let i = self.segment(deflection_m);
         let d = (deflection_m - self.deflection_m[i]).max(0.0);
-        self.work_j[i] + 0.5 * (self.force_n[i] + self.force_at(deflection_m)) * d
+        self.work_j[i] + 0.5 * (self.force_n[i] + self.force_in(i, deflection_m)) * d
     }
 
     /// `∫F dd` over the whole table, in J.

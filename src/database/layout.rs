@@ -227,11 +227,8 @@ impl Content<'_> {
 }
 
 pub(crate) fn hash_of(values: &[f64]) -> String {
-    let mut hasher = blake3::Hasher::new();
-    for value in values {
-        hasher.update(&value.to_le_bytes());
-    }
-    hasher.finalize().to_hex().to_string()
+    let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
+    blake3::hash(&bytes).to_hex().to_string()
 }
 
 /// The attributes of a case as they are written, its hashes among them: those it was read with

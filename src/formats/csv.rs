@@ -24,11 +24,13 @@ pub(crate) fn write(curve: &ExportCurve, options: &Options) -> Result<Exported, 
     line!(lines, "d_{length},force_{force}{edges}");
     let shown = |force_n: f64| nine_digits(force_n / units.force());
     for (i, (d, f)) in curve.deflection_m().iter().zip(curve.force_n()).enumerate() {
-        let edges = match &curve.band {
-            Some((low, high)) => format!(",{},{}", shown(low[i]), shown(high[i])),
-            None => String::new(),
-        };
-        line!(lines, "{},{}{edges}", nine_digits(d / units.length_m), shown(*f));
+        let edges = curve.band.as_ref().map(|(low, high)| [low[i], high[i]]);
+        lines += &nine_digits(d / units.length_m);
+        for force_n in [*f].into_iter().chain(edges.into_iter().flatten()) {
+            lines.push(',');
+            lines += &shown(force_n);
+        }
+        lines.push('\n');
     }
     Ok(Exported::file(format!("{}.csv", curve.file_stem()), lines.into_bytes()))
 }

@@ -1,19 +1,31 @@
 //! Numbers, titles, names and lines as text of other tools' files.
 
+/// Adds a line to a text: `line!(text, "…")`.
+macro_rules! line {
+    ($text:expr, $($line:tt)+) => {{
+        use std::fmt::Write as _;
+        // Writing to a string cannot fail.
+        let _ = writeln!($text, $($line)+);
+    }};
+}
+pub(super) use line;
+
 /// Nine significant digits in Fortran's form: `3.80000000E+06`.
 pub(crate) fn nine_digits(value: f64) -> String {
+    let mut text = String::with_capacity("-3.80000000E-100".len());
     // A negative zero would only puzzle readers.
-    let text = format!("{:.8E}", value + 0.0);
-    match text.split_once('E') {
-        Some((mantissa, exponent)) => {
-            let (sign, digits) = match exponent.strip_prefix('-') {
-                Some(digits) => ('-', digits),
-                None => ('+', exponent),
-            };
-            format!("{mantissa}E{sign}{digits:0>2}")
+    line!(text, "{:.8E}", value + 0.0);
+    text.pop();
+    if let Some(mut at) = text.rfind('E').map(|e| e + 1) {
+        if !text[at..].starts_with('-') {
+            text.insert(at, '+');
         }
-        None => text,
+        at += 1;
+        if text.len() - at < 2 {
+            text.insert(at, '0');
+        }
     }
+    text
 }
 
 /// A title of at most `width` characters that no keyword reader misreads: ASCII, no comma
@@ -25,16 +37,6 @@ pub(crate) fn title(text: &str, width: usize) -> String {
         .take(width)
         .collect()
 }
-
-/// Adds a line to a text: `line!(text, "…")`.
-macro_rules! line {
-    ($text:expr, $($line:tt)+) => {{
-        use std::fmt::Write as _;
-        // Writing to a string cannot fail.
-        let _ = writeln!($text, $($line)+);
-    }};
-}
-pub(super) use line;
 
 /// Longest identifier: importers unpack into folders of that name, and paths have their limits.
 const LONGEST: usize = 60;

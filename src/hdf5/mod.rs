@@ -101,11 +101,11 @@ impl Blocks {
             Some(k) => latest.remove(k),
             None => {
                 let start = number * Self::BYTES;
-                let mut block = vec![0; Self::BYTES.min(self.length - start) as usize];
+                // The oldest gives its memory.
+                let is_full = latest.len() == Self::KEPT;
+                let mut block = if is_full { latest.remove(0).1 } else { Vec::new() };
+                block.resize(Self::BYTES.min(self.length - start) as usize, 0);
                 self.read(start, &mut block)?;
-                if latest.len() == Self::KEPT {
-                    latest.remove(0);
-                }
                 (number, block)
             }
         };

@@ -12,6 +12,8 @@
 //!
 //! The same equations hold in the closing coordinates of two equal bodies, with the reduced mass.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use super::CaseCurve;
@@ -41,8 +43,9 @@ pub(crate) struct CrushLaw {
     /// The stopped mass, with the deviation of the runs' momentum.
     #[serde(flatten)]
     pub stopped: StoppedMass,
+    /// One for all copies and for the laws of one model.
     #[serde(skip)]
-    forces: Cached<CrushForces>,
+    forces: Cached<Arc<Cached<CrushForces>>>,
 }
 
 /// The curves of the crush force, and the speeds by which the curves they come from are known.
@@ -69,14 +72,28 @@ impl CrushLaw {
     /// The law of a group of this stopped mass, whose contact curves know their closing speeds.
     pub(crate) fn of(stopped: StoppedMass, contact: &[CaseCurve]) -> Self {
         let (sensitivity, of_impact) = (0.0, 0.0);
-        Self { sensitivity, of_impact, stopped, forces: Cached::default() }.with_rate_of(contact)
+        let law = Self { sensitivity, of_impact, stopped, forces: Cached::default() };
+        law.with_rate_of(contact)
     }
 
     /// The same with the β and γ of its crush forces.
     fn with_rate_of(self, contact: &[CaseCurve]) -> Self {
         let forces = self.crush_forces(contact);
         let (sensitivity, of_impact) = Rate::of_speed_and_impact(&forces);
-        Self { sensitivity, of_impact, forces: Cached::default(), ..self }
+        let law = Self { sensitivity, of_impact, forces: Cached::default(), ..self };
+        law.shared();
+        law
+    }
+
+    fn shared(&self) -> &Arc<Cached<CrushForces>> {
+        self.forces.get_or_compute(Arc::default)
+    }
+
+    /// Lets an equal law, which has not answered yet, use the crush forces of this one.
+    pub(super) fn share(&self, equal: &Self) {
+        if equal == self {
+            equal.forces.get_or_compute(|| self.shared().clone());
+        }
     }
 
     /// The law that takes the contact force for the crush force, with its own β.
@@ -125,7 +142,7 @@ impl CrushLaw {
         deflection_m: &[f64],
     ) -> Vec<f64> {
         let of = || contact.iter().map(|c| [c.speed_m_per_s, c.end_m()]);
-        let kept = self.forces.get_or_compute(|| CrushForces {
+        let kept = self.shared().get_or_compute(|| CrushForces {
             of: of().collect(),
             curves: self.crush_forces(contact),
             rate: self.rate(),

@@ -141,8 +141,8 @@ impl Surrogate for OfCrushLaw {
         self.law.check()
     }
 
-    fn answers_from_contact(&self) -> bool {
-        true
+    fn crush_law(&self) -> Option<&CrushLaw> {
+        Some(&self.law)
     }
 }
 

@@ -96,9 +96,9 @@ pub(crate) trait Surrogate: Debug + Send + Sync {
         true
     }
 
-    /// Whether it answers from the curves of the contact force, whichever force it gives.
-    fn answers_from_contact(&self) -> bool {
-        false
+    /// The law from which it answers, by the curves of the contact force, whichever force it gives.
+    fn crush_law(&self) -> Option<&CrushLaw> {
+        None
     }
 
     fn forest(&self) -> Option<&forest::ForestSurrogate> {

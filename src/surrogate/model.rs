@@ -276,7 +276,7 @@ impl Model {
     /// the declared ones if the model has no others.
     pub fn body_force_n(&self, at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         match &self.fitted_body {
-            Some(body) if body.answers_from_contact() => {
+            Some(body) if body.crush_law().is_some() => {
                 let law_n =
                     |at: &QueryPoint<'_>| body.force_n(&self.curves.declared, at, deflection_m);
                 let mass_kg = self.masses().effective_kg();

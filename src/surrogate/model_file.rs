@@ -181,6 +181,11 @@ impl Model {
             crush_law: file.crush_law,
         };
         model.check().map_err(damaged)?;
+        let laws =
+            [model.fitted_body.as_ref().and_then(|f| f.crush_law()), model.crush_law.as_ref()];
+        for (law, other) in model.fitted.crush_law().iter().flat_map(|a| laws.map(|b| (a, b))) {
+            other.into_iter().for_each(|other| law.share(other));
+        }
         match &file.fingerprint {
             Some(fingerprint) if !is_as_written(text, fingerprint) && !file::accepts_changed() => {
                 Err(error!(

@@ -47,8 +47,10 @@ pub(super) fn without_spikes(
             // A point at a corner stands out most.
             let corners = curve.envelope().deflection_m().iter().copied();
             let corners = corners.filter(|&d| d >= step && d + step <= curve.end_m());
+            let mut near = [0; 3];
             for d in even.chain(corners.take(PROBES as usize)) {
-                let [a, b, c] = [d - step, d, d + step].map(|d| curve.force_at(d));
+                let mut force_n = |i: usize, d| curve.envelope().force_near(&mut near[i], d);
+                let [a, b, c] = [force_n(0, d - step), force_n(1, d), force_n(2, d + step)];
                 most = most.max(stands_out(a, b, c));
             }
         }
