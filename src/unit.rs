@@ -188,7 +188,7 @@ pub(crate) const MASS: Dimension = Dimension {
 pub(crate) const LENGTH: Dimension = Dimension {
     what: "length",
     example_unit: "mm",
-    units: &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254), ("ft", 0.3048)],
+    units: &[("mm", 1e-3), ("cm", 1e-2), ("m", 1.0), ("in", 0.0254), ("ft", 0.3048), ("um", 1e-6)],
 };
 /// Times, in s inside.
 pub(crate) const TIME: Dimension = Dimension {
@@ -265,7 +265,9 @@ impl Dimension {
 
     /// SI value of one `unit`, or `None` when the unit is not one of this quantity's.
     pub(crate) fn size_of(&self, unit: &str) -> Option<f64> {
-        self.units.iter().find(|(name, _)| *name == unit).map(|&(_, size)| size)
+        // Both signs of micro.
+        let plain = unit.replace(['\u{b5}', '\u{3bc}'], "u");
+        self.units.iter().find(|(name, _)| *name == plain).map(|&(_, size)| size)
     }
 
     /// Like [`Dimension::parse`], but refuses values that are not above zero.
@@ -557,6 +559,8 @@ mod tests {
         t(&TIME, "0.75ms", 0.75e-3);
         t(&STIFFNESS, "80MN/m", 80e6);
         t(&LENGTH, "-3mm", -0.003);
+        t(&LENGTH, "5 \u{b5}m", 5.0 * 1e-6);
+        t(&TIME, "5\u{3bc}s", 5.0 * 1e-6);
     }
 
     /// Steel, aluminium and magnesium in each system; what is not a metal in any.

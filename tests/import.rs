@@ -665,6 +665,12 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
     );
     says(&error, "such an impact is impossible");
     says(&error, "--accept-energy");
+    // Times in ms under a header of s.
+    fs::write(here.join("nose.csv"), text.replace("[ms]", "[s]")).unwrap();
+    let asked = ["--speed", "10m/s", "--kind", "wall", "--mass", "24t", "--case", "b"];
+    let error = crumple_fails(here, 1, &adding(&asked));
+    says(&error, "changes by 0.0100 m/s at most, but 10.0000 m/s is stated");
+    says(&error, "the times are in another unit");
 }
 
 /// Predicted curves of a model, written as JSON and CSV and added again, make a group on which

@@ -8,6 +8,8 @@
 //! Every point of the table is a state, with states between them at an eighth of the common
 //! interval, so that straight lines over time follow the motion.
 
+use std::fmt::Display;
+
 use super::extract::{self, ExtractError, Extracted, Record, Setup, Stated, StatedContact};
 use super::recipe::{Filter, Sampling};
 use super::retrace::{Impact, Table, retrace};
@@ -21,7 +23,10 @@ use crate::unit::Shown;
 pub(crate) const IMPORTED: &str = "imported";
 
 fn impossible_table(impossible: energy::ImpossibleRun) -> Error {
-    let (found, cause) = (impossible.found(), impossible.cause_in_file());
+    impossible_for(impossible.found(), impossible.cause_in_file())
+}
+
+fn impossible_for(found: impl Display, cause: impl Display) -> Error {
     error!(
         Other,
         "{found}: such an impact is impossible; {cause}. Correct speed, mass or units (--speed, --mass, and --units or in crumple export --input-units), or take the curve as it is with --accept-energy"
@@ -168,12 +173,22 @@ fn recorded(
         stated: Stated { contact, accept_energy: impact.accept_energy, ..Stated::default() },
         others: &Vec::new,
     };
-    let Extracted { curves, quality, .. } =
+    let (record, remarks) =
         Record::of_columns(time_s, table.deflection_m, table.force_n, impact.units)
-            .and_then(|(record, remarks)| extract::curve_of(record, remarks, &setup))
             .map_err(of_table)?;
+    // What else is impossible would then follow from it.
+    let fastest = record.rate_m_per_s.iter().fold(0.0_f64, |most, rate| most.max(rate.abs()));
+    let stated = impact.speed.m_per_s;
+    if !(stated / OTHER_UNIT..=stated * OTHER_UNIT).contains(&fastest) && !impact.accept_energy {
+        let found = format!(
+            "its deflection changes by {fastest:.4} m/s at most, but {stated:.4} m/s is stated"
+        );
+        return Err(impossible_for(found, OTHER_SPEED));
+    }
+    let Extracted { curves, quality, .. } =
+        extract::curve_of(record, remarks, &setup).map_err(of_table)?;
     let curves = RecordedCurves { force_kind: impact.force_kind, ..curves };
-    let (of_unloading, mut warnings) = remarks(&curves, impact)?;
+    let (of_unloading, mut warnings) = remarks_on(&curves, impact)?;
     warnings.splice(0..0, quality.warnings);
     notes.extend(of_unloading);
     notes.extend(quality.notes);
@@ -181,15 +196,14 @@ fn recorded(
 }
 
 /// Notes and warnings on a record under an impact.
-fn remarks(curves: &RecordedCurves, impact: &Impact) -> Result<(Vec<String>, Vec<String>), Error> {
+fn remarks_on(
+    curves: &RecordedCurves,
+    impact: &Impact,
+) -> Result<(Vec<String>, Vec<String>), Error> {
     let (mut notes, mut warnings) = (Vec::new(), Vec::new());
     if let Some(found) = other_speed(&curves.closing_speed_m_per_s, impact.speed.m_per_s) {
         if !impact.accept_energy {
-            let cause = "the times are in another unit, the speed is that of another run, or the test was slow (--time-column none takes its force over deflection without the times)";
-            return Err(error!(
-                Other,
-                "{found}: such an impact is impossible; {cause}. Correct speed, mass or units (--speed, --mass, and --units or in crumple export --input-units), or take the curve as it is with --accept-energy"
-            ));
+            return Err(impossible_for(found, OTHER_SPEED));
         }
         warnings.push(format!("accept_energy: {found}"));
     }
@@ -210,6 +224,10 @@ fn other_speed(closing_m_per_s: &[f64], stated_m_per_s: f64) -> Option<String> {
         format!("its deflection starts at {begins:.4} m/s, but {stated_m_per_s:.4} m/s is stated")
     })
 }
+
+const OTHER_SPEED: &str = "the times are in another unit, the speed is that of another run, or the test was slow (--time-column none takes its force over deflection without the times)";
+/// A record whose fastest motion is so many times off the impact speed is of no impact at that speed.
+const OTHER_UNIT: f64 = 20.0;
 
 /// States in which the speed of a record's beginning is looked for.
 const FIRST_STATES: usize = 4;
