@@ -30,6 +30,9 @@ use crate::surrogate::{MODELS, Model, ModelKind, predict};
 /// Most speeds that are left out: each costs what all others share.
 pub(crate) const MOST_SPEEDS: usize = 20;
 
+/// Ends on either side, besides the outermost, that a band outside the speeds rests on.
+const FURTHER_ENDS: usize = 2;
+
 /// What `crumple validate --json` prints.
 #[derive(Debug, Serialize, JsonSchema)]
 pub struct Report {
@@ -210,7 +213,7 @@ pub(crate) fn validate_speeds(
     notes.extend(without_floors);
     let trials = trials(&fitting, &left_out);
     let inner_speeds = left_out.iter().filter(|case| case.inner).count();
-    let tables = Tables::of(&fitting, &trials, inner_speeds, (declared, scatter_of(declared)));
+    let mut tables = Tables::of(&fitting, &trials, inner_speeds, (declared, scatter_of(declared)));
     let (chosen, reason) = match selection {
         Selection::Named(model) => (model.to_string(), "asked for".into()),
         Selection::Best(purpose) => {
@@ -219,6 +222,9 @@ pub(crate) fn validate_speeds(
             chosen.unwrap_or_else(|| without_validation(&fitting, &physical))
         }
     };
+    if let Some(kind) = fitting.iter().find(|kind| kind.name() == chosen) {
+        tables.add_further_ends(kind, &set);
+    }
     let [band, band_outside] = tables.bands(&chosen, declared, scatter_of(declared));
     let [body_band, body_band_outside] = match declared {
         ForceKind::Contact => tables.bands(&chosen, ForceKind::Body, scatter_of(ForceKind::Body)),
@@ -374,6 +380,37 @@ impl Tables {
     /// The model chosen for a purpose, and why.
     pub(super) fn chosen(&self, purpose: Purpose, physical: &[&str]) -> Option<(String, String)> {
         choose(&scores(&self.means, &self.rows, purpose), purpose, physical)
+    }
+
+    /// Adds residuals at ends of the set without its outermost one and two speeds on either side: two ends would be little evidence.
+    fn add_further_ends(&mut self, kind: &ModelKind, set: &TrainingSet) {
+        let Some(means) = self.means.iter().find(|m| m.model == kind.name()) else { return };
+        if !set.features.is_empty() {
+            return;
+        }
+        let (rule, all) = (means.max_crush_rule, set.speeds_m_per_s());
+        let mut speeds = all.clone();
+        speeds.dedup_by(|v, before| is_within(*v, nearly_same(&all, *before)));
+        let last = speeds.len() - 1;
+        // Three speeds remain besides the end.
+        let further = (1..=FURTHER_ENDS).take_while(|k| k + 3 <= last);
+        let ends = further.flat_map(|k| [(true, speeds[k]), (false, speeds[last - k])]);
+        let of_end = |(is_low, end): (bool, f64)| {
+            let end = nearly_same(&all, end);
+            let set = set.with(|case| {
+                let v = case.speed_m_per_s;
+                is_within(v, end) || if is_low { v > end.0 } else { v < end.0 }
+            });
+            let case = LeftOutCase::new(&set, if is_low { 0 } else { set.cases.len() - 1 }).ok()?;
+            let trial = case.trial_of(*kind, &case.fit(*kind), &[rule]);
+            trial.judged(rule).ok().map(|score| score.residuals)
+        };
+        let ends: Vec<(bool, f64)> = ends.collect();
+        let residuals: Vec<_> = ends.into_par_iter().filter_map(of_end).collect();
+        let own = self.residuals.entry(kind.name()).or_default();
+        for (force, of) in residuals.into_iter().flatten() {
+            own.entry((force, LeftOutSpeeds::Ends)).or_default().push(of);
+        }
     }
 
     /// The bands of one force of a model: between training speeds, and outside of them.

@@ -366,7 +366,9 @@ fn print_summary(out: &mut dyn Write, validation: &Validation) -> io::Result<()>
         let span = km_per_h(band.span_m_per_s);
         let place = match band.left_out {
             LeftOutSpeeds::Inner => format!("between speeds {span} apart"),
-            LeftOutSpeeds::Ends => format!("{span} outside the range"),
+            LeftOutSpeeds::Ends => {
+                format!("{span} outside the range, around {}", km_per_h(band.around_m_per_s))
+            }
         };
         let coverage = match band.coverage {
             Some(share) => format!("covers {:.0} % of the left-out points", share * 100.0),
@@ -519,7 +521,8 @@ fn band_line(force: &str, band: &Band) -> String {
         LeftOutSpeeds::Ends => (
             "end",
             format!(
-                "{span} outside the training speeds, elsewhere in proportion to the distance but no narrower than inside"
+                "{span} outside the training speeds around {}, elsewhere in proportion to the interval between the roots of both speeds but no narrower than inside",
+                km_per_h(band.around_m_per_s)
             ),
         ),
     };
