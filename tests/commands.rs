@@ -999,6 +999,15 @@ fn scenarios_choose_the_force() {
     let warned = run("file = \"bare.csv\"")["warnings"].to_string();
     says(&warned, "its file does not state which force it holds");
     assert!(warned.contains("it has no unloading stiffness: it unloads with its steepest rise"));
+    // Stages that begin with a force do not unload softly at once.
+    let stages = "stages = [ { stroke = \"0.4m\", from = \"1MN\" } ], unloading";
+    let warned = run(&format!("{stages} = \"6MN/m\""))["warnings"].to_string();
+    says(
+        &warned,
+        "is softer than the line from the origin to the first stage's force up to a crush of 164 mm",
+    );
+    let warned = run(&format!("{stages} = \"30MN/m\""))["warnings"].to_string();
+    assert!(!warned.contains("is softer"), "{warned}");
     scenario("file = \"bare.csv\"");
     assert!(crumple_ok(here, "simulate s.toml").contains("unknown"));
     std::fs::write(here.join("bad.csv"), text.replace("force_kind: body", "force_kind: bodie"))

@@ -665,6 +665,12 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
     );
     says(&error, "such an impact is impossible");
     says(&error, "--accept-energy");
+    // Another speed with as much energy.
+    let other = ["--speed", "11m/s", "--kind", "wall", "--mass", "19.83t", "--case", "d"];
+    let output = crumple_in(here, &*adding(&other));
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    says(&said, "speed: its deflection starts at 9.9998 m/s");
+    says(&said, "but 11.0000 m/s is stated");
     // Times in ms under a header of s.
     fs::write(here.join("nose.csv"), text.replace("[ms]", "[s]")).unwrap();
     let asked = ["--speed", "10m/s", "--kind", "wall", "--mass", "24t", "--case", "b"];

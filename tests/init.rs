@@ -546,6 +546,31 @@ const MOTION_ONLY: Crash = Crash {
     interval_s: 2e-4,
 };
 
+/// A kinetic energy at the start is that of the body that moves; the other one's mass follows from both changes of velocity.
+#[test]
+fn a_standing_body_is_as_heavy_as_it_is() {
+    let crash = Crash { other_kg: Some(2_000.0), duration_s: 0.2, ..Crash::default() };
+    let history = crash.run();
+    let nodes = [node(5, "CG of car", 0, 4, 0.0), node(9, "CG of other", 1, 4, 0.0)];
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let run = here.join("pair/a");
+    let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
+    layout.nodout(&run, &history, &nodes);
+    let contact = Force { id: 2, title: "", along_n: &history.contact_n, across_n: 0.0 };
+    layout.rcforc(&run, &history, &[contact]);
+    layout.glstat(&run, &history);
+    crumple_ok(here, "init pair -o s.toml");
+    let found = study(here, "s.toml");
+    let run = &found["run"][0];
+    for (key, tonnes) in [("mass", 1.2), ("other_mass", 2.0)] {
+        let mass = number(&run[key], "t");
+        assert!((mass / tonnes - 1.0).abs() < 2e-3, "{key}: {mass} t");
+    }
+    let text = fs::read_to_string(here.join("s.toml")).unwrap();
+    assert!(text.contains("shared by"), "{text}");
+}
+
 /// Momentum alone says that two bodies meet, that they are of different mass, and that it is a
 /// guess.
 #[test]
@@ -1541,6 +1566,84 @@ fn a_late_force_is_not_taken_for_gravity() {
     layout.rwforc(&run, &history, &[wall(&force_n)]);
     let said = warned(here, "build s.toml -o s.h5");
     says(&said, "in a way that neither gravity nor brakes explain: the force is recorded late");
+}
+
+/// What cannot be read of a node or a force is said of it, and lets init take no other.
+#[test]
+fn damage_does_not_choose() {
+    let history = Crash::default().run();
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
+    let runs = ["car/a", "car/b"].map(|run| here.join(run));
+    let damage = |path: &Path, line: usize, columns: std::ops::Range<usize>| {
+        let mut text = fs::read(path).unwrap();
+        let start =
+            text.split_inclusive(|&b| b == b'\n').take(line).map(<[u8]>::len).sum::<usize>();
+        text[start + columns.start..start + columns.end].fill(b'*');
+        fs::write(path, text).unwrap();
+    };
+    for run in &runs {
+        layout.nodout(run, &history, &car_nodes());
+        let wall = Force { id: 1, title: "", along_n: &history.contact_n, across_n: 0.0 };
+        layout.rwforc(run, &history, &[wall]);
+    }
+    crumple_ok(here, "init car -o whole.toml");
+    let whole = study(here, "whole.toml");
+    // The node's velocity across the motion, in one state.
+    let node = whole["recipe"]["deflection"]["node"].as_integer().unwrap();
+    let text = fs::read_to_string(runs[1].join("nodout")).unwrap();
+    let is_node = |line: &(usize, &str)| line.1.starts_with(&format!("{node:>9} "));
+    let line = text.lines().enumerate().filter(is_node).nth(50).unwrap().0;
+    damage(&runs[1].join("nodout"), line, 59..70);
+    crumple_ok(here, "init car -o across.toml");
+    assert_eq!(study(here, "across.toml")["recipe"], whole["recipe"]);
+    // A force.
+    damage(&runs[1].join("rwforc"), 40, 21..35);
+    let found: Value =
+        serde_json::from_str(&crumple_ok(here, "init car -o force.toml --json")).unwrap();
+    assert_eq!(study(here, "force.toml")["recipe"], whole["recipe"]);
+    let left_out = left_out(&found);
+    says(&left_out[0].1, "of rwforc holds values that are not numbers (line 41, columns 2");
+    damage(&runs[0].join("rwforc"), 40, 21..35);
+    let error = crumple_fails(here, 1, "init car -o none.toml");
+    says(&error, "correct them, or name another force with --force");
+    assert!(!here.join("none.toml").exists());
+}
+
+/// A wall of fixed nodes is known by its reaction, and the mass by the energies of the parts.
+#[test]
+fn a_support_may_be_the_wall() {
+    let history = Crash::default().run();
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let run = here.join("car/a");
+    Layout { units: SI, axis: 0, sign: 1.0 }.nodout(&run, &history, &car_nodes());
+    let (mut support, mut parts) = (
+        " made up\n\n single point constraint forces\n\n".to_string(),
+        " made up\n\n\n".to_string(),
+    );
+    for (i, t) in history.time_s.iter().enumerate() {
+        let (force, kinetic) = (-history.contact_n[i], 0.5 * history.kinetic_j[i]);
+        support += &format!(
+            " output at time ={t:14.5E}\n node= 19381 local x,y,z forces ={force:14.4E}{zero:14.4E}{zero:14.4E}  setid=       0\n             force resultants   ={force:14.4E}{zero:14.4E}{zero:14.4E}\n",
+            zero = 0.0
+        );
+        parts += &format!("\n time ={t:13.4E}\n");
+        for part in 1..=2 {
+            parts += &format!(
+                " mat.#={part:5}             inten=   0.0000E+00     kinen={kinetic:13.4E}     eroded_ie=   0.0000E+00     eroded_ke=   0.0000E+00\n x-mom=   0.0000E+00 y-mom=   0.0000E+00 z-mom=   0.0000E+00\n x-rbv=   0.0000E+00 y-rbv=   0.0000E+00 z-rbv=   0.0000E+00\n                         hgeng=   0.0000E+00     +mass=   0.0000E+00     eroded_he=   0.0000E+00\n"
+            );
+        }
+    }
+    fs::write(run.join("spcforc"), support).unwrap();
+    fs::write(run.join("matsum"), parts).unwrap();
+    crumple_ok(here, "init car -o s.toml --units SI");
+    let found = study(here, "s.toml");
+    let force = &found["recipe"]["force"];
+    assert_eq!((force["file"].as_str(), force["id"].as_integer()), (Some("spcforc"), Some(19381)));
+    let mass = number(&found["run"][0]["mass"], "t");
+    assert!((mass / 1.2 - 1.0).abs() < 2e-3, "{mass} t");
 }
 
 /// A body that falls through its impact takes more impulse than its mass times its change of speed.

@@ -186,7 +186,7 @@ tension = \"pull\"
 [curves.pull]
 stages = [ { stroke = \"50mm\", from = \"0.4MN\" } ]
 gap = \"4mm\"
-unloading = \"20MN/m\"
+unloading = \"40MN/m\"
 
 [curves.nose]
 stages = [ { stroke = \"0.8m\", from = \"2MN\" } ]

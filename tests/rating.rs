@@ -235,6 +235,13 @@ fn parts_and_units_are_said() {
         let of = rate(here, &["a.csv:a_m_per_s2[A1]", &format!("{other},scale=0.5")]);
         assert!(!of["warnings"].to_string().contains("according to their names"), "{of}");
     }
+    // Without units in the names the factor shows.
+    write(here, "c.csv", "time_s,value", 200, |t| format!("{t:?},{:?}", 1e3 * pulse(t)));
+    let of = rate(here, &["a.csv:a_m_per_s2[A1]", "c.csv:value"]);
+    says(&of["warnings"].to_string(), "is 1000 times the reference throughout");
+    says(&of["warnings"].to_string(), "c.csv,scale=0.001");
+    let of = rate(here, &["a.csv:a_m_per_s2[A1]", "c.csv:value,scale=0.001"]);
+    assert!(!of["warnings"].to_string().contains("throughout"), "{of}");
 }
 
 /// The way over crumple histories and the direct one are the same.

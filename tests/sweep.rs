@@ -160,6 +160,14 @@ fn what_has_no_effect_is_refused() {
         gap,
         "the contact, a train or a vehicle has its own gap, so that of the curve has no effect",
     );
+    // One train of two.
+    let of_one = SCENARIO.replacen("inner = \"inner\"", "gap = \"30mm\"\ninner = \"inner\"", 1);
+    folder.put("s.toml", &format!("{of_one}[sweep]\nvary = [ {{ {gap} }} ]\n"));
+    let said = crumple_in(folder.0.path(), "sweep s.toml --dry-run");
+    says(
+        &String::from_utf8(said.stderr).unwrap(),
+        "the gap of curve \"inner\" is varied, but A1|A2 keeps that of its contact, train or vehicle",
+    );
     let band = "what = \"band\", curve = \"nose\", values = [-1, 1]";
     let train = "[[train]]\nname = \"A\"\nspeed = \"36km/h\"\n";
     let run = "[run]\nduration = \"0.1s\"\n[wall]\n[contact]\n";

@@ -205,17 +205,21 @@ struct LoadedSignal {
     problems: usize,
 }
 
+/// Signals whose phase error is smaller have one shape; and a factor that is off by less is that of a unit.
+const SAME_SHAPE: f64 = 0.02;
+
 /// A unit of values, its SI unit and its size in it.
 type ValueUnit = (&'static str, &'static str, f64);
 
 /// Units of values, and how the names of columns write them.
-const VALUE_UNITS: [(ValueUnit, &str); 11] = [
+const VALUE_UNITS: [(ValueUnit, &str); 12] = [
     (("m/s²", "m/s²", 1.0), "m_per_s2 m/s2 m/s^2 m/s**2 m/s²"),
     (("mm/s²", "m/s²", 1e-3), "mm_per_s2 mm/s2 mm/s^2 mm/s**2 mm/s²"),
     (("g", "m/s²", STANDARD_GRAVITY_M_PER_S2), "g"),
     (("m/s", "m/s", 1.0), "m_per_s m/s"),
     (("mm/s", "m/s", 1e-3), "mm_per_s mm/s"),
-    (("km/h", "m/s", M_PER_S_PER_KM_PER_H), "km_per_h km/h"),
+    (("km/h", "m/s", M_PER_S_PER_KM_PER_H), "km_per_h km/h kmh kph"),
+    (("mph", "m/s", 0.44704), "mph"),
     (("m", "m", 1.0), "m"),
     (("mm", "m", 1e-3), "mm"),
     (("N", "N", 1.0), "n"),
@@ -270,6 +274,20 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         rating.warnings.push(format!(
             "according to their names, the reference is in {of_a} and the prediction in {of_b}, and they are compared as they stand: {remedy}"
         ));
+    }
+    if let (None, Some(of)) = (reference.unit.zip(prediction.unit), &rating.sprague_geers)
+        && of.phase < SAME_SHAPE
+    {
+        let times = 1.0 + of.magnitude;
+        let units = [1e3, 1e6, 1.0 / M_PER_S_PER_KM_PER_H, STANDARD_GRAVITY_M_PER_S2];
+        let factor = units.into_iter().flat_map(|size| [size, 1.0 / size]);
+        if let Some(factor) = factor.into_iter().find(|f| (times / f - 1.0).abs() < SAME_SHAPE) {
+            rating.warnings.push(format!(
+                "the prediction is {factor} times the reference throughout: if they are in different units, write the factor after the file's name: {},scale={}",
+                b.path().display(),
+                1.0 / factor
+            ));
+        }
     }
     let outcome = options.warn_all(&rating.warnings);
     options.show(&rating, |out| print(out, &rating))?;

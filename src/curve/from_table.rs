@@ -9,6 +9,7 @@
 //! interval, so that straight lines over time follow the motion.
 
 use std::fmt::Display;
+use std::ops::RangeInclusive;
 
 use super::extract::{self, ExtractError, Extracted, Record, Setup, Stated, StatedContact};
 use super::recipe::{Filter, Sampling};
@@ -179,14 +180,22 @@ fn recorded(
     // What else is impossible would then follow from it.
     let fastest = record.rate_m_per_s.iter().fold(0.0_f64, |most, rate| most.max(rate.abs()));
     let stated = impact.speed.m_per_s;
-    if !(stated / OTHER_UNIT..=stated * OTHER_UNIT).contains(&fastest) && !impact.accept_energy {
+    let other_speed = || {
         let found = format!(
             "its deflection changes by {fastest:.4} m/s at most, but {stated:.4} m/s is stated"
         );
-        return Err(impossible_for(found, OTHER_SPEED));
+        impossible_for(found, OTHER_SPEED)
+    };
+    if !(stated / OTHER_UNIT..=stated * OTHER_UNIT).contains(&fastest) && !impact.accept_energy {
+        return Err(other_speed());
     }
     let Extracted { curves, quality, .. } =
-        extract::curve_of(record, remarks, &setup).map_err(of_table)?;
+        extract::curve_of(record, remarks, &setup).map_err(|error| match error {
+            ExtractError::ImpossibleRun(_) if !SPEEDS.contains(&(fastest / stated)) => {
+                other_speed()
+            }
+            error => of_table(error),
+        })?;
     let curves = RecordedCurves { force_kind: impact.force_kind, ..curves };
     let (of_unloading, mut warnings) = remarks_on(&curves, impact)?;
     warnings.splice(0..0, quality.warnings);
@@ -201,11 +210,14 @@ fn remarks_on(
     impact: &Impact,
 ) -> Result<(Vec<String>, Vec<String>), Error> {
     let (mut notes, mut warnings) = (Vec::new(), Vec::new());
-    if let Some(found) = other_speed(&curves.closing_speed_m_per_s, impact.speed.m_per_s) {
+    let closing = &curves.closing_speed_m_per_s;
+    if let Some(found) = other_speed(closing, impact.speed.m_per_s, SPEEDS) {
         if !impact.accept_energy {
             return Err(impossible_for(found, OTHER_SPEED));
         }
         warnings.push(format!("accept_energy: {found}"));
+    } else if let Some(found) = other_speed(closing, impact.speed.m_per_s, SAME_SPEED) {
+        warnings.push(format!("speed: {found}"));
     }
     if let Some(stated) = impact.unloading_stiffness_n_per_m {
         match unloading_of_record(curves.unloading_stiffness_n_per_m, stated) {
@@ -216,14 +228,22 @@ fn remarks_on(
     Ok((notes, warnings))
 }
 
-/// A record begins with its impact speed: what it begins with, if that is more than a quarter off.
-fn other_speed(closing_m_per_s: &[f64], stated_m_per_s: f64) -> Option<String> {
+/// A record begins with its impact speed: what it begins with, if that as a share of it is not within limits.
+fn other_speed(
+    closing_m_per_s: &[f64],
+    stated_m_per_s: f64,
+    limits: RangeInclusive<f64>,
+) -> Option<String> {
     let begins = closing_m_per_s.iter().take(FIRST_STATES).copied().fold(0.0, f64::max);
     let ratio = begins / stated_m_per_s;
-    (!(0.8..=1.25).contains(&ratio)).then(|| {
+    (!limits.contains(&ratio)).then(|| {
         format!("its deflection starts at {begins:.4} m/s, but {stated_m_per_s:.4} m/s is stated")
     })
 }
+
+/// Initial speeds of a record as shares of the stated one that are possible, and those that go without a word.
+const SPEEDS: RangeInclusive<f64> = 0.8..=1.25;
+const SAME_SPEED: RangeInclusive<f64> = 0.95..=1.05;
 
 const OTHER_SPEED: &str = "the times are in another unit, the speed is that of another run, or the test was slow (--time-column none takes its force over deflection without the times)";
 /// A record whose fastest motion is so many times off the impact speed is of no impact at that speed.

@@ -263,9 +263,14 @@ impl MotionBuilder {
         let (ends, moving_ends) = (f / stiffness, moving / body);
         if ends.max(moving_ends) > d * (1.0 + 1e-9) {
             let (stiffness_n_per_m, least_n_per_m) = (stiffness, f / d);
+            // No stiffness that somebody knows is so far off, but a unit is.
+            let remedy = match least_n_per_m > 10.0 * stiffness_n_per_m {
+                true => "check the units of its columns",
+                false => "give a stiffer one with --unloading",
+            };
             return Err(error!(
                 Other,
-                "the unloading stiffness {stiffness_n_per_m} N/m is softer than the line from the maximum deflection to zero ({least_n_per_m} N/m), which is impossible in a crash: give a stiffer one with --unloading"
+                "the unloading stiffness {stiffness_n_per_m} N/m is softer than the line from the maximum deflection to zero ({least_n_per_m} N/m), which is impossible in a crash: {remedy}"
             ));
         }
         let mut way = vec![0.0, ends.min(moving_ends), ends.max(moving_ends)];

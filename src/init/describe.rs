@@ -181,7 +181,14 @@ impl Facts<'_> {
             let from = "the only force along the motion, and the bodies follow it";
             Proposed::found(source, Computed, from)
         } else {
-            let from = "of the forces that the bodies follow, the one with the largest impulse along the motion";
+            let from = match &self.recipe.beside.larger {
+                Some(_) => {
+                    "of the forces along the motion, the one that the bodies follow most closely"
+                }
+                None => {
+                    "of the forces that the bodies follow, the one with the largest impulse along the motion"
+                }
+            };
             Proposed::found(source, Guessed, from)
         }
     }
@@ -243,6 +250,15 @@ impl Facts<'_> {
             warnings.push(format!(
                 "no node's velocity follows the impulse of a force closely (residual {} %): several bodies in a row, or a force on part of the body? Check node and force",
                 percent(recipe.residual)
+            ));
+        }
+        if let (Some(force), Some(larger), None) =
+            (&recipe.force, &recipe.beside.larger, &self.hints.force)
+        {
+            warnings.push(format!(
+                "force: {larger} has a far larger impulse than {}, which the body of node {} follows more closely: if several bodies move in a row, this is the force on that one alone, and its way against the ground; choose with --force and --node",
+                force.label(),
+                recipe.nodes.first().map_or(0, |node| node.id)
             ));
         }
         let given = self.hints.mass_kg.zip(self.units.value()).map(|(kg, u)| kg / u.mass_kg);

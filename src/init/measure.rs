@@ -94,6 +94,8 @@ pub(super) struct MassEstimates {
     /// Share by which other forces than the contact's may have changed it.
     pub unexplained: f64,
     pub by_energy: Option<f64>,
+    /// Whether two bodies have that energy.
+    pub is_shared: bool,
     /// Interval of the states over the time from contact to the largest crush, of which a mass by momentum may be off by
     /// half; after the contact that of the forces alone.
     pub coarseness: f64,
@@ -124,6 +126,10 @@ impl MassEstimates {
         const IMPULSE: &str = "impulse of the force over the change of velocity";
         let by_energy = (self.by_energy, "kinetic energy at the start");
         let (from, (other, way)) = match self.kg() {
+            Some((_, true)) if self.is_shared => (
+                "kinetic energy of the model at the start, shared by the bodies' changes of velocity".into(),
+                (self.by_momentum, "momentum"),
+            ),
             Some((_, true)) => (
                 "kinetic energy of the model at the start over ½v²".into(),
                 (self.by_momentum, "momentum"),

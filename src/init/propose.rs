@@ -145,6 +145,12 @@ fn refuse_hints(
         let forces = surveys.iter().flat_map(|survey| &survey.forces);
         let known: BTreeSet<String> = forces.map(ForceCandidate::label).collect();
         let ids = ids.iter().map(i64::to_string).collect::<Vec<_>>().join(" + ");
+        if known.contains(&format!("{file} {ids}")) {
+            return Err(error!(
+                Study,
+                "{file} {ids} does not drive two bodies of a run apart, as a pair needs: nodes that start with one velocity count as one body: use --kind wall with the node of one of them"
+            ));
+        }
         let known = match known.len() {
             0 => "none".into(),
             _ => known.into_iter().collect::<Vec<_>>().join(", "),

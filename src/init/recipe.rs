@@ -57,6 +57,8 @@ pub(super) struct Beside {
     pub whole: f64,
     /// Others of the file act against it on the side that would be added, so that no recipe adds them.
     pub opposite: Vec<i64>,
+    /// Of any file, one with a far larger impulse, which the bodies follow less closely.
+    pub larger: Option<String>,
 }
 
 /// What else could be meant, and how well it would do.
@@ -423,6 +425,11 @@ fn chosen_force(views: &[RunView<'_>]) -> Option<(ForceCandidate, Vec<Alternativ
         ids: alike.iter().flat_map(|other| &other.ids).copied().collect(),
         whole: 1.0 + alike.iter().map(|other| other.size() / force.size()).sum::<f64>(),
         opposite: opposite.iter().flat_map(|other| &other.ids).copied().collect(),
+        larger: others
+            .iter()
+            .map(|(other, _)| *other)
+            .find(|other| other.size() > LARGER * force.size())
+            .map(ForceCandidate::label),
     };
     let others = others
         .into_iter()
@@ -475,6 +482,8 @@ pub(super) const RELATED: f64 = 0.3;
 const WORTH: f64 = 0.8;
 /// A sum leaves at most this much more than the part of it that the bodies follow best: as a factor and of the impulse.
 const NO_WORSE: (f64, f64) = (1.1, 0.002);
+/// A force that is so many times larger than the one that the bodies follow acts on more than these.
+const LARGER: f64 = 1.2;
 /// What printed digits leave.
 const ROUNDED: f64 = 2e-3;
 /// A body that leaves less of an impulse follows it too closely for another interface's to show.
@@ -575,7 +584,10 @@ pub(super) fn best_of(survey: &Survey, kind: Option<StudyKind>) -> Option<Explan
     // A section carries only what passes through it, and a rigid body may be the one that is stopped: neither represents
     // a contact that is there.
     let [contacts, bodies, sections] = [&["rwforc", "rcforc"][..], &["rbdout"], &["secforc"]];
-    largest(contacts).or_else(|| largest(bodies)).or_else(|| largest(sections))
+    let other = largest(contacts).or_else(|| largest(bodies)).or_else(|| largest(sections));
+    // Of several supports each has a part of the reaction.
+    let is_one = explained.iter().filter(|(force, _)| force.file == "spcforc").count() == 1;
+    other.or_else(|| largest(&["spcforc"]).filter(|_| is_one))
 }
 
 /// The choice if no force explains a run: two bodies whose velocities change against each

@@ -111,7 +111,10 @@ impl Record {
             let history = &history;
             impulses = impulse(history, &time).ok_or_else(|| {
                 let (history, file) = (history.label(), source.shown());
-                unusable(format!("{history} of {file} holds values that are not numbers"))
+                let damage = bracketed(read.problems.first().map(ToString::to_string).as_deref());
+                unusable(format!(
+                    "{history} of {file} holds values that are not numbers{damage}: correct them, or name another force with --force"
+                ))
             })?;
             let states = rising(&history.time);
             force_time = picked(&history.time, &states);
@@ -130,7 +133,9 @@ impl Record {
             damage.extend(self::damage(source, read.problems.first()));
         }
         if velocities.iter().flatten().chain(&travel).any(|v| !v.is_finite()) {
-            return unusable("the motion of its nodes holds values that are not numbers");
+            let damage = bracketed(damage.first().map(String::as_str));
+            let what = "the motion of its nodes holds values that are not numbers";
+            return unusable(&format!("{what}{damage}"));
         }
         let record = Self {
             run,
@@ -219,6 +224,7 @@ impl Record {
             in_free_flight: in_free_flight.unwrap_or_default(),
             unexplained: self.unexplained(k),
             by_energy: kg(&by_energy, k),
+            is_shared: self.velocities.len() > 1,
             coarseness: self.coarseness().unwrap_or_default(),
         };
         (0..self.velocities.len()).map(estimates).collect()
@@ -291,12 +297,13 @@ impl Record {
         if share.is_finite() { share } else { 0.0 }
     }
 
-    /// Mass of the other body over the first one's, by their changes of velocity while loading:
-    /// no force is needed for that. `None` for one body.
+    /// Mass of the other body over the first one's, by their changes of velocity: no force is needed for that. After the
+    /// contact, where the crush zones move with their bodies, else while loading. `None` for one body.
     pub(super) fn mass_ratio(&self) -> Option<f64> {
         let [node, other] = &self.velocities[..] else { return None };
         let end = self.loading_end().ok()?;
-        let changes = (0..=end).map(|i| (node[i] - node[0], other[i] - other[0]));
+        let states = self.free_flight(end).map_or(0..end + 1, |from| from..self.time.len());
+        let changes = states.map(|i| (node[i] - node[0], other[i] - other[0]));
         let (of, by) = changes.fold((0.0, 0.0), |(of, by), (a, b)| (of - a * b, by + b * b));
         Some(of / by).filter(|ratio| ratio.is_finite() && *ratio > 0.0)
     }
@@ -305,7 +312,8 @@ impl Record {
     /// of two bodies is shared by the ratio of their changes of velocity.
     fn masses_by_energy(&self) -> Option<Vec<f64>> {
         let energy = self.run.sources.energy.as_ref()?.read(None, &["kinetic_energy"]).ok()?;
-        let kinetic = *energy.history(None, "kinetic_energy")?.values.first()?;
+        let of_parts = energy.histories.iter().map(|part| part.values.first());
+        let kinetic = of_parts.sum::<Option<f64>>()?;
         let mut shares = vec![1.0];
         if self.velocities.len() > 1 {
             shares.push(self.mass_ratio()?);

@@ -16,8 +16,9 @@ use crate::study::files::{content_hash, is_section_of, is_without_states, shown_
 /// Histories of nodes, named as a recipe's file is.
 pub(super) const MOTION: &str = "nodout";
 /// Forces that a recipe can name, what acts between bodies before what acts within one.
-pub(super) const FORCES: [&str; 4] = ["rwforc", "rcforc", "secforc", "rbdout"];
-const ENERGY: &str = "glstat";
+pub(super) const FORCES: [&str; 5] = ["rwforc", "rcforc", "secforc", "rbdout", "spcforc"];
+/// Of the model, else of its parts.
+const ENERGIES: [&str; 2] = ["glstat", "matsum"];
 
 /// A file, or a section of one, with histories that a recipe can name.
 #[derive(Clone, Debug)]
@@ -92,7 +93,7 @@ impl Sources {
             }
         }
         let (_, hash) = content_hash(&parts).map_err(|error| unreadable(&error))?;
-        let energy = Source::choose(folder, ENERGY, &listed);
+        let energy = ENERGIES.iter().find_map(|name| Source::choose(folder, name, &listed));
         Ok(Self { motion, forces, energy, deck, unread, hash })
     }
 
@@ -109,7 +110,7 @@ fn continued(folder: &Path) -> Vec<String> {
     let of_restart = |name: &&String| {
         let own = without_job_id(name);
         let first = own.trim_end_matches(|c: char| c.is_ascii_digit());
-        let is_known = FORCES.contains(&first) || [MOTION, ENERGY].contains(&first);
+        let is_known = FORCES.contains(&first) || ENERGIES.contains(&first) || first == MOTION;
         first.len() < own.len() && is_known && names.iter().any(|n| without_job_id(n) == first)
     };
     let words = |name: &String| {
@@ -209,7 +210,7 @@ impl Source {
 fn is_looked_at(path: &Path) -> bool {
     let name = shown_name(path);
     let own = without_job_id(&name);
-    is_named_like_binary(&name) || FORCES.contains(&own) || [MOTION, ENERGY].contains(&own)
+    is_named_like_binary(&name) || FORCES.contains(&own) || own == MOTION || ENERGIES.contains(&own)
 }
 
 /// Why the forces of a section are means over their output intervals, if they are.

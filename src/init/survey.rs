@@ -31,6 +31,8 @@ const STANDS: f64 = 0.02;
 const CHANGED: f64 = 0.95;
 /// Forces of a run that are kept, those with the largest impulse.
 const KEPT_FORCES: usize = 12;
+/// Of values that are not numbers one in so many is few.
+const FEW: usize = 20;
 /// A wall's normal force is taken if its impulse differs from that along the motion by less.
 const SAME_IMPULSE: f64 = 0.02;
 
@@ -179,8 +181,23 @@ pub(super) fn bracketed(damage: Option<&str>) -> String {
     damage.map_or(String::new(), |damage| format!(" ({damage})"))
 }
 
-/// How each node starts, and the times that rise. Without nodes that have no velocities, or one that is
-/// not a number: these did not live long.
+/// Values of which few are not numbers, each of these with the one before it in its place: damage is reported of what is
+/// chosen, and must not decide what that is. `None` if they are many.
+fn mended(mut values: Vec<f64>) -> Option<Vec<f64>> {
+    let lost = values.iter().filter(|v| !v.is_finite()).count();
+    if lost * FEW > values.len() {
+        return None;
+    }
+    let mut last = values.iter().copied().find(|v| v.is_finite())?;
+    for value in &mut values {
+        last = if value.is_finite() { *value } else { last };
+        *value = last;
+    }
+    Some(values)
+}
+
+/// How each node starts, and the times that rise. Without nodes that have no velocities, or few that are
+/// numbers: these did not live long.
 fn starts(
     source: &Source,
     each_node: &mut EachBatch<'_>,
@@ -194,12 +211,10 @@ fn starts(
         }
         for node in by_entity(&piece.histories) {
             let Some(entity) = node[0].entity else { continue };
-            let velocities = DisplacementComponent::ALL.map(|along| velocity(node, along, &states));
+            let velocities = DisplacementComponent::ALL
+                .map(|along| velocity(node, along, &states).and_then(mended));
             let [Some(x), Some(y), Some(z)] = velocities else { continue };
             let velocities = [x, y, z];
-            if velocities.iter().flatten().any(|v| !v.is_finite()) {
-                continue;
-            }
             let change = |v: &Vec<f64>| v.iter().map(|v_i| (v_i - v[0]).abs()).fold(0.0, f64::max);
             starts.push(NodeCandidate {
                 id: entity.id,
@@ -302,12 +317,16 @@ fn along(
     direction: DisplacementComponent,
     time: &[f64],
 ) -> Option<(&'static str, Vec<f64>)> {
-    let force = impulse(component(of, direction.force())?, time)?;
+    let impulse = |of: &History| match of.values.iter().all(|v| v.is_finite()) {
+        true => impulse(of, time),
+        false => impulse(&History { values: mended(of.values.clone())?, ..of.clone() }, time),
+    };
+    let force = impulse(component(of, direction.force())?)?;
     let at = largest(&force);
     if force.get(at).is_none_or(|j| *j == 0.0) {
         return None;
     }
-    let normal = component(of, "normal_force").and_then(|normal| impulse(normal, time));
+    let normal = component(of, "normal_force").and_then(impulse);
     let is_same =
         |normal: &Vec<f64>| (normal[at].abs() / force[at].abs() - 1.0).abs() < SAME_IMPULSE;
     match normal.filter(is_same) {
@@ -352,7 +371,7 @@ fn fit_nodes(
         for node in by_entity(&piece.histories) {
             let candidate = node[0].entity.and_then(|entity| candidates.get_mut(&entity.id));
             let (Some((body, candidate)), Some(velocity)) =
-                (candidate, velocity(node, direction, &states))
+                (candidate, velocity(node, direction, &states).and_then(mended))
             else {
                 continue;
             };

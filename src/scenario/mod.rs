@@ -130,16 +130,19 @@ pub(crate) fn check<'a>(path: &Path, scenario: &'a Scenario) -> Result<CheckedSc
     scenario.check().map_err(|error| error.placed(|_| Place::of_file(path)))
 }
 
-/// Whether an interface, or the slack of a coupling, takes the gap of a curve: not where contact, train or vehicle state one.
+/// Whether an interface, or the slack of a coupling, takes the gap of a curve, and the interfaces that do not although they have
+/// the curve: where contact, train or vehicle state one.
 ///
 /// # Errors
 /// If the scenario is not one.
-pub(crate) fn takes_gap_of(scenario: &Scenario, curve: &str) -> Result<bool, Error> {
+pub(crate) fn takes_gap_of(scenario: &Scenario, curve: &str) -> Result<(bool, Vec<String>), Error> {
     let checked = scenario.check()?;
-    let slots = layout::layout(&checked).slots;
+    let mut slots = layout::layout(&checked).slots;
+    slots.retain(|slot| slot.joint == layout::ConnectionKind::Curve(curve));
     let is_slack = scenario.curves.values().any(|of| of.tension.as_deref() == Some(curve));
-    let takes = slots.iter().any(|slot| slot.gap_m.is_none() && slot.joint.curve() == Some(curve));
-    Ok(takes || is_slack)
+    let takes = slots.iter().any(|slot| slot.gap_m.is_none());
+    let others = slots.into_iter().filter(|slot| slot.gap_m.is_some()).map(|slot| slot.name);
+    Ok((takes || is_slack, others.collect()))
 }
 
 /// Reads and checks a scenario; curves are not read.

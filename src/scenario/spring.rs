@@ -245,6 +245,19 @@ impl Spring {
             let begins = |&(d, _): &(&f64, &f64)| stages.first().is_some_and(|s| *d < s.stroke.0);
             let secants = points.skip_while(begins).map(|(d, f)| f / d);
             let secant = secants.fold(0.0, f64::max);
+            let stroke_m = stages.first().map_or(0.0, |first| first.stroke.0);
+            let is_softer = |share: &f64| {
+                self.curve.loading.force_at(share * stroke_m) > asked * share * stroke_m
+            };
+            let until =
+                (1..=100).map(|k| f64::from(k) / 100.0).filter(is_softer).fold(0.0, f64::max);
+            if asked >= secant && until > MENTIONED {
+                warnings.push(format!(
+                    "unloading {} is softer than the line from the origin to the first stage's force up to a crush of {:.0} mm: until there it unloads along that line",
+                    Shown::one_stiffness(asked),
+                    until * stroke_m * 1e3
+                ));
+            }
             if asked < secant {
                 warnings.push(format!(
                     "unloading {} is softer than the line from the origin to the stages' forces ({} from the end of the first on, more before): there it unloads along that line, or more steeply where a force that steps up has absorbed less than that line would return",
@@ -267,6 +280,9 @@ impl Spring {
         Ok((asked.map(|stiffness_n_per_m| Unloading::Memory { stiffness_n_per_m }), warnings))
     }
 }
+
+/// A larger share of the first stage within which it does not unload as stated is mentioned.
+const MENTIONED: f64 = 0.25;
 
 /// Stiffness and damping between two plates, or a plate and the wall: ten times as stiff as any end
 /// we have seen, so that little of the crush is theirs, and damped enough not to ring.

@@ -176,7 +176,17 @@ impl Sweep {
         let (variables, design) = variables::bind(&plan, &scenario).map_err(invalid)?;
         let results = results(&plan, scenario.limits.is_some()).map_err(invalid)?;
         let sources = Sources::read(path, &scenario)?;
-        let base = scenario::assemble(path, &scenario, &sources)?;
+        let mut base = scenario::assemble(path, &scenario, &sources)?;
+        for variable in &variables {
+            let Some(curve) = variable.gap_of() else { continue };
+            let (_, others) = scenario::takes_gap_of(&scenario, curve)?;
+            base.warnings.extend((!others.is_empty()).then(|| {
+                format!(
+                    "the gap of curve \"{curve}\" is varied, but {} keeps that of its contact, train or vehicle",
+                    others.join(", ")
+                )
+            }));
+        }
         let hash = hash(path, &text, plan_path, &scenario, None)?;
         let (path, plan_path) = (path.to_path_buf(), plan_path.to_path_buf());
         Ok(Self {

@@ -19,6 +19,14 @@ pub(crate) struct Variable {
 }
 
 impl Variable {
+    /// The curve whose gap it is.
+    pub(super) fn gap_of(&self) -> Option<&str> {
+        match &self.target {
+            Target::CurveGap(curve) => Some(curve),
+            _ => None,
+        }
+    }
+
     /// Whether its values stand in place of those of one before it.
     fn replaces(&self, before: &Self) -> bool {
         !self.factor
@@ -196,7 +204,7 @@ impl Binder<'_> {
                         "curve \"{curve}\" has no gap that a factor could change"
                     ));
                 }
-                if !self.replaces(curve) && !scenario::takes_gap_of(self.scenario, curve)? {
+                if !self.replaces(curve) && !scenario::takes_gap_of(self.scenario, curve)?.0 {
                     return Err(error!(
                         Sweep at "curve",
                         "where curve \"{curve}\" is used, the contact, a train or a vehicle has its own gap, so that of the curve has no effect: remove these (for the contact, vary interface = \"contact\")"
