@@ -367,7 +367,7 @@ fn print_summary(out: &mut dyn Write, validation: &Validation) -> io::Result<()>
         let place = match band.left_out {
             LeftOutSpeeds::Inner => format!("between speeds {span} apart"),
             LeftOutSpeeds::Ends => {
-                format!("{span} outside the range, around {}", km_per_h(band.around_m_per_s))
+                format!("{span} outside the range, around {}", around(band))
             }
         };
         let coverage = match band.coverage {
@@ -507,6 +507,11 @@ fn scatter_line(scatter: &Scatter) -> String {
     )
 }
 
+/// The speed around which a band is stated, in whole km/h.
+fn around(band: &Band) -> String {
+    km_per_h((band.around_m_per_s * 3.6).round() / 3.6)
+}
+
 /// A band of the validation around this force, with the span that it is stated for.
 fn band_line(force: &str, band: &Band) -> String {
     let span = km_per_h(band.span_m_per_s);
@@ -515,14 +520,14 @@ fn band_line(force: &str, band: &Band) -> String {
             "curve",
             format!(
                 "between training speeds {span} apart around {}, otherwise scaled by the interval between the roots of both speeds to the power {POWER_OF_GAP}",
-                km_per_h(band.around_m_per_s)
+                around(band)
             ),
         ),
         LeftOutSpeeds::Ends => (
             "end",
             format!(
                 "{span} outside the training speeds around {}, elsewhere in proportion to the interval between the roots of both speeds but no narrower than inside",
-                km_per_h(band.around_m_per_s)
+                around(band)
             ),
         ),
     };
