@@ -512,7 +512,8 @@ macro_rules! texts_with_units {
             }
             fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
                 let units: Vec<&str> = $dimension.units.iter().map(|(name, _)| *name).collect();
-                let pattern = format!("^{}[0-9.eE+-]+ *({})$", $sign, units.join("|"));
+                let units = units.join("|").replace("us", "[uµμ]s").replace("um", "[uµμ]m");
+                let pattern = format!("^{}[0-9.eE+-]+ *({units})$", $sign);
                 schemars::json_schema!({ "type": "string", "pattern": pattern })
             }
         }

@@ -1644,6 +1644,16 @@ fn a_support_may_be_the_wall() {
     assert_eq!((force["file"].as_str(), force["id"].as_integer()), (Some("spcforc"), Some(19381)));
     let mass = number(&found["run"][0]["mass"], "t");
     assert!((mass / 1.2 - 1.0).abs() < 2e-3, "{mass} t");
+    // One of two has a part of the reaction.
+    let text = fs::read_to_string(run.join("spcforc")).unwrap();
+    let second = |line: &str| match line.strip_prefix(" node= 19381") {
+        Some(rest) => format!("{line}\n node= 19382{rest}\n"),
+        None => format!("{line}\n"),
+    };
+    let two: String = text.lines().map(second).collect();
+    fs::write(run.join("spcforc"), two).unwrap();
+    crumple_ok(here, "init car -o two.toml --units SI");
+    assert!(study(here, "two.toml")["recipe"]["force"].get("id").is_none());
 }
 
 /// A body that falls through its impact takes more impulse than its mass times its change of speed.

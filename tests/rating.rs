@@ -239,7 +239,9 @@ fn parts_and_units_are_said() {
     write(here, "c.csv", "time_s,value", 200, |t| format!("{t:?},{:?}", 1e3 * pulse(t)));
     let of = rate(here, &["a.csv:a_m_per_s2[A1]", "c.csv:value"]);
     says(&of["warnings"].to_string(), "is 1000 times the reference throughout");
-    says(&of["warnings"].to_string(), "c.csv,scale=0.001");
+    says(&of["warnings"].to_string(), "write ,scale=0.001 after what names the prediction");
+    let of = rate(here, &["a.csv:a_m_per_s2[A1]", "c.csv:value,scale=1000"]);
+    says(&of["warnings"].to_string(), "write ,scale=0.001 after");
     let of = rate(here, &["a.csv:a_m_per_s2[A1]", "c.csv:value,scale=0.001"]);
     assert!(!of["warnings"].to_string().contains("throughout"), "{of}");
 }

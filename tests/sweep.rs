@@ -166,7 +166,7 @@ fn what_has_no_effect_is_refused() {
     let said = crumple_in(folder.0.path(), "sweep s.toml --dry-run");
     says(
         &String::from_utf8(said.stderr).unwrap(),
-        "the gap of curve \"inner\" is varied, but A1|A2 keeps that of its contact, train or vehicle",
+        "the gap of curve \"inner\" is varied, but not at A1|A2: there contact, train or vehicle states one",
     );
     let band = "what = \"band\", curve = \"nose\", values = [-1, 1]";
     let train = "[[train]]\nname = \"A\"\nspeed = \"36km/h\"\n";

@@ -223,7 +223,7 @@ pub(crate) fn validate_speeds(
         }
     };
     if let Some(kind) = fitting.iter().find(|kind| kind.name() == chosen) {
-        tables.add_further_ends(kind, &set);
+        tables.add_further_ends(kind, &set, scatter_of(declared));
     }
     let [band, band_outside] = tables.bands(&chosen, declared, scatter_of(declared));
     let [body_band, body_band_outside] = match declared {
@@ -383,7 +383,13 @@ impl Tables {
     }
 
     /// Adds residuals at ends of the set without its outermost one and two speeds on either side: two ends would be little evidence.
-    fn add_further_ends(&mut self, kind: &ModelKind, set: &TrainingSet) {
+    /// The rows of the ends then state what the band of all these holds of them.
+    fn add_further_ends(
+        &mut self,
+        kind: &ModelKind,
+        set: &TrainingSet,
+        scatter: Option<ForceScatter>,
+    ) {
         let Some(means) = self.means.iter().find(|m| m.model == kind.name()) else { return };
         if !set.features.is_empty() {
             return;
@@ -410,6 +416,11 @@ impl Tables {
         let own = self.residuals.entry(kind.name()).or_default();
         for (force, of) in residuals.into_iter().flatten() {
             own.entry((force, LeftOutSpeeds::Ends)).or_default().push(of);
+        }
+        let Some(ends) = own.get(&(set.force_kind, LeftOutSpeeds::Ends)) else { return };
+        let rows = self.rows.iter_mut().filter(|row| !row.inner && row.model == kind.name());
+        for (i, row) in rows.enumerate() {
+            row.coverage = band::coverage(LeftOutSpeeds::Ends, ends, i, scatter);
         }
     }
 

@@ -143,7 +143,7 @@ fn rests_on(band: &Band, in_range: bool) -> String {
         LeftOutSpeeds::Inner => {
             ("curve", "left out in turn, scaled to the interval between the neighbouring speeds")
         }
-        LeftOutSpeeds::Ends => ("end", "of the range left out, growing with the distance"),
+        LeftOutSpeeds::Ends => ("end", "left out in turn, growing with the distance"),
     };
     format!("{place}, from {} {how}", counted(band.curves, one))
 }

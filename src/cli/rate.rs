@@ -241,6 +241,12 @@ fn value_unit(column: &str) -> Option<ValueUnit> {
     units.filter(|(_, ways)| ways.split(' ').any(end)).map(|(unit, _)| unit).next()
 }
 
+/// A factor with six digits behind the point, but no zeros at the end.
+fn short(factor: f64) -> String {
+    let text = format!("{factor:.6}");
+    text.trim_end_matches('0').trim_end_matches('.').into()
+}
+
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if args.are_runs()? {
         args.refuse_of_signals()?;
@@ -279,13 +285,14 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         && of.phase < SAME_SHAPE
     {
         let times = 1.0 + of.magnitude;
-        let units = [1e3, 1e6, 1.0 / M_PER_S_PER_KM_PER_H, STANDARD_GRAVITY_M_PER_S2];
+        let mph = 0.44704;
+        let units = [1e3, 1e6, 1.0 / M_PER_S_PER_KM_PER_H, 1.0 / mph, STANDARD_GRAVITY_M_PER_S2];
         let factor = units.into_iter().flat_map(|size| [size, 1.0 / size]);
         if let Some(factor) = factor.into_iter().find(|f| (times / f - 1.0).abs() < SAME_SHAPE) {
             rating.warnings.push(format!(
-                "the prediction is {factor} times the reference throughout: if they are in different units, write the factor after the file's name: {},scale={}",
-                b.path().display(),
-                1.0 / factor
+                "the prediction is {} times the reference throughout: if they are in different units, write ,scale={} after what names the prediction",
+                short(factor),
+                short(b.address.scale / factor)
             ));
         }
     }

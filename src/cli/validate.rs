@@ -20,7 +20,7 @@ use crate::database::Database;
 use crate::dataset::{TrainingSet, is_same_speed};
 use crate::rating::acceptance::{ACCEPTANCE, Acceptance, STANDARD};
 use crate::surrogate::ModelKind;
-use crate::surrogate::band::{Band, LeftOutSpeeds, POWER_OF_GAP};
+use crate::surrogate::band::{self, Band, LeftOutSpeeds, POWER_OF_GAP};
 use crate::surrogate::leave_one_out::{
     Floor, LeftOut, PeakError, Scatter, SpeedScatter, Validation,
 };
@@ -363,20 +363,20 @@ fn print_summary(out: &mut dyn Write, validation: &Validation) -> io::Result<()>
     }
     print_acceptance(out, validation, "")?;
     for (force, band) in bands(validation) {
-        let span = km_per_h(band.span_m_per_s);
+        let width = band.pointwise_share * 100.0;
+        let digits = usize::from(width < 1.0);
         let place = match band.left_out {
-            LeftOutSpeeds::Inner => format!("between speeds {span} apart"),
-            LeftOutSpeeds::Ends => {
-                format!("{span} outside the range, around {}", around(band))
+            LeftOutSpeeds::Inner => {
+                let span = km_per_h(band.span_m_per_s);
+                format!("between speeds {span} apart: ±{width:.digits$} %")
             }
+            LeftOutSpeeds::Ends => format!("outside the range: {}", outside(validation, band)),
         };
         let coverage = match band.coverage {
             Some(share) => format!("covers {:.0} % of the left-out points", share * 100.0),
             None => "not checked".into(),
         };
-        let width = band.pointwise_share * 100.0;
-        let digits = usize::from(width < 1.0);
-        writeln!(out, "band of the {force} {place}: ±{width:.digits$} %, {coverage}")?;
+        writeln!(out, "band of the {force} {place}, {coverage}")?;
     }
     Ok(())
 }
@@ -477,7 +477,7 @@ fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
         writeln!(out, "{group}: {}", scatter_line(scatter))?;
     }
     for (force, band) in bands(validation) {
-        writeln!(out, "{group}: {}", band_line(force, band))?;
+        writeln!(out, "{group}: {}", band_line(validation, force, band))?;
     }
     Ok(())
 }
@@ -507,30 +507,31 @@ fn scatter_line(scatter: &Scatter) -> String {
     )
 }
 
-/// The speed around which a band is stated, in whole km/h.
-fn around(band: &Band) -> String {
-    km_per_h((band.around_m_per_s * 3.6).round() / 3.6)
+/// Half widths of a band of ends, as far outside as these lay: above and below the speeds of a validation.
+fn outside(validation: &Validation, band: &Band) -> String {
+    let of_model = validation.rows.iter().filter(|row| row.model == validation.chosen);
+    let speeds = of_model.clone().map(|row| row.speed_m_per_s);
+    let (low, high) =
+        speeds.fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(v), high.max(v)));
+    let span = band.span_m_per_s;
+    let width = |v: f64, distance: f64| {
+        let share = band.over(band::outside(&[low, high], v)?)?.pointwise_share;
+        Some(format!("±{} {}", percent(share), km_per_h(distance)))
+    };
+    // An end that was not left out is none of the rows.
+    let are_ends = of_model.filter(|row| !row.inner).count() == 2;
+    let below = span.min(0.5 * low);
+    match (width(high + span, span), width(low - below, below)) {
+        (Some(above), Some(under)) if are_ends => {
+            format!("{above} above {} and {under} below {}", km_per_h(high), km_per_h(low))
+        }
+        _ => format!("±{} {} away", percent(band.pointwise_share), km_per_h(span)),
+    }
 }
 
 /// A band of the validation around this force, with the span that it is stated for.
-fn band_line(force: &str, band: &Band) -> String {
-    let span = km_per_h(band.span_m_per_s);
-    let (of, place) = match band.left_out {
-        LeftOutSpeeds::Inner => (
-            "curve",
-            format!(
-                "between training speeds {span} apart around {}, otherwise scaled by the interval between the roots of both speeds to the power {POWER_OF_GAP}",
-                around(band)
-            ),
-        ),
-        LeftOutSpeeds::Ends => (
-            "end",
-            format!(
-                "{span} outside the training speeds around {}, elsewhere in proportion to the interval between the roots of both speeds but no narrower than inside",
-                around(band)
-            ),
-        ),
-    };
+fn band_line(validation: &Validation, force: &str, band: &Band) -> String {
+    let of = if band.left_out == LeftOutSpeeds::Inner { "curve" } else { "end" };
     let coverage = match band.coverage {
         Some(share) => format!(
             "covers {} of the points of the other left-out curves (calibration error {:.2}; ±{} for whole curves, which holds {:.0} of {})",
@@ -550,9 +551,21 @@ fn band_line(force: &str, band: &Band) -> String {
         ),
         None => String::new(),
     };
+    let of_what = format!("of the local {force}{parts}");
+    let widths = match band.left_out {
+        LeftOutSpeeds::Inner => format!(
+            "±{} {of_what} between training speeds {} apart around {}, otherwise scaled by the interval between the roots of both speeds to the power {POWER_OF_GAP}",
+            percent(band.pointwise_share),
+            km_per_h(band.span_m_per_s),
+            km_per_h((band.around_m_per_s * 3.6).round() / 3.6)
+        ),
+        LeftOutSpeeds::Ends => format!(
+            "{of_what} outside the training speeds {}, in proportion to the interval between the roots of both speeds but no narrower than inside",
+            outside(validation, band)
+        ),
+    };
     format!(
-        "band ±{} of the local {force}{parts} {place}; empirical range for {:.0} %, from {}; {coverage}",
-        percent(band.pointwise_share),
+        "band {widths}; empirical range for {:.0} %, from {}; {coverage}",
         band.level * 100.0,
         counted(band.curves, of)
     )

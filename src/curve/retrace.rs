@@ -265,7 +265,7 @@ impl MotionBuilder {
             let (stiffness_n_per_m, least_n_per_m) = (stiffness, f / d);
             // No stiffness that somebody knows is so far off, but a unit is.
             let remedy = match least_n_per_m > 10.0 * stiffness_n_per_m {
-                true => "check the units of its columns",
+                true => "check the units of the table and of the stiffness",
                 false => "give a stiffer one with --unloading",
             };
             return Err(error!(

@@ -181,14 +181,7 @@ impl Facts<'_> {
             let from = "the only force along the motion, and the bodies follow it";
             Proposed::found(source, Computed, from)
         } else {
-            let from = match &self.recipe.beside.larger {
-                Some(_) => {
-                    "of the forces along the motion, the one that the bodies follow most closely"
-                }
-                None => {
-                    "of the forces that the bodies follow, the one with the largest impulse along the motion"
-                }
-            };
+            let from = "of the walls and contacts (else supports and sections) that the bodies follow closely, the one with the largest impulse along the motion";
             Proposed::found(source, Guessed, from)
         }
     }
@@ -252,13 +245,12 @@ impl Facts<'_> {
                 percent(recipe.residual)
             ));
         }
-        if let (Some(force), Some(larger), None) =
-            (&recipe.force, &recipe.beside.larger, &self.hints.force)
+        if let (Some(larger), [node, ..], None) =
+            (&recipe.beside.larger, &recipe.nodes[..], &self.hints.force)
         {
             warnings.push(format!(
-                "force: {larger} has a far larger impulse than {}, which the body of node {} follows more closely: if several bodies move in a row, this is the force on that one alone, and its way against the ground; choose with --force and --node",
-                force.label(),
-                recipe.nodes.first().map_or(0, |node| node.id)
+                "force: {larger}, which the body of node {} follows more closely: if several bodies move in a row, this is the force on that one alone, and its way against the ground; choose with --force and --node",
+                node.id
             ));
         }
         let given = self.hints.mass_kg.zip(self.units.value()).map(|(kg, u)| kg / u.mass_kg);

@@ -57,7 +57,7 @@ pub(super) struct Beside {
     pub whole: f64,
     /// Others of the file act against it on the side that would be added, so that no recipe adds them.
     pub opposite: Vec<i64>,
-    /// Of any file, one with a far larger impulse, which the bodies follow less closely.
+    /// Which force has a larger impulse that the bodies follow less closely, in words.
     pub larger: Option<String>,
 }
 
@@ -413,6 +413,8 @@ fn chosen_force(views: &[RunView<'_>]) -> Option<(ForceCandidate, Vec<Alternativ
         .filter_map(|(k, other)| Some((other, of_force(first, k, None)?.residual)))
         .filter(|(_, residual)| *residual < RELATED)
         .collect();
+    let own = first.force(force.file, &force.ids).and_then(|k| of_force(first, k, None));
+    let own_left = own.map_or(1.0, |own| own.residual);
     let last = |force: &ForceCandidate| force.impulse.last().copied().unwrap_or(0.0);
     let shares = others.iter().filter(|(other, residual)| {
         let is_contact = ["rwforc", "rcforc"].contains(&force.file);
@@ -427,9 +429,17 @@ fn chosen_force(views: &[RunView<'_>]) -> Option<(ForceCandidate, Vec<Alternativ
         opposite: opposite.iter().flat_map(|other| &other.ids).copied().collect(),
         larger: others
             .iter()
-            .map(|(other, _)| *other)
-            .find(|other| other.size() > LARGER * force.size())
-            .map(ForceCandidate::label),
+            .find(|(other, left)| {
+                other.size() > LARGER * force.size() && *left > LESS_CLOSELY * own_left
+            })
+            .map(|(other, _)| {
+                let times = percent(other.size() / force.size());
+                format!(
+                    "the impulse of {} is {times} % of that of {}",
+                    other.label(),
+                    force.label()
+                )
+            }),
     };
     let others = others
         .into_iter()
@@ -482,8 +492,9 @@ pub(super) const RELATED: f64 = 0.3;
 const WORTH: f64 = 0.8;
 /// A sum leaves at most this much more than the part of it that the bodies follow best: as a factor and of the impulse.
 const NO_WORSE: (f64, f64) = (1.1, 0.002);
-/// A force that is so many times larger than the one that the bodies follow acts on more than these.
+/// A force that is so many times larger than the chosen one, and leaves so many times more, acts on more than the bodies.
 const LARGER: f64 = 1.2;
+const LESS_CLOSELY: f64 = 1.5;
 /// What printed digits leave.
 const ROUNDED: f64 = 2e-3;
 /// A body that leaves less of an impulse follows it too closely for another interface's to show.
@@ -586,7 +597,7 @@ pub(super) fn best_of(survey: &Survey, kind: Option<StudyKind>) -> Option<Explan
     let [contacts, bodies, sections] = [&["rwforc", "rcforc"][..], &["rbdout"], &["secforc"]];
     let other = largest(contacts).or_else(|| largest(bodies)).or_else(|| largest(sections));
     // Of several supports each has a part of the reaction.
-    let is_one = explained.iter().filter(|(force, _)| force.file == "spcforc").count() == 1;
+    let is_one = survey.forces.iter().filter(|force| force.file == "spcforc").count() == 1;
     other.or_else(|| largest(&["spcforc"]).filter(|_| is_one))
 }
 

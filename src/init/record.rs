@@ -71,6 +71,7 @@ impl Record {
         let read = motion.read(Some(ids), &[direction.name(), direction.velocity()])?;
         let states = rising(&read.time);
         let mut damage = damage(motion, read.problems.first());
+        let damage_of_motion = bracketed(damage.first().map(String::as_str));
         let (mut velocities, mut travels) = (Vec::new(), Vec::new());
         for node in &recipe.nodes {
             let entity = Some(EntityId::new(node.id));
@@ -133,9 +134,8 @@ impl Record {
             damage.extend(self::damage(source, read.problems.first()));
         }
         if velocities.iter().flatten().chain(&travel).any(|v| !v.is_finite()) {
-            let damage = bracketed(damage.first().map(String::as_str));
             let what = "the motion of its nodes holds values that are not numbers";
-            return unusable(&format!("{what}{damage}"));
+            return unusable(&format!("{what}{damage_of_motion}"));
         }
         let record = Self {
             run,

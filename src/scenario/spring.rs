@@ -253,7 +253,7 @@ impl Spring {
                 (1..=100).map(|k| f64::from(k) / 100.0).filter(is_softer).fold(0.0, f64::max);
             if asked >= secant && until > MENTIONED {
                 warnings.push(format!(
-                    "unloading {} is softer than the line from the origin to the first stage's force up to a crush of {:.0} mm: until there it unloads along that line",
+                    "unloading {} would return more than the first stage has absorbed, until it is crushed by {:.0} mm: up to there it unloads along the line to the origin, which is steeper",
                     Shown::one_stiffness(asked),
                     until * stroke_m * 1e3
                 ));

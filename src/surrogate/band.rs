@@ -23,7 +23,7 @@
 //!
 //! Outside the training speeds, the band is based on left-out ends, in proportion to the distance by the roots of the speeds: those of
 //! all speeds, and those that are left without the outermost one or two. Over as many m/s the runs below the range differ more
-//! than those above it: by the speeds themselves bands above vehicle-pair were ±85 %, where the fastest run is off by 9 %. Further outside than
+//! than those above it. Further outside than
 //! a third of the range, a prediction needs `--extrapolate`. In multi-body runs this is only a warning: inside a train,
 //! interfaces close far more slowly than any run by itself.
 
@@ -53,7 +53,7 @@ pub(crate) enum LeftOutSpeeds {
     /// Speeds between others: for queries between training speeds.
     #[default]
     Inner,
-    /// The lowest and the highest: for queries outside the training speeds.
+    /// Ends of the range, and of the range without its outermost speeds: for queries outside the training speeds.
     Ends,
 }
 
@@ -94,7 +94,7 @@ pub struct Band {
     pub(crate) left_out: LeftOutSpeeds,
     /// What the half widths below hold for. `inner`: distance of the two training speeds that a
     /// query lies between, and the widths scale with its power 0.5; `ends`: distance to the
-    /// nearest training speed, and they are in proportion to it.
+    /// nearest training speed, and they are in proportion to it at the same `around_m_per_s`.
     pub span_m_per_s: f64,
     /// Middle of those two speeds; over equal distances the widths are in proportion to its power −0.25, for `ends` −0.5.
     /// 0 for `ends` of earlier versions, where only the distance counts.
@@ -177,10 +177,10 @@ impl Gap {
         let faster = self.around_m_per_s / other.around_m_per_s;
         match left_out {
             // √b − √a is about (b − a)/(2√middle).
-            // 0 in ends of earlier versions.
             _ if faster > 0.0 && faster.is_finite() => {
                 (wider / faster.sqrt()).powf(left_out.power())
             }
+            // Ends of earlier versions state no middle.
             _ => wider.powf(left_out.power()),
         }
     }

@@ -182,7 +182,7 @@ impl Sweep {
             let (_, others) = scenario::takes_gap_of(&scenario, curve)?;
             base.warnings.extend((!others.is_empty()).then(|| {
                 format!(
-                    "the gap of curve \"{curve}\" is varied, but {} keeps that of its contact, train or vehicle",
+                    "the gap of curve \"{curve}\" is varied, but not at {}: there contact, train or vehicle states one",
                     others.join(", ")
                 )
             }));

@@ -143,8 +143,7 @@ impl Quantity {
             let is_its = is_one(&dimension.trim().to_ascii_lowercase(), self.terms().stated);
             return size.filter(|size| is_its && *size > 0.0);
         }
-        // Micro is a separate letter in non-ASCII texts.
-        self.terms().dimension.size_of(&unit.replace(['µ', 'μ'], "u"))
+        self.terms().dimension.size_of(unit)
     }
 
     /// The same, or what is wrong with the unit.
