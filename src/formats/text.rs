@@ -12,6 +12,9 @@ pub(super) use line;
 
 /// Nine significant digits in Fortran's form: `3.80000000E+06`.
 pub(crate) fn nine_digits(value: f64) -> String {
+    if let Some(text) = rounded_at_once(value) {
+        return text;
+    }
     let mut text = String::with_capacity("-3.80000000E-100".len());
     // A negative zero would only puzzle readers.
     line!(text, "{:.8E}", value + 0.0);
@@ -26,6 +29,33 @@ pub(crate) fn nine_digits(value: f64) -> String {
         }
     }
     text
+}
+
+/// The same of usual sizes, of which a product with an exact power of ten decides the digits; `None` where rounding of the
+/// product could, and of zero.
+fn rounded_at_once(value: f64) -> Option<String> {
+    let size = value.abs();
+    if !(1e-9..1e12).contains(&size) {
+        return None;
+    }
+    let exponent = size.log10().floor() as i32;
+    let power = 10_f64.powi((8 - exponent).abs());
+    let scaled = if exponent <= 8 { size * power } else { size / power };
+    let digits = scaled.round();
+    if !(1e8..1e9).contains(&digits) || (scaled - digits).abs() > 0.5 - 1e-6 {
+        return None;
+    }
+    let mut text = *b"-0.00000000E+00";
+    let digit = |rest: u32| b'0' + (rest % 10) as u8;
+    let mut rest = digits as u32;
+    for k in [10, 9, 8, 7, 6, 5, 4, 3, 1] {
+        text[k] = digit(rest);
+        rest /= 10;
+    }
+    text[12] = if exponent < 0 { b'-' } else { b'+' };
+    (text[13], text[14]) = (digit(exponent.unsigned_abs() / 10), digit(exponent.unsigned_abs()));
+    let text = if value < 0.0 { &text[..] } else { &text[1..] };
+    std::str::from_utf8(text).ok().map(String::from)
 }
 
 /// A title of at most `width` characters that no keyword reader misreads: ASCII, no comma
@@ -88,6 +118,19 @@ mod tests {
         assert_eq!(nine_digits(-1.0 / 3.0), "-3.33333333E-01");
         assert_eq!(nine_digits(-0.0), "0.00000000E+00");
         assert_eq!(nine_digits(1e-120), "1.00000000E-120");
+        // As the library rounds them: of any size, ties, and powers of ten with their neighbours.
+        let powers = (-12..14).map(|n| 10_f64.powi(n));
+        let near =
+            powers.flat_map(|x| [x, x.next_down(), x.next_up(), 1.000000005 * x, 9.999999995 * x]);
+        let any = (0..200_000).map(|k| (f64::from(k) * 0.731).sin() * 10_f64.powi(k % 24 - 11));
+        let ties = (0..1000).map(|k| f64::from(k) + 123_456_789.5);
+        for value in near.chain(any).chain(ties).flat_map(|x| [x, -x]) {
+            let exact = format!("{:.8E}", value + 0.0);
+            let (mantissa, exponent) = exact.split_once('E').unwrap();
+            let exponent: i32 = exponent.parse().unwrap();
+            let sign = if exponent < 0 { '-' } else { '+' };
+            assert_eq!(nine_digits(value), format!("{mantissa}E{sign}{:02}", exponent.abs()));
+        }
     }
 
     #[test]
