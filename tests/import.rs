@@ -571,6 +571,7 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
     let cases = [
         (&["--kind", "wall", "--mass", "240t", "--speed", &v][..], "nose.csv: the curve absorbs 0.1000 times the kinetic energy of 240.0 t"),
         (&["--kind", "wall", "--mass", "24t", "--speed", &v, "--unloading", "1MN/m"][..], "is softer than the line from the maximum deflection"),
+        (&["--kind", "wall", "--mass", "24t", "--speed", &v, "--unloading", "8kN/m"][..], "check the units of the table and of the stiffness"),
     ];
     cases.into_iter().for_each(|(more, expected)| t(1, more, expected));
     // The second file is missing: the first is not written either.

@@ -1611,6 +1611,29 @@ fn damage_does_not_choose() {
     assert!(!here.join("none.toml").exists());
 }
 
+/// A wall whose force grows over that of a contact, as of a body that another one runs into: the contact alone is followed closely.
+#[test]
+fn a_larger_force_is_named() {
+    let history = Crash::default().run();
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let run = here.join("car/a");
+    let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
+    layout.nodout(&run, &history, &car_nodes());
+    let grows = |(i, f): (usize, &f64)| f * (1.0 + 0.01 * i as f64);
+    let wall_n: Vec<f64> = history.contact_n.iter().enumerate().map(grows).collect();
+    let force = |along_n| Force { id: 1, title: "", along_n, across_n: 0.0 };
+    layout.rwforc(&run, &history, &[force(&wall_n)]);
+    layout.rcforc(&run, &history, &[force(&history.contact_n)]);
+    let said = warned(here, "init car -o s.toml");
+    says(&said, "force: the impulse of rwforc 1 is ");
+    says(&said, "% of that of rcforc 1, which the body of node ");
+    assert_eq!(study(here, "s.toml")["recipe"]["force"]["file"].as_str(), Some("rcforc"));
+    // Named, it is not asked about.
+    let said = warned(here, "init car --force rcforc:1 -o named.toml");
+    assert!(!said.contains("the impulse of rwforc 1"), "{said}");
+}
+
 /// A wall of fixed nodes is known by its reaction, and the mass by the energies of the parts.
 #[test]
 fn a_support_may_be_the_wall() {
