@@ -1,6 +1,6 @@
 //! The command line tool: arguments in, exit code out. See `cli`.
 
-// The allocator of musl, with which the released program for Linux is linked, takes twice the time.
+// The released program for Linux is linked with musl, whose own allocator is slow.
 #[cfg(target_env = "musl")]
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;

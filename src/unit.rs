@@ -23,6 +23,9 @@ use crate::guess;
 /// Metres per second in one kilometre per hour.
 pub(crate) const M_PER_S_PER_KM_PER_H: f64 = 1.0 / 3.6;
 
+/// Metres per second in one mile per hour.
+pub(crate) const M_PER_S_PER_MPH: f64 = 0.44704;
+
 /// What a speed is measured against. A speed is never stated without it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
@@ -175,7 +178,7 @@ pub(crate) const SPEED: Dimension = Dimension {
         ("m/s", 1.0),
         ("mm/ms", 1.0),
         ("mm/s", 1e-3),
-        ("mph", 0.44704),
+        ("mph", M_PER_S_PER_MPH),
     ],
 };
 /// Masses, in kg inside.

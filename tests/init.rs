@@ -1677,6 +1677,12 @@ fn a_support_may_be_the_wall() {
     fs::write(run.join("spcforc"), two).unwrap();
     crumple_ok(here, "init car -o two.toml --units SI");
     assert!(study(here, "two.toml")["recipe"]["force"].get("id").is_none());
+    // Beside a wall supports are not looked at.
+    let wall = Force { id: 1, title: "", along_n: &history.contact_n, across_n: 0.0 };
+    Layout { units: SI, axis: 0, sign: 1.0 }.rwforc(&run, &history, &[wall]);
+    crumple_ok(here, "init car -o wall.toml --units SI");
+    let text = fs::read_to_string(here.join("wall.toml")).unwrap();
+    assert!(text.contains("file = \"rwforc\"") && !text.contains("spcforc"), "{text}");
 }
 
 /// A body that falls through its impact takes more impulse than its mass times its change of speed.

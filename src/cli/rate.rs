@@ -16,7 +16,7 @@ use crate::rating::iso18571::Iso18571;
 use crate::rating::{self, Quantity, Rating, RatingSettings, Signal};
 use crate::solver::{self, Selection, WantedId};
 use crate::table::Table;
-use crate::unit::{M_PER_S_PER_KM_PER_H, Shown, TIME};
+use crate::unit::{M_PER_S_PER_KM_PER_H, M_PER_S_PER_MPH, Shown, TIME};
 use crate::{file, formats};
 
 /// Maximum number of bytes of a table that is rated: some million rows.
@@ -219,7 +219,7 @@ const VALUE_UNITS: [(ValueUnit, &str); 12] = [
     (("m/s", "m/s", 1.0), "m_per_s m/s"),
     (("mm/s", "m/s", 1e-3), "mm_per_s mm/s"),
     (("km/h", "m/s", M_PER_S_PER_KM_PER_H), "km_per_h km/h kmh kph"),
-    (("mph", "m/s", 0.44704), "mph"),
+    (("mph", "m/s", M_PER_S_PER_MPH), "mph"),
     (("m", "m", 1.0), "m"),
     (("mm", "m", 1e-3), "mm"),
     (("N", "N", 1.0), "n"),
@@ -285,8 +285,13 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         && of.phase < SAME_SHAPE
     {
         let times = 1.0 + of.magnitude;
-        let mph = 0.44704;
-        let units = [1e3, 1e6, 1.0 / M_PER_S_PER_KM_PER_H, 1.0 / mph, STANDARD_GRAVITY_M_PER_S2];
+        let units = [
+            1e3,
+            1e6,
+            1.0 / M_PER_S_PER_KM_PER_H,
+            1.0 / M_PER_S_PER_MPH,
+            STANDARD_GRAVITY_M_PER_S2,
+        ];
         let factor = units.into_iter().flat_map(|size| [size, 1.0 / size]);
         if let Some(factor) = factor.into_iter().find(|f| (times / f - 1.0).abs() < SAME_SHAPE) {
             rating.warnings.push(format!(

@@ -518,7 +518,7 @@ fn outside(validation: &Validation, band: &Band) -> String {
         let share = band.over(band::outside(&[low, high], v)?)?.pointwise_share;
         Some(format!("±{} {}", percent(share), km_per_h(distance)))
     };
-    // An end that was not left out is none of the rows.
+    // An end that was not left out has no row.
     let are_ends = of_model.filter(|row| !row.inner).count() == 2;
     let below = span.min(0.5 * low);
     match (width(high + span, span), width(low - below, below)) {

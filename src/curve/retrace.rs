@@ -263,7 +263,7 @@ impl MotionBuilder {
         let (ends, moving_ends) = (f / stiffness, moving / body);
         if ends.max(moving_ends) > d * (1.0 + 1e-9) {
             let (stiffness_n_per_m, least_n_per_m) = (stiffness, f / d);
-            // No stiffness that somebody knows is so far off, but a unit is.
+            // So far off, a unit is wrong rather than the stiffness.
             let remedy = match least_n_per_m > 10.0 * stiffness_n_per_m {
                 true => "check the units of the table and of the stiffness",
                 false => "give a stiffer one with --unloading",

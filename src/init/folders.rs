@@ -13,6 +13,7 @@ use crate::guess;
 use crate::solver::decks::{self, Search};
 use crate::solver::runs::{renamed_file, run_folders};
 use crate::study::files::shown_name;
+use crate::unit::M_PER_S_PER_MPH;
 
 /// Folders of runs, and those that are none.
 pub(super) struct Folders {
@@ -183,7 +184,7 @@ pub(super) fn speed_in(name: &str) -> Option<f64> {
         let km_per_h = ["kmh", "kmph", "kph"].iter().any(|known| unit.starts_with(known));
         let factor = match () {
             () if km_per_h => 1.0 / 3.6,
-            () if unit.starts_with("mph") => 0.44704,
+            () if unit.starts_with("mph") => M_PER_S_PER_MPH,
             () => continue,
         };
         return number.parse::<f64>().ok().filter(|v| *v > 0.0).map(|v| v * factor);

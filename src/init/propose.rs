@@ -148,7 +148,7 @@ fn refuse_hints(
         if known.contains(&format!("{file} {ids}")) {
             return Err(error!(
                 Study,
-                "{file} {ids} does not drive two bodies of a run apart, as a pair needs: nodes that start with one velocity count as one body: use --kind wall with the node of one of them"
+                "{file} {ids} does not drive two bodies of a run apart, as a pair needs (nodes that start with one velocity count as one body): use --kind wall with the node of one of them"
             ));
         }
         let known = match known.len() {

@@ -57,7 +57,7 @@ pub(super) struct Beside {
     pub whole: f64,
     /// Others of the file act against it on the side that would be added, so that no recipe adds them.
     pub opposite: Vec<i64>,
-    /// Which force has a larger impulse that the bodies follow less closely, in words.
+    /// A force with a larger impulse, which the bodies follow less closely, as a warning says it.
     pub larger: Option<String>,
 }
 
@@ -492,7 +492,7 @@ pub(super) const RELATED: f64 = 0.3;
 const WORTH: f64 = 0.8;
 /// A sum leaves at most this much more than the part of it that the bodies follow best: as a factor and of the impulse.
 const NO_WORSE: (f64, f64) = (1.1, 0.002);
-/// A force that is so many times larger than the chosen one, and leaves so many times more, acts on more than the bodies.
+/// A force with an impulse so many times larger than the chosen one's, and a residual so many times larger, acts on other bodies, too.
 const LARGER: f64 = 1.2;
 const LESS_CLOSELY: f64 = 1.5;
 /// What printed digits leave.

@@ -57,7 +57,11 @@ impl Sources {
         let files = solver::runs::output_files(folder).map_err(|error| unreadable(&error))?;
         let (mut listed, mut unread) = (Vec::new(), Vec::new());
         let names_only = Selection { audit: false, ..Selection::nothing() };
-        for path in files.iter().filter(|path| is_looked_at(path)) {
+        let is = |path: &Path, name: &str| without_job_id(&shown_name(path)) == name;
+        // As large as a file of forces: read only where it is needed.
+        let has_energy = files.iter().any(|path| is(path, ENERGIES[0]));
+        let is_needed = |path: &&PathBuf| !(has_energy && is(path, ENERGIES[1]));
+        for path in files.iter().filter(|path| is_looked_at(path)).filter(is_needed) {
             match solver::read_sections(path, None, &names_only) {
                 Ok(sections) => listed.push((path.clone(), sections)),
                 Err(error) => unread.push(error.to_string()),

@@ -31,7 +31,7 @@ const STANDS: f64 = 0.02;
 const CHANGED: f64 = 0.95;
 /// Forces of a run that are kept, those with the largest impulse.
 const KEPT_FORCES: usize = 12;
-/// Of values that are not numbers one in so many is few.
+/// A record may lack one value in so many.
 const FEW: usize = 20;
 /// A wall's normal force is taken if its impulse differs from that along the motion by less.
 const SAME_IMPULSE: f64 = 0.02;
@@ -117,6 +117,11 @@ impl Survey {
         let (direction, aligned) = direction(&starts)?;
         let mut forces = Vec::new();
         for source in &sources.forces {
+            // Hundreds of supports would stand before smaller contacts: they count where nothing else acts, or by name.
+            let is_named = named.iter().any(|(file, _)| file == source.name);
+            if source.name == "spcforc" && !forces.is_empty() && !is_named {
+                continue;
+            }
             forces.extend(force_candidates(source, direction, &time, named)?);
         }
         keep_largest(&mut forces, named);
@@ -181,8 +186,8 @@ pub(super) fn bracketed(damage: Option<&str>) -> String {
     damage.map_or(String::new(), |damage| format!(" ({damage})"))
 }
 
-/// Values of which few are not numbers, each of these with the one before it in its place: damage is reported of what is
-/// chosen, and must not decide what that is. `None` if they are many.
+/// Values with each one that is not a number replaced by the one before it: damage is reported once a node or force is chosen,
+/// and must not decide which. `None` if many are not numbers.
 fn mended(mut values: Vec<f64>) -> Option<Vec<f64>> {
     let lost = values.iter().filter(|v| !v.is_finite()).count();
     if lost * FEW > values.len() {
@@ -196,8 +201,8 @@ fn mended(mut values: Vec<f64>) -> Option<Vec<f64>> {
     Some(values)
 }
 
-/// How each node starts, and the times that rise. Without nodes that have no velocities, or few that are
-/// numbers: these did not live long.
+/// How each node starts, and the times that rise. Without nodes whose velocities are
+/// missing, or mostly not numbers: these did not live long.
 fn starts(
     source: &Source,
     each_node: &mut EachBatch<'_>,
