@@ -436,6 +436,6 @@ fn wrong_ends_are_refused() {
     fails(
         "nose = { model = \"lead-car-wall.model\" }",
         rate,
-        "law belongs to a model, which has a rate",
+        "law belongs to the curve of a model, whose force follows the rate",
     );
 }

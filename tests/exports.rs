@@ -808,6 +808,7 @@ fn what_is_said_of_an_import_and_what_its_file_says() {
     let added = add("uneven.csv", "pair", &[]).to_string();
     let shown = crumple_ok(here, "db ls said.h5 --json");
     assert!(shown.contains("\"other_mass_kg\": 22000.0"), "{added} {shown}");
+    says(&crumple_ok(here, "db ls said.h5"), "20.24 t on 22.00 t");
     let said =
         add("pair.csv", "wall", &["--kind", "wall", "--unloading", "30MN/m", "--accept-energy"]);
     let said = said.to_string();
@@ -941,6 +942,91 @@ fn the_targets_rebound_is_said() {
         );
     }
     assert!((work("soft.csv") / work("hard.csv") - 1.0).abs() < 1e-3);
+}
+
+/// A curve rebounds by the energy of its own unloading branch, not by a slope of it; and no spring gives back more than
+/// crumple's own law, which unloads no less steeply than a curve rises.
+#[test]
+fn curves_give_back_the_energy_of_their_unloading() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let facts = "# force_kind: body\n# speed_kind: wall\n# speed_m_per_s: 10\n";
+    let falling = "0,0\n0.1,1.0e6\n0.3,1.5e6\n0.5,2.0e6\n0.495,0.2e6\n0.40,0\n";
+    let file = format!("{facts}# mass_kg: 13000\nd_m,force_N\n{falling}");
+    fs::write(here.join("press.csv"), file).unwrap();
+    // 15.0 kJ of the 650 kJ come back.
+    let restitution = (15.0_f64 / 650.0).sqrt();
+    let asked = "db add press.h5 press.csv --group g";
+    crumple_ok(here, asked);
+    for source in ["file = \"press.csv\"", "database = \"press.h5\"\ncase = \"g/press\""] {
+        let text = format!(
+            "[run]\nduration = \"300ms\"\n[curves.k]\n{source}\n[[train]]\nname = \"A\"\nspeed = \"10m/s\"\nvehicles = [ {{ name = \"A1\", mass = \"13t\" }} ]\n[wall]\n[contact]\ncurve = \"k\"\n"
+        );
+        fs::write(here.join("press.toml"), text).unwrap();
+        let run: Value =
+            serde_json::from_str(&crumple_ok(here, "simulate press.toml --json -q")).unwrap();
+        let found = run["summary"]["interfaces"][0]["restitution"].as_f64().unwrap();
+        assert!((found / restitution - 1.0).abs() < 2e-3, "{source}: {found}");
+    }
+    let exported = export_notes(here, "press.csv", &["-o", "press-again.csv"]);
+    let text = fs::read_to_string(here.join("press-again.csv")).unwrap();
+    says(&text, "# unloading_stiffness_N_per_m: 1.33333333E+08\n");
+    assert!(!exported.contains("restitution"), "{exported}");
+    let file = format!(
+        "{facts}# mass_kg: 10000\n# unloading_stiffness_N_per_m: 5e6\nd_m,force_N\n0,0.5e6\n0.1,1.0e6\n0.3,1.5e6\n0.4,2.0e6\n"
+    );
+    fs::write(here.join("soft.csv"), file).unwrap();
+    for material in ["mat121", "s06"] {
+        let notes = export_notes(here, "soft.csv", &["--material", material, "-o", "soft.k"]);
+        says(&notes, "(it unloads with 7.8 MN/m), 0.894 in crumple's own runs");
+        says(&notes, "restitution 0.894 in LS-DYNA's");
+    }
+}
+
+/// A table that is said to hold the contact force does not become one of the force that moves the body; and a recorded contact
+/// force lets a body of one mass rebound as its run does.
+#[test]
+fn contact_forces_stay_contact_forces() {
+    let folder = demo_folder();
+    let here = folder.path();
+    export(here, "lead50.json", "contact.csv", &["--force", "contact", "--tail", "none"]);
+    let error = crumple_fails(here, 2, &["export", "contact.csv", "-o", "body.k"]);
+    says(&error, "its file states a contact force without times): use --force contact");
+    let said = export_notes(here, "contact.csv", &["--force", "contact", "-o", "again.csv"]);
+    says(&fs::read_to_string(here.join("again.csv")).unwrap(), "# force_kind: contact\n");
+    assert!(!said.contains("[case_warning]"), "{said}");
+    let output = crumple_in(here, "db add contact.h5 contact.csv --group g --strict");
+    assert_eq!(output.status.code(), Some(3));
+    says(&String::from_utf8_lossy(&output.stderr), "force: only the contact force is known");
+    let text = "[run]\nduration = \"300ms\"\n[curves.k]\ndatabase = \"curves.h5\"\ncase = \"lead-car-wall/72kmh\"\nforce = \"contact\"\n[[train]]\nname = \"A\"\nspeed = \"72km/h\"\nvehicles = [ { name = \"A1\", mass = \"24t\" } ]\n[wall]\n[contact]\ncurve = \"k\"\n";
+    fs::write(here.join("recorded.toml"), text).unwrap();
+    let run: Value =
+        serde_json::from_str(&crumple_ok(here, "simulate recorded.toml --json -q")).unwrap();
+    let found = run["summary"]["interfaces"][0]["restitution"].as_f64().unwrap();
+    let database = crumple::database::Database::read(&here.join("curves.h5")).unwrap();
+    let cases = database.cases("lead-car-wall");
+    let case = cases.iter().find(|case| case.id.name == "72kmh").unwrap();
+    let rebound = case.curves.closing_speed_m_per_s.iter().fold(0.0, |a: f64, v| a.min(*v));
+    let recorded = -rebound / case.conditions.speed.m_per_s;
+    assert!((found / recorded - 1.0).abs() < 0.03, "{found} for {recorded}");
+}
+
+/// The steepest rise of a table is not that of a jump, whose width crumple chooses; and the bottoming ends at three times the peak.
+#[test]
+fn a_jump_is_not_a_stiffness() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let table = "d_m,force_N\n0,0\n0.06,0.6e6\n0.06,1.2e6\n0.45,1.2e6\n";
+    fs::write(here.join("jump.csv"), table).unwrap();
+    let of = ["--speed", "5m/s", "--kind", "wall", "--mass", "40t", "-o", "out.csv"];
+    let output = crumple_in(here, &[&["export", "jump.csv"], &of[..]].concat());
+    let said = String::from_utf8_lossy(&output.stderr);
+    says(&said, "the steepest rise, 10.0 MN/m, is used");
+    assert_eq!(said.matches("the steepest rise, 10.0 MN/m").count(), 1, "{said}");
+    export(here, "jump.csv", "stiff.csv", &[&of[..6], &["--unloading", "9000MN/m"]].concat());
+    let text = fs::read_to_string(here.join("stiff.csv")).unwrap();
+    let force = |row: &str| row.split(',').nth(1).unwrap().parse::<f64>().unwrap();
+    assert!((force(text.lines().last().unwrap()) / 3.6e6 - 1.0).abs() < 1e-6, "{text}");
 }
 
 /// What a format says it can hold it holds, and what it does not say is refused.

@@ -207,7 +207,7 @@ fn no_unwrap_outside_tests() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 83428), ("files", 306), ("public types", 165), ("error types", 9)];
+    [("lines", 83582), ("files", 306), ("public types", 165), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {

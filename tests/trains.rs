@@ -884,6 +884,23 @@ fn a_curve_file_of_any_format_drives_an_interface() {
     std::fs::write(here.join("t.csv"), format!("time_ms,d_mm,force_kN\n{rows}")).unwrap();
     let (found, warnings) = crush("t.csv", "");
     assert!(found > 0.5 && warnings.contains("record over time"), "{found} {warnings}");
+    // Its body may fly back by more than it was crushed: half a sine of 120 ms, 0.3 m and 2.4 MN.
+    std::fs::write(here.join("line.csv"), "d_mm,F_kN\n0,0\n150,1200\n200,1600\n300,2400\n")
+        .unwrap();
+    let (expected, _) = crush("line.csv", "");
+    for sign in [1.0, -1.0] {
+        let row = |i: u32| {
+            let ms = f64::from(i) * 0.5;
+            let flown = -7.853_98 * (ms - 120.0);
+            let crushed = 300.0 * (std::f64::consts::PI * ms / 120.0).sin();
+            let d = if ms > 120.0 { flown } else { crushed };
+            format!("{ms},{},{}\n", sign * d, sign * (8.0 * d).max(0.0))
+        };
+        let rows: String = (0..=360).map(row).collect();
+        std::fs::write(here.join("back.csv"), format!("time_ms,d_mm,force_kN\n{rows}")).unwrap();
+        let (found, _) = crush("back.csv", "");
+        assert!((found / expected - 1.0).abs() < 0.01, "{found} m for {expected} m");
+    }
 }
 
 /// A train crushes its noses further than any FE run: the moment an interface leaves the data of its

@@ -419,6 +419,14 @@ class Curve:
         self.band_level = None if of is None else of["level"]
         self.warnings = document.get("warnings", [])
 
+    def __setattr__(self, name, value):
+        if name in self.__dict__:
+            raise AttributeError(
+                f"{name} is that of the document, which is what is exported: "
+                "give a changed one, crumple.Curve({**curve.document, 'force_N': list(...)})"
+            )
+        super().__setattr__(name, value)
+
     def to_pandas(self):
         """A DataFrame over deflection: force, body_force and their bands (force_low, ...), where they are known."""
         import pandas as pd

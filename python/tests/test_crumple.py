@@ -86,6 +86,10 @@ def test_what_is_exported_cannot_be_changed_by_its_arrays():
     for values in (curve.force, curve.deflection, curve.body_force, *curve.band):
         with pytest.raises(ValueError, match="read-only"):
             values[:] = 1.0
+    with pytest.raises(AttributeError, match="^force is that of the document"):
+        curve.force = 1.2 * curve.force
+    worse = crumple.Curve({**curve.document, "force_N": list(1.2 * curve.force)})
+    assert np.array_equal(pickle.loads(pickle.dumps(worse)).force, 1.2 * curve.force)
 
 
 @pytest.mark.parametrize("speed", [np.array([10.0, 12.0]), [10.0]])

@@ -8,7 +8,7 @@ use crate::multibody::{Run, STANDARD_GRAVITY_M_PER_S2};
 use crate::plot::{Axis, Band, Chart, Panel, Series, Shown};
 use crate::rating::acceptance::StageRecord;
 use crate::scenario::{PLATES, Prepared};
-use crate::signal::cfc;
+use crate::signal::{CfcError, cfc};
 
 /// What of a run is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -130,6 +130,14 @@ impl Motion {
                     error!(Plot, "line {line}, column {at}: expected a number, found \"{found}\"")
                 })?);
             }
+            if let [.., before, time] = columns[0][..]
+                && time <= before
+            {
+                return Err(error!(
+                    Plot,
+                    "line {line}, column 1: expected a time after {before} s, found {time}: rows must be in the order of time"
+                ));
+            }
         }
         if columns[0].is_empty() {
             return Err(error!(Plot, "there are no rows below the header: was the run stopped?"));
@@ -227,6 +235,17 @@ impl Motion {
         stages.collect()
     }
 
+    /// Whether it has values of a quantity, of any body or interface.
+    fn holds(&self, quantity: Quantity) -> bool {
+        let (mut bodies, mut interfaces) = (self.bodies.iter(), self.interfaces.iter());
+        match quantity {
+            Quantity::Velocity => bodies.any(|body| !body.v_m_per_s.is_empty()),
+            Quantity::Acceleration => bodies.any(|body| !body.a_m_per_s2.is_empty()),
+            Quantity::Crush => interfaces.any(|of| !of.deflection_m.is_empty()),
+            Quantity::Force | Quantity::Energy => interfaces.any(|of| !of.force_n.is_empty()),
+        }
+    }
+
     /// Bodies or interfaces by name, with whether each is drawn without being asked for.
     fn names(&self, of_interfaces: bool) -> Vec<(&str, bool)> {
         if of_interfaces {
@@ -251,7 +270,7 @@ pub(crate) const USUAL_CLASS: u32 = 60;
 /// frequency class of SAE J211-1. More than six lines are drawn in a panel per body or interface.
 ///
 /// # Errors
-/// For a name that no run has, and for energies where a result does not hold them.
+/// For a name that no run has, and for quantities that no result holds.
 pub fn motion(
     title: &str,
     runs: &[(String, Motion)],
@@ -259,6 +278,15 @@ pub fn motion(
     chosen: &[String],
     filter_class: u32,
 ) -> Result<Chart, Error> {
+    if let Some((name, _)) = runs.iter().find(|(_, run)| !run.holds(quantity)) {
+        let missing = match quantity {
+            Quantity::Velocity => "speeds of bodies: expected columns such as v_m_per_s[A1]",
+            Quantity::Acceleration => "accelerations: expected columns such as a_m_per_s2[A1]",
+            Quantity::Crush => "deflections: expected columns such as deflection_m[A1|A2]",
+            _ => "forces of interfaces: expected columns such as force_N[A1|A2]",
+        };
+        return Err(error!(Plot, "{name} has no {missing}"));
+    }
     let names = names(runs, quantity, chosen)?;
     let mut chart = match quantity {
         Quantity::Energy => {
@@ -418,7 +446,13 @@ fn filtered(run: &Motion, body: &BodyMotion, class: u32, notes: &mut Vec<String>
     match cfc::filter_from_rest(class, &run.time_s, &body.a_m_per_s2) {
         Ok(filtered) => filtered.values,
         Err(error) => {
-            let note = format!("Not filtered: {error}.");
+            let why = match error {
+                CfcError::TooCoarse { class, .. } => {
+                    format!("the output interval is too long for CFC {class}")
+                }
+                CfcError::Uneven { .. } => "the output intervals are not equal".into(),
+            };
+            let note = format!("Not filtered: {why}.");
             if !notes.contains(&note) {
                 notes.push(note);
             }

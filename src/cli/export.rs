@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::file::{not_written, write_all_whole};
 use crate::formats::{self, Exported, FORMATS, Format, Material, Options};
 use crate::surrogate::max_crush::MaxCrushRule;
-use crate::surrogate::{PredictedCurve, Query};
+use crate::surrogate::{PredictedCurve, Query, WarningCode};
 use crate::unit::UnitSystem;
 
 /// Write curves, recorded cases or a model for another tool
@@ -190,7 +190,7 @@ impl Target {
         }
         format.export(curves, &self.options(path)).map_err(|error| {
             if self.force.is_none() && error.is_about("force") {
-                usage_error("the curve has no force that drives a body of one mass (its runs record no velocities): use --force contact to export the force on the obstacle")
+                usage_error("the curve has no force that drives a body of one mass (its runs record no velocities, or its file states a contact force without times): use --force contact to export the force on the obstacle")
             } else {
                 error.into()
             }
@@ -298,6 +298,7 @@ fn export_curves(
     output: Option<&Path>,
 ) -> Result<(Exported, Vec<String>), Failure> {
     let (mut curves, quality) = input.curves(args)?;
+    let is_file = quality.is_some();
     let (mut notes, mut warnings) =
         quality.map_or_else(Default::default, |q| (q.notes, q.warnings));
     if let (Input::Curve(curve), true, None) =
@@ -309,7 +310,10 @@ fn export_curves(
             notes.push("the body force alone is exported, which drives a body of one mass: --force contact exports the contact force, and the file itself has both".into());
         }
     }
-    for warning in curves.iter().flat_map(|c| &c.warnings).map(ToString::to_string) {
+    // Those of a file's case are its curve's, too.
+    let of_curves = curves.iter().flat_map(|c| &c.warnings);
+    let of_curves = of_curves.filter(|w| !(is_file && w.code == WarningCode::CaseWarning));
+    for warning in of_curves.map(ToString::to_string) {
         if !warnings.contains(&warning) {
             warnings.push(warning);
         }

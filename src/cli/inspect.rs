@@ -6,8 +6,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::arguments::FileKind;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, failed_at, output};
-use crate::error::Error;
+use crate::database;
+use crate::error::{Error, error};
 use crate::solver::decks::{self, Search};
 use crate::solver::lsdyna::deck::{Deck, DeckEntity};
 use crate::solver::runs::{output_files, run_folders};
@@ -99,10 +101,23 @@ fn inspect(run: Option<PathBuf>, files: Vec<PathBuf>, args: &Args) -> Inspected 
     for path in files {
         match read(&path, args.format.as_deref(), &selection) {
             Ok(sections) => inspected.sections.extend(sections),
-            Err(error) => inspected.unread.push(error),
+            Err(error) => inspected.unread.push(of_crumple(&path).unwrap_or(error)),
         }
     }
     inspected
+}
+
+/// That a file is one of crumple's own, if it is, and what shows it.
+fn of_crumple(path: &Path) -> Option<Error> {
+    let what = match FileKind::of(path).ok()? {
+        FileKind::Database if database::is_database(path) => {
+            "a curve database: crumple db ls lists its cases, crumple plot draws them"
+        }
+        FileKind::Model => "a model: crumple predict takes it, crumple plot draws it",
+        FileKind::Sweep => "the results of a sweep: crumple plot draws them",
+        _ => return None,
+    };
+    Some(error!(SolverFile, "{path}: this is {what}", path = path.display()))
 }
 
 /// The sections of a file, or the deck that it is.

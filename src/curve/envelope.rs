@@ -25,7 +25,7 @@ impl Envelope {
             return Err(error!(Other, "{deflections} deflections but {forces} forces"));
         }
         if deflections < 2 {
-            return Err(error!(Other, "an envelope needs at least 2 points, found {deflections}"));
+            return Err(error!(Other, "a curve needs at least 2 points, found {deflections}"));
         }
         for (i, (&deflection_m, &force_n)) in deflection_m.iter().zip(&force_n).enumerate() {
             if !(deflection_m.is_finite() && force_n.is_finite()) {

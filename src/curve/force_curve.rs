@@ -14,7 +14,7 @@
 //!    steepest rise for it) to three times the curve's peak force.
 
 use super::body::{rebound_stiffness_n_per_m, recorded_force};
-use super::{Case, Envelope, ForceKind};
+use super::{Case, Envelope, ForceKind, loading};
 use crate::error::Error;
 use crate::unit::SpeedKind;
 
@@ -122,8 +122,11 @@ impl ForceCurve {
         if is_other && !case.moves_by_its_force() {
             return Self::recorded(case).ok_or(ForceCurveError::NoMotion);
         }
+        let by_energy = loading::stiffness_of_unloading_energy(&case.curves.original);
+        let is_of_body = force == ForceKind::Body || case.moves_by_its_force();
+        let stiffness = by_energy.filter(|_| is_of_body);
         Ok(Self {
-            unloading: CurveUnloading::of(case.curves.unloading_stiffness_n_per_m),
+            unloading: CurveUnloading::of(stiffness.or(case.curves.unloading_stiffness_n_per_m)),
             kind: Some(force),
             speed_kind: Some(case.conditions.speed.kind),
             speed_m_per_s: Some(case.conditions.speed.m_per_s),
@@ -300,7 +303,10 @@ pub(crate) fn bottomed(
     let (mut d, mut f) = (held.deflection_m().to_vec(), held.force_n().to_vec());
     let (crushed_m, level_n) = (held.end_m(), held.force_at(held.end_m()));
     let to_highest_m = (HIGHEST * peak_n - level_n) / stiffness_n_per_m;
-    let rise_m = (to_highest_m / interval_m - 1e-9).ceil().max(1.0) * interval_m;
+    let on_grid_m = (to_highest_m / interval_m - 1e-9).ceil().max(1.0) * interval_m;
+    // Of a stiffness that a force rises by far in one interval the grid ends.
+    let is_steep = to_highest_m > 0.0 && stiffness_n_per_m * interval_m > peak_n;
+    let rise_m = if is_steep { to_highest_m } else { on_grid_m };
     d.push(crushed_m + rise_m);
     f.push(level_n + stiffness_n_per_m * rise_m);
     Envelope::new(d, f)

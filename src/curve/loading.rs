@@ -44,6 +44,27 @@ pub(crate) fn loading_branch(curve: &Curve) -> Result<Loading, Error> {
     Ok(Loading { envelope, dropped })
 }
 
+/// Where a file jumps, its points of one deflection are set apart by this share of the largest: negligible in energy, and less
+/// steep than would ask runs for tiny steps.
+pub(crate) const STEP_WIDTH_SHARE: f64 = 1e-4;
+/// More such steps in a row are a fine record and no jump.
+const MOST_AT_ONE: usize = 3;
+
+/// Steepest rise of a loading branch, in N/m: that of a jump, whose width says nothing, only if it rises nowhere else.
+pub(crate) fn steepest_rise(deflection_m: &[f64], force_n: &[f64]) -> f64 {
+    let step_m = |i: &usize| deflection_m[*i] - deflection_m[i - 1];
+    let jump_m = STEP_WIDTH_SHARE * (1.0 + 1e-6) * deflection_m.last().copied().unwrap_or(0.0);
+    let is_narrow = |i: &usize| step_m(i) <= jump_m;
+    let steps: Vec<usize> = (1..deflection_m.len()).collect();
+    let alike = steps.chunk_by(|a, b| is_narrow(a) == is_narrow(b));
+    let (jumps, others): (Vec<&[usize]>, Vec<&[usize]>) =
+        alike.partition(|run| is_narrow(&run[0]) && run.len() <= MOST_AT_ONE);
+    let slope = |i: &usize| (force_n[*i] - force_n[i - 1]) / step_m(i);
+    let steepest = |of: Vec<&[usize]>| of.into_iter().flatten().map(slope).fold(0.0, f64::max);
+    let rise = steepest(others);
+    if rise > 0.0 { rise } else { steepest(jumps) }
+}
+
 /// Secant of the unloading branch between 90 % and 10 % of the force at the maximum
 /// deflection, in N/m.
 ///
@@ -62,6 +83,24 @@ pub fn unloading_stiffness(curve: &Curve) -> Option<f64> {
     };
     let (high, low) = (crossing(0.9)?, crossing(0.1)?);
     (high > low).then(|| 0.8 * top / (high - low))
+}
+
+/// Stiffness in N/m of the straight line from the maximum deflection that gives back the energy of the unloading branch up to
+/// where its force is first zero, `F²/2E`: a branch that is not straight rebounds by its energy, not by its slope.
+///
+/// `None` where the branch has no [`unloading_stiffness`], or gives back nothing.
+pub(crate) fn stiffness_of_unloading_energy(curve: &Curve) -> Option<f64> {
+    unloading_stiffness(curve)?;
+    let end = loading_end(curve);
+    let (d, f) = (&curve.deflection_m()[end..], &curve.force_n()[end..]);
+    let until = f.iter().position(|f| *f <= 0.0).unwrap_or(f.len() - 1);
+    let step = |i: usize| match f[i] {
+        // To where the force passes zero.
+        after if after < 0.0 => 0.5 * f[i - 1] * (d[i - 1] - d[i]) * f[i - 1] / (f[i - 1] - after),
+        after => 0.5 * (f[i - 1] + after) * (d[i - 1] - d[i]),
+    };
+    let energy_j: f64 = (1..=until).map(step).sum();
+    (energy_j > 0.0).then(|| f[0] * f[0] / (2.0 * energy_j))
 }
 
 #[cfg(test)]
@@ -85,9 +124,22 @@ mod tests {
     }
 
     #[test]
+    fn a_jump_is_no_stiffness() {
+        let d = [0.0, 0.06, 0.06 + 4.5e-5, 0.45];
+        assert!((steepest_rise(&d, &[0.0, 0.6, 1.2, 1.2]) - 10.0).abs() < 1e-9);
+        assert!((steepest_rise(&d, &[0.0, 0.0, 1.2, 1.2]) - 1.2 / 4.5e-5).abs() < 1e-6);
+        let fine: Vec<f64> = (0..=20_000).map(|i| f64::from(i) / 2e4).collect();
+        let force: Vec<f64> = fine.iter().map(|d| d * d).collect();
+        assert!((steepest_rise(&fine, &force) - 2.0).abs() < 1e-3);
+    }
+
+    #[test]
     fn unloading_stiffness_of_a_straight_line() {
         let c = curve(&[(0.0, 0.0), (2.0, 100.0), (1.9, 50.0), (1.8, 0.0), (1.7, 0.0)]);
         assert!((unloading_stiffness(&c).unwrap() - 500.0).abs() < 1e-9);
+        assert!((stiffness_of_unloading_energy(&c).unwrap() - 500.0).abs() < 1e-9);
+        let c = curve(&[(0.0, 0.0), (2.0, 100.0), (1.9, 20.0), (1.4, 0.0), (1.3, -1.0)]);
+        assert!((stiffness_of_unloading_energy(&c).unwrap() - 1e4 / 22.0).abs() < 1e-9);
         let truncated = curve(&[(0.0, 0.0), (1.0, 50.0), (2.0, 100.0)]);
         assert_eq!(unloading_stiffness(&truncated), None);
     }

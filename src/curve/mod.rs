@@ -354,8 +354,17 @@ impl Case {
     /// Whether its motion was made of its own force, as for an imported table without times: then
     /// that force is also the one that moves the body.
     pub(crate) fn moves_by_its_force(&self) -> bool {
+        self.imported("moves_by_its_force")
+    }
+
+    /// Whether nothing but its contact force is known: its file has no times, and is said to hold that force.
+    pub(crate) fn has_contact_alone(&self) -> bool {
+        self.imported("contact_alone")
+    }
+
+    fn imported(&self, key: &str) -> bool {
         let recipe: Option<serde_json::Value> = serde_json::from_str(&self.provenance.recipe).ok();
-        recipe.is_some_and(|r| r["imported"]["moves_by_its_force"] == true)
+        recipe.is_some_and(|recipe| recipe["imported"][key] == true)
     }
 
     /// Maximum deflection, in m.

@@ -4,6 +4,7 @@
 //! are sums of `2 Δd/(v + v')` over short steps, exact for a constant force, also where the body
 //! is at rest.
 
+use super::loading::steepest_rise;
 use super::{ForceKind, Masses};
 use crate::error::{Error, error};
 use crate::unit::{Shown, Speed, UnitSystem};
@@ -301,9 +302,4 @@ impl MotionBuilder {
         }
         Ok(())
     }
-}
-
-/// Steepest rise of the loading branch, in N/m.
-fn steepest_rise(d: &[f64], f: &[f64]) -> f64 {
-    (1..d.len()).map(|i| (f[i] - f[i - 1]) / (d[i] - d[i - 1])).fold(0.0, f64::max)
 }

@@ -196,6 +196,15 @@ impl ExportCurve {
         self.predicted.unloading_stiffness_n_per_m
     }
 
+    /// Stiffness in N/m of the straight line on which a target unloads whatever the curve's slopes are: the curve's own, or
+    /// where that would return more energy than crumple's law, which unloads no less steeply than the curve rises,
+    /// the one that returns as much.
+    pub(crate) fn line_stiffness_n_per_m(&self) -> f64 {
+        let own = self.stiffness_n_per_m();
+        let more = self.restitution(TargetUnloading::Line(own)) / self.own_restitution();
+        if more > 1.01 { own * more.powi(2) } else { own }
+    }
+
     /// The curve as it drives an interface, tail included.
     pub fn driving(&self) -> ForceCurve {
         ForceCurve {
@@ -356,7 +365,7 @@ impl ExportCurve {
             ("max_deflection_m", nine_digits(self.max_crush_m())),
             ("tail", self.tail.rule(self.follows_faster_runs).into()),
             ("unloading_stiffness_N_per_m", nine_digits(self.stiffness_n_per_m())),
-            ("unloading", self.unloading(steepest).into()),
+            ("unloading", self.unloading(steepest)),
             ("steepest_rise_N_per_m", nine_digits(steepest)),
             ("model", curve.model.clone()),
             ("training_hash", curve.provenance.training_hash.clone()),
@@ -380,17 +389,20 @@ impl ExportCurve {
     }
 
     /// Effect of the unloading stiffness.
-    fn unloading(&self, steepest_n_per_m: f64) -> &'static str {
-        let softer = self.stiffness_n_per_m() < steepest_n_per_m * (1.0 - 1e-9);
-        match (self.predicted.rebound.is_some(), softer) {
-            (true, false) => "along this stiffness from the maximum crush it gives the rebound",
-            (true, true) => {
-                "along this stiffness from the maximum crush it gives the rebound; from a point of the steepest rise it would generate energy"
-            }
-            (false, _) => {
-                "no run shows the rebound: at least the steepest rise, so as to generate no energy"
-            }
+    fn unloading(&self, steepest_n_per_m: f64) -> String {
+        if self.predicted.rebound.is_none() {
+            return "no run shows the rebound: at least the steepest rise, so as to generate no energy".into();
         }
+        let (stop_m, max_crush_m) = (self.stop_m(&self.loading), self.max_crush_m());
+        // A contact force stops mass besides the body's, and so a body of one mass sooner.
+        let from = match stop_m < 0.99 * max_crush_m {
+            true => format!("{stop_m:.3} m, where it has stopped a body of one mass,"),
+            false => "the maximum crush".into(),
+        };
+        let softer = self.stiffness_n_per_m() < steepest_n_per_m * (1.0 - 1e-9);
+        let creates = "; from a point of the steepest rise it would generate energy";
+        let creates = if softer { creates } else { "" };
+        format!("along this stiffness from {from} it gives the rebound{creates}")
     }
 
     /// Kind of impact.

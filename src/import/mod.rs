@@ -160,7 +160,11 @@ pub(crate) fn case_of(
     };
     let (curves, quality) = from_table(&table, &impact)
         .map_err(|error| error.coded(ErrorCode::Import).of(item.path.display()))?;
-    let recipe = recipe(item, settings, &curve, format, &impact);
+    let moves = table.time_s.is_none() && table.body_force_n.is_none();
+    let stated = curve.facts.force.or(settings.read.force);
+    let is_contact_alone = moves && stated == Some(ForceKind::Contact);
+    let alone = is_contact_alone.then(|| CONTACT_ALONE.to_string());
+    let recipe = recipe(item, settings, &curve, format, &impact, is_contact_alone);
     let mut hash = blake3::Hasher::new();
     hash.update(recipe.as_bytes());
     for file in &curve.files {
@@ -180,7 +184,13 @@ pub(crate) fn case_of(
         quality: Quality {
             audit: quality.audit,
             notes: notes.collect(),
-            warnings: both.warnings.into_iter().chain(gaps).chain(quality.warnings).collect(),
+            warnings: both
+                .warnings
+                .into_iter()
+                .chain(alone)
+                .chain(gaps)
+                .chain(quality.warnings)
+                .collect(),
         },
         provenance: Provenance {
             fingerprint: hash.finalize().to_hex().to_string(),
@@ -191,6 +201,9 @@ pub(crate) fn case_of(
     })
 }
 
+/// What a contact force over deflection leaves open, where it is stated to be one.
+const CONTACT_ALONE: &str = "force: only the contact force is known: a vehicle of one mass is driven by less, where its crush zone stops mass early";
+
 /// Everything besides the file that determines the case's numbers, as JSON.
 // `document!` calls the type of a field as the field.
 #[allow(non_camel_case_types)]
@@ -200,6 +213,7 @@ fn recipe(
     curve: &ReadCurve,
     format: &str,
     impact: &Impact,
+    is_contact_alone: bool,
 ) -> String {
     let Impact { speed, masses, force_kind, .. } = *impact;
     let recipe = document! {
@@ -214,6 +228,8 @@ fn recipe(
             has_times: curve.time_s.is_some(),
             // Whether the motion was made of the case's own force, which then moves the body, too.
             moves_by_its_force: curve.time_s.is_none() && curve.body_force_n.is_none(),
+            // Whether the file is said to hold the contact force, so that the one that moves the body is not known.
+            contact_alone if_any: is_contact_alone.then_some(true),
             force: force_kind,
             speed_m_per_s: speed.m_per_s,
             mass_kg: masses.body_kg,

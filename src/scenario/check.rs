@@ -329,7 +329,7 @@ fn check_keys(name: &str, table: &CurveTable) -> Result<(), Error> {
     ];
     let rate = table.law == LawName::Rate;
     let of_rate = [
-        ("law", "a model, which has a rate", rate && no_model),
+        ("law", "the curve of a model, whose force follows the rate", rate && no_model),
         ("band", "law = \"memory\"", rate && table.band.is_some()),
         ("max_crush", "law = \"memory\"", rate && table.max_crush.is_some()),
         ("force", "law = \"memory\"", rate && table.force.is_some()),

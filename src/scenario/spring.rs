@@ -56,7 +56,8 @@ pub(super) fn spring(
             (Some(curve.provenance.force_kind), curve.body_force_n.is_some())
         }
         CurveSource::Case(case) => {
-            (Some(case.curves.force_kind), case.curves.force_kind == ForceKind::Contact)
+            let is_contact = case.curves.force_kind == ForceKind::Contact;
+            (Some(case.curves.force_kind), is_contact && !case.has_contact_alone())
         }
         CurveSource::Curve(curve, _) => (curve.kind, curve.kind == Some(ForceKind::Body)),
         CurveSource::Stages(_) => (None, false),
@@ -82,12 +83,18 @@ pub(super) fn spring(
         CurveSource::Case(case) => {
             let truncated = case.is_truncated().then(|| "the run ended while loading".into());
             let curve = ForceCurve::of_case(case, force.unwrap_or(case.curves.force_kind));
-            let curve = curve.map_err(|error| match error {
+            let mut curve = curve.map_err(|error| match error {
                 ForceCurveError::Envelope(error) => envelope_error(error),
                 ForceCurveError::NoMotion => {
                     error!(Scenario, "its samples contain no loading branch")
                 }
             })?;
+            if curve.kind == Some(ForceKind::Contact) && has_body {
+                // What it drives leaves it as it leaves the predicted curves: with the rebound of the run.
+                let driving = PredictedCurve::of_case(case)
+                    .and_then(|of| of.driving_member(ForceKind::Contact, None, slot.split));
+                curve.unloading = driving.map_err(predict_error)?.unloading;
+            }
             (curve, truncated.into_iter().collect())
         }
     };

@@ -31,8 +31,8 @@ impl PredictedCurve {
         };
         let declared = of_case(case.curves.force_kind).map_err(no_curve)?;
         let body = match case.curves.force_kind {
-            ForceKind::Contact => of_case(ForceKind::Body).ok(),
-            ForceKind::Body => None,
+            ForceKind::Contact if !case.has_contact_alone() => of_case(ForceKind::Body).ok(),
+            _ => None,
         };
         let deflection_m = union(&declared.loading, body.as_ref().map(|b| &b.loading));
         let at = |e: &Envelope| -> Vec<f64> {
@@ -53,10 +53,7 @@ impl PredictedCurve {
             body_force_n: body.as_ref().map(|b| at(&b.loading)),
             body_drives: body.as_ref().map(|_| ForceKind::Body.drives().into()),
             body_unloading_stiffness_n_per_m: None,
-            unloading_stiffness_n_per_m: case
-                .curves
-                .unloading_stiffness_n_per_m
-                .unwrap_or(steepest),
+            unloading_stiffness_n_per_m: declared.unloading.stiffness_n_per_m().unwrap_or(steepest),
             force_low_n: None,
             force_high_n: None,
             beyond: None,

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::{Chosen, CommandResult, Failure, GlobalOptions, output};
 use crate::cli::train::stopped_mass_line;
-use crate::curve::{Case, StoppedMass, group as siblings};
+use crate::curve::{Case, Masses, StoppedMass, group as siblings};
 use crate::database::Database;
 use crate::dataset::of_one_kind;
 use crate::table::{Table, TableOf};
@@ -105,10 +105,15 @@ pub(crate) fn case_columns<'c, T>(
         let truncated = if c.is_truncated() { " (truncated)" } else { "" };
         format!("{:.4} m{truncated}", c.max_deflection_m())
     };
+    let masses = |c: &Case| {
+        let Masses { body_kg, other_kg } = c.conditions.masses;
+        let other = other_kg.filter(|other| *other != body_kg);
+        mass.text(body_kg) + &other.map_or(String::new(), |kg| format!(" on {}", mass.text(kg)))
+    };
     type Cell<'a> = &'a dyn Fn(&Case) -> String;
     let columns: [(&str, Cell<'_>); 6] = [
         ("speed", &speed),
-        ("mass", &|c| mass.text(c.conditions.masses.body_kg)),
+        ("mass", &masses),
         ("peak force", &|c| force.text(c.peak_force_n())),
         ("max crush", &crush),
         ("W/E", &|c| format!("{:.4}", c.quality.audit.ratio())),

@@ -81,7 +81,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
 
 /// The material's restitution compared with ours.
 fn note(curve: &ExportCurve, material: Material) -> Vec<String> {
-    let own = TargetUnloading::Line(curve.stiffness_n_per_m());
+    let own = TargetUnloading::Line(curve.line_stiffness_n_per_m());
     match material {
         Material::S08 => {
             let other = ", --material mat121 unloads with its own stiffness";
@@ -109,7 +109,10 @@ fn describe(lines: &mut String, curve: &ExportCurve, units: InUnits, material: M
     line!(
         lines,
         "$ unloading stiffness in these units: {}",
-        nine_digits(units.stiffness(curve.stiffness_n_per_m()))
+        nine_digits(units.stiffness(match material {
+            Material::S08 => curve.stiffness_n_per_m(),
+            Material::Mat121 | Material::S06 => curve.line_stiffness_n_per_m(),
+        }))
     );
     let facts = match material {
         Material::S08 => curve.facts(),
@@ -143,7 +146,7 @@ fn discrete_beam(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u3
     define_curve(lines, (id + 1, &format!("{text} unloaded")), &nothing, units, 0);
     // A discrete beam needs its own mass: with VOL 1, a millionth of the body's.
     let density = ten_columns(1e-6 * curve.predicted.mass_kg / units.0.mass_kg);
-    let k = ten_columns(units.stiffness(curve.stiffness_n_per_m()));
+    let k = ten_columns(units.stiffness(curve.line_stiffness_n_per_m()));
     let (text, unloading) = (title(&text, TITLE_WIDTH), id + 1);
     line!(lines, "*MAT_GENERAL_NONLINEAR_1DOF_DISCRETE_BEAM_TITLE\n{text}");
     line!(lines, "$#     mid        ro         k   unldopt    offset     dampf");
@@ -159,7 +162,7 @@ fn general(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u32) {
     let text = curve.headline();
     define_curve(lines, (id, &text), &points, units, resampling(&points));
     let highest = curve.loading.peak_force_n();
-    let length = highest / curve.stiffness_n_per_m();
+    let length = highest / curve.line_stiffness_n_per_m();
     let unloading = [(-length, -highest), (0.0, 0.0), (length, 0.0)];
     define_curve(lines, (id + 1, &format!("{text} unloading")), &unloading, units, 0);
     let (text, unloading) = (title(&text, TITLE_WIDTH), id + 1);

@@ -7,6 +7,7 @@ use std::cmp::Ordering;
 
 use super::MIN_POINTS;
 use super::curve::{Place, ReadCurve, shown};
+use crate::curve::loading::STEP_WIDTH_SHARE;
 use crate::curve::{Envelope, ForceCurve};
 
 /// Maximum number of points of a curve: guards memory. Test records have some ten thousand.
@@ -81,9 +82,6 @@ const ZERO_SHARE: f64 = 1e-9;
 /// Distances of two guard points that agree this well are one.
 const SAME_DISTANCE: f64 = 1e-6;
 
-/// Points of one deflection are set apart by this share of the largest: negligible in energy, and less steep than
-/// would ask runs for tiny steps.
-const STEP_WIDTH_SHARE: f64 = 1e-4;
 /// Jumps of the force that a note names.
 const STEPS: usize = 3;
 

@@ -5,10 +5,8 @@ use std::path::Path;
 
 use super::encoding::number;
 use crate::curve::contact::{THRESHOLD, onset, threshold_n};
-use crate::curve::loading::loading_branch;
-use crate::curve::{
-    Curve, CurveUnloading, Envelope, ForceCurve, ForceKind, SourceFile, unloading_stiffness,
-};
+use crate::curve::loading::{loading_branch, steepest_rise, stiffness_of_unloading_energy};
+use crate::curve::{Curve, CurveUnloading, Envelope, ForceCurve, ForceKind, SourceFile};
 use crate::file::absolute;
 use crate::unit::{SpeedKind, UnitSystem};
 use std::fmt;
@@ -64,10 +62,10 @@ impl ReadCurve {
                 })?;
                 let first = time_s.iter().position(|t| *t >= onset.time_s).unwrap_or(0);
                 let rest = &d[first..];
-                let farthest = rest.iter().fold(0.0, |a: f64, v| {
-                    if (v - rest[0]).abs() > f64::abs(a) { v - rest[0] } else { a }
-                });
-                let deflection_m = rest.iter().map(|v| (v - rest[0]) * farthest.signum()).collect();
+                // The force pushes while it is crushed; afterwards the body may go back by more than the crush.
+                let pushed: f64 =
+                    rest.iter().zip(&f[first..]).map(|(v, f)| f * (v - rest[0])).sum();
+                let deflection_m = rest.iter().map(|v| (v - rest[0]) * pushed.signum()).collect();
                 changes.push(format!(
                     "it is a record over time: its loading branch from {:.2} ms on drives the interface (crumple db add keeps all of it)",
                     1e3 * time_s[first]
@@ -83,8 +81,10 @@ impl ReadCurve {
                 "the force of point {point} of its loading branch is below 0: an interface only pushes, so write compression positive and tension as 0"
             ));
         }
+        let (d, f) = (envelope.deflection_m(), envelope.force_n());
+        let rise = Some(steepest_rise(d, f)).filter(|rise| *rise < envelope.max_slope());
         let known = self.facts.unloading_stiffness_n_per_m;
-        let stiffness = known.or_else(|| unloading_stiffness(&curve));
+        let stiffness = known.or_else(|| stiffness_of_unloading_energy(&curve)).or(rise);
         let unloading = CurveUnloading::of(stiffness);
         Ok((ForceCurve { unloading, ..self.facts.driving(envelope) }, changes))
     }
