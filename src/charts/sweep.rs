@@ -374,6 +374,6 @@ fn unit_in_brackets(unit: &str) -> String {
 
 /// `0.412`, `12.3`, `1234`.
 fn three_digits(value: f64) -> String {
-    let before = if value == 0.0 { 1 } else { value.abs().log10().floor() as i32 + 1 };
+    let before = if value == 0.0 { 1 } else { libm::log10(value.abs()).floor() as i32 + 1 };
     format!("{value:.*}", usize::try_from((3 - before).clamp(0, 6)).unwrap_or(0)).replace('-', "−")
 }

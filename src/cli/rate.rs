@@ -633,7 +633,7 @@ fn milliseconds(time_s: f64) -> String {
 
 /// Five significant digits.
 fn digits(value: f64) -> String {
-    let decimals = (4.0 - value.abs().max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
+    let decimals = (4.0 - libm::log10(value.abs().max(1e-9)).floor()).clamp(0.0, 9.0) as usize;
     format!("{value:.decimals$}")
 }
 

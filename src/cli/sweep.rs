@@ -498,7 +498,7 @@ impl ShareOverLimits {
 fn digits(value: f64) -> String {
     let magnitude = value.abs();
     if value == 0.0 || (1e-3..1e7).contains(&magnitude) {
-        let before = if value == 0.0 { 1 } else { magnitude.log10().floor() as i32 + 1 };
+        let before = if value == 0.0 { 1 } else { libm::log10(magnitude).floor() as i32 + 1 };
         format!("{value:.*}", (3 - before).clamp(0, 6) as usize)
     } else {
         format!("{value:.2e}")

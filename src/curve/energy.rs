@@ -246,14 +246,16 @@ impl StatedConditions<'_> {
     fn cause(&self, balance: EnergyBalance) -> Cause {
         let used = self.speed.m_per_s;
         let work = balance.work.unwrap_or(1.0);
-        let near = |a: f64, b: f64, factor: f64| a > 0.0 && (a / b).ln().abs() < factor.ln();
+        let near =
+            |a: f64, b: f64, factor: f64| a > 0.0 && libm::log(a / b).abs() < libm::log(factor);
         let same = |a: f64, b: f64| (a / b - 1.0).abs() < ALIKE;
         if let Some(units) = self.fitting_units(balance) {
             return Cause::FittingUnits(units);
         }
         let ratios = [balance.work, balance.impulse].into_iter().flatten();
         let beyond = ratios.clone().any(|r| !(0.05..=20.0).contains(&r));
-        let tens = |r: f64| near(r, 10_f64.powi(3 * (r.log10() / 3.0).round() as i32), NEAR_TEN);
+        let tens =
+            |r: f64| near(r, 10_f64.powi(3 * (libm::log10(r) / 3.0).round() as i32), NEAR_TEN);
         if ratios.clone().filter(|r| !same(*r, 1.0)).all(tens) && beyond {
             return Cause::OtherUnits;
         }
@@ -347,6 +349,6 @@ fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }
-    let digits = (3 - value.abs().log10().floor() as i32).max(0) as usize;
+    let digits = (3 - libm::log10(value.abs()).floor() as i32).max(0) as usize;
     format!("{value:.digits$}")
 }

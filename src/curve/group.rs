@@ -217,7 +217,7 @@ fn designs(runs: &[&Case]) -> Vec<Remark> {
         let end_m = slow.max_deflection_m().min(fast.max_deflection_m());
         let (a, b) = (parts(&slow.curves.original, end_m), parts(&fast.curves.original, end_m));
         let ratio = b.iter().sum::<f64>() / a.iter().sum::<f64>();
-        let most = MOST_RATIO * (other.speed.m_per_s / one.speed.m_per_s).powf(RATE_POWER);
+        let most = MOST_RATIO * libm::pow(other.speed.m_per_s / one.speed.m_per_s, RATE_POWER);
         let likeness = correlation(&a, &b);
         let why = if !(LEAST_RATIO..=most).contains(&ratio) {
             format!("its mean force is {ratio:.2} times that of {}", slow.id.name)

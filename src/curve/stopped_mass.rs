@@ -64,7 +64,7 @@ impl StoppedMass {
             return None;
         }
         let end_m = runs.iter().map(LoadingRun::end_m).fold(0.0, f64::max);
-        let node = |i: usize| end_m * (i as f64 / SEGMENTS as f64).powf(SHORTER_AT_TIP);
+        let node = |i: usize| end_m * libm::pow(i as f64 / SEGMENTS as f64, SHORTER_AT_TIP);
         let deflection_m: Vec<f64> = (0..=SEGMENTS).map(node).collect();
         let states: Vec<Vec<(f64, f64)>> =
             runs.par_iter().map(|run| stopped_by_momentum(run, mass_kg)).collect();

@@ -81,7 +81,7 @@ impl Table {
         warnings.sort();
         warnings.dedup();
         let reach = curves.iter().map(|c| c.loading.end_m()).fold(0.0, f64::max);
-        let share = |k: usize| (k as f64 / INTERVALS as f64).powf(1.5);
+        let share = |k: usize| libm::pow(k as f64 / INTERVALS as f64, 1.5);
         let deflection_m: Vec<f64> = (0..=INTERVALS).map(|k| reach * share(k)).collect();
         let mut force_n = Vec::with_capacity(curves.len() * deflection_m.len());
         let mut band = [Vec::new(), Vec::new()];

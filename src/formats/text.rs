@@ -38,7 +38,7 @@ fn rounded_at_once(value: f64) -> Option<String> {
     if !(1e-9..1e12).contains(&size) {
         return None;
     }
-    let exponent = size.log10().floor() as i32;
+    let exponent = libm::log10(size).floor() as i32;
     let power = 10_f64.powi((8 - exponent).abs());
     let scaled = if exponent <= 8 { size * power } else { size / power };
     let digits = scaled.round();

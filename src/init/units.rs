@@ -56,7 +56,7 @@ impl Range {
 
     /// How unusual a value is: 1 at `spread` times the usual one.
     fn unusual(&self, value: f64) -> f64 {
-        ((value / self.usual).ln() / self.spread.ln()).powi(2)
+        (libm::log(value / self.usual) / libm::log(self.spread)).powi(2)
     }
 }
 
@@ -280,7 +280,7 @@ pub(super) fn digits(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
     }
-    let places = 2 - value.abs().log10().floor() as i32;
+    let places = 2 - libm::log10(value.abs()).floor() as i32;
     match places {
         0..=9 => trimmed(&format!("{value:.*}", places as usize)),
         -6..=-1 => format!("{value:.0}"),

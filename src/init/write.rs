@@ -261,7 +261,7 @@ pub(super) fn speed_text(m_per_s: f64) -> String {
     if km_per_h <= 0.0 {
         return "0km/h".into();
     }
-    let digits = (4 - km_per_h.log10().floor() as i32).clamp(0, 9) as usize;
+    let digits = (4 - libm::log10(km_per_h).floor() as i32).clamp(0, 9) as usize;
     format!("{}km/h", trimmed(&format!("{km_per_h:.digits$}")))
 }
 

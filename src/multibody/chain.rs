@@ -69,7 +69,7 @@ impl Resistance {
             + self.linear_per_s * v
             + self.quadratic_per_m * v * v
             + self.braking * STANDARD_GRAVITY_M_PER_S2;
-        mass_kg * rate * (v_m_per_s / SMOOTH_M_PER_S).tanh()
+        mass_kg * rate * libm::tanh(v_m_per_s / SMOOTH_M_PER_S)
     }
 }
 

@@ -106,9 +106,9 @@ fn cross<const N: usize>(a: &mut [f64; N], b: &mut [f64; N], stream: &mut Stream
         let power = CROSSOVER_ETA + 1.0;
         // The larger child may not pass the bound that is nearer to its parent.
         let beta = 1.0 + 2.0 / apart * low.min(1.0 - high);
-        let alpha = 2.0 - beta.powf(-power);
+        let alpha = 2.0 - libm::pow(beta, -power);
         let share = if u * alpha <= 1.0 { u * alpha } else { 1.0 / (2.0 - u * alpha) };
-        let spread = share.powf(1.0 / power) * apart;
+        let spread = libm::pow(share, 1.0 / power) * apart;
         let children = (0.5 * (low + high - spread), 0.5 * (low + high + spread));
         let (first, second) = if swap { (children.1, children.0) } else { children };
         (*a, *b) = (first.clamp(0.0, 1.0), second.clamp(0.0, 1.0));
@@ -124,9 +124,12 @@ fn mutate<const N: usize>(genes: &mut [f64; N], stream: &mut Stream) {
         }
         let u = stream.unit();
         let shift = if u < 0.5 {
-            (2.0 * u + (1.0 - 2.0 * u) * (1.0 - *gene).powf(power)).powf(1.0 / power) - 1.0
+            libm::pow(2.0 * u + (1.0 - 2.0 * u) * libm::pow(1.0 - *gene, power), 1.0 / power) - 1.0
         } else {
-            1.0 - (2.0 * (1.0 - u) + (2.0 * u - 1.0) * gene.powf(power)).powf(1.0 / power)
+            1.0 - libm::pow(
+                2.0 * (1.0 - u) + (2.0 * u - 1.0) * libm::pow(*gene, power),
+                1.0 / power,
+            )
         };
         *gene = (*gene + shift).clamp(0.0, 1.0);
     }
@@ -173,7 +176,7 @@ impl Scales {
         Nodes {
             x_m: positions(x_gaps, self.displacement_m),
             stiffness: std::array::from_fn(|i| {
-                (soft * (stiffness[i] * (stiff / soft).ln()).exp()).clamp(soft, stiff)
+                (soft * libm::exp(stiffness[i] * libm::log(stiff / soft))).clamp(soft, stiff)
             }),
             v_m_per_s: positions(v_gaps, self.speed_m_per_s),
             damping: std::array::from_fn(|i| low + damping[i] * (high - low)),
@@ -189,7 +192,7 @@ impl Scales {
         let [soft, stiff] = STIFFNESS_N_PER_M;
         let [low, high] = DAMPING_N_S_PER_M;
         for (gene, k) in genes.iter_mut().zip(stiffness) {
-            *gene = (k.clamp(soft, stiff) / soft).ln() / (stiff / soft).ln();
+            *gene = libm::log(k.clamp(soft, stiff) / soft) / libm::log(stiff / soft);
         }
         for (gene, c) in genes[2 * STIFFNESS_NODES - 2..].iter_mut().zip(damping) {
             *gene = (c.clamp(low, high) - low) / (high - low);
@@ -219,7 +222,8 @@ impl Scales {
 /// Nodes from 0 to `end`, always ordered: gaps relative to the last one, normalised to their
 /// sum. N nodes have N − 2 free gaps; a gene of a half makes a gap equal to the last one.
 fn positions<const N: usize>(genes: &[f64], end: f64) -> [f64; N] {
-    let gap = |i: usize| genes.get(i).map_or(1.0, |g| ((2.0 * g - 1.0) * GAP_RATIO.ln()).exp());
+    let gap =
+        |i: usize| genes.get(i).map_or(1.0, |g| libm::exp((2.0 * g - 1.0) * libm::log(GAP_RATIO)));
     let total: f64 = (0..N - 1).map(gap).sum();
     let mut at = [0.0; N];
     for i in 1..N {

@@ -239,8 +239,8 @@ mod tests {
         let zeta = c / (2.0 * m);
         let omega = (k / m - zeta * zeta).sqrt();
         for (i, t) in time_s.iter().enumerate() {
-            let (sin, cos) = (omega * t).sin_cos();
-            let decay = (-zeta * t).exp();
+            let (sin, cos) = libm::sincos(omega * t);
+            let decay = libm::exp(-zeta * t);
             let x = v0 / omega * decay * sin;
             let v = v0 * decay * (cos - zeta / omega * sin);
             assert!((motion.x_m[i] - x).abs() < 1e-7, "x at {t}: {} {x}", motion.x_m[i]);

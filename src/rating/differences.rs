@@ -127,7 +127,7 @@ fn norms_and_phase(reference: &[f64], prediction: &[f64]) -> Option<[f64; 3]> {
         apart += (r - p) * (r - p);
         together += (r + p) * (r + p);
     }
-    let angle = 2.0 * f64::atan2(apart.sqrt(), together.sqrt());
+    let angle = 2.0 * libm::atan2(apart.sqrt(), together.sqrt());
     (of_r > 0.0 && of_p > 0.0).then_some([of_r, of_p, angle / PI])
 }
 
@@ -139,7 +139,7 @@ fn norms_and_phase(reference: &[f64], prediction: &[f64]) -> Option<[f64; 3]> {
 pub(crate) fn sprague_geers(reference: &[f64], prediction: &[f64]) -> Option<MagnitudePhase> {
     let [of_r, of_p, phase] = norms_and_phase(reference, prediction)?;
     let magnitude = of_p / of_r - 1.0;
-    Some(MagnitudePhase { magnitude, phase, combined: magnitude.hypot(phase) })
+    Some(MagnitudePhase { magnitude, phase, combined: libm::hypot(magnitude, phase) })
 }
 
 /// `m = (Σp² − Σr²)/√(Σr² Σp²)`, `M = sgn(m) lg(1 + |m|)`, P as above, `C = √(π/4 (M² + P²))`.
@@ -149,8 +149,8 @@ pub(crate) fn sprague_geers(reference: &[f64], prediction: &[f64]) -> Option<Mag
 pub(crate) fn russell(reference: &[f64], prediction: &[f64]) -> Option<MagnitudePhase> {
     let [of_r, of_p, phase] = norms_and_phase(reference, prediction)?;
     let m = of_p / of_r - of_r / of_p;
-    let magnitude = (1.0 + m.abs()).log10().copysign(m);
-    let combined = FRAC_PI_4.sqrt() * magnitude.hypot(phase);
+    let magnitude = libm::log10(1.0 + m.abs()).copysign(m);
+    let combined = FRAC_PI_4.sqrt() * libm::hypot(magnitude, phase);
     Some(MagnitudePhase { magnitude, phase, combined })
 }
 

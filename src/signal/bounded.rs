@@ -119,7 +119,7 @@ impl Cholesky {
 
     /// The logarithm of the determinant of the first `n` rows and columns.
     pub(crate) fn log_determinant(&self, n: usize) -> f64 {
-        self.rows[..n].iter().enumerate().map(|(i, row)| 2.0 * row[i].ln()).sum()
+        self.rows[..n].iter().enumerate().map(|(i, row)| 2.0 * libm::log(row[i])).sum()
     }
 }
 

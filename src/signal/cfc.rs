@@ -73,7 +73,7 @@ impl Coefficients {
     /// Formulas of SAE J211-1, appendix C.
     pub(crate) fn new(class: u32, interval_s: f64) -> Self {
         let w_d = 2.0 * PI * f64::from(class) * 2.0775;
-        let w_a = (w_d * interval_s / 2.0).tan();
+        let w_a = libm::tan(w_d * interval_s / 2.0);
         let denominator = 1.0 + SQRT_2 * w_a + w_a * w_a;
         let a0 = w_a * w_a / denominator;
         Self {

@@ -178,10 +178,10 @@ impl Gap {
         match left_out {
             // √b − √a is about (b − a)/(2√middle).
             _ if faster > 0.0 && faster.is_finite() => {
-                (wider / faster.sqrt()).powf(left_out.power())
+                libm::pow(wider / faster.sqrt(), left_out.power())
             }
             // Ends of earlier versions state no middle.
-            _ => wider.powf(left_out.power()),
+            _ => libm::pow(wider, left_out.power()),
         }
     }
 }
@@ -360,8 +360,8 @@ impl Band {
     fn and(self, scatter: Option<ScatterWidths>) -> Self {
         let Some(of) = scatter else { return self };
         Self {
-            pointwise_share: self.pointwise_share.hypot(of.pointwise_share),
-            simultaneous_share: self.simultaneous_share.hypot(of.simultaneous_share),
+            pointwise_share: libm::hypot(self.pointwise_share, of.pointwise_share),
+            simultaneous_share: libm::hypot(self.simultaneous_share, of.simultaneous_share),
             scatter,
             ..self
         }
@@ -494,8 +494,8 @@ fn calibration_error(mut points: Vec<(f64, f64)>) -> f64 {
 /// Probability that Student's t with `n` degrees of freedom lies between −t and t (Abramowitz and Stegun 26.7.3 and
 /// 26.7.4).
 fn inside_t(t: f64, n: usize) -> f64 {
-    let angle = (t / (n as f64).sqrt()).atan();
-    let (sine, cosine) = angle.sin_cos();
+    let angle = libm::atan(t / (n as f64).sqrt());
+    let (sine, cosine) = libm::sincos(angle);
     let odd = n % 2;
     let (mut term, mut sum) = (if odd == 1 { cosine } else { 1.0 }, 0.0);
     for k in 0..n / 2 {

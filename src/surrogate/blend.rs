@@ -94,7 +94,9 @@ pub(super) fn own_share(speeds_m_per_s: &[f64], values: &[Vec<f64>]) -> f64 {
             let own: Vec<f64> = values.iter().filter(|y| y.len() == runs).map(square).collect();
             let freedom = (runs - 1) as f64;
             let variance = own.iter().sum::<f64>() / (own.len() as f64 * freedom);
-            let spread = freedom * variance.ln() + equations.log_determinant(runs) + precision.ln();
+            let spread = freedom * libm::log(variance)
+                + equations.log_determinant(runs)
+                + libm::log(precision);
             if variance > 0.0 { -0.5 * own.len() as f64 * spread } else { 0.0 }
         };
         // Two runs say nothing of it.
@@ -111,7 +113,7 @@ fn matern(distance: f64, length: f64) -> f64 {
         return 1.0;
     }
     let x = 5.0_f64.sqrt() * distance.abs() / length;
-    (1.0 + x + x * x / 3.0) * (-x).exp()
+    (1.0 + x + x * x / 3.0) * libm::exp(-x)
 }
 
 #[cfg(test)]

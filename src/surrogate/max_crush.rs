@@ -142,7 +142,7 @@ pub(crate) fn monotone(points: &[(f64, f64)], v: f64) -> Option<f64> {
             continue;
         }
         let (a, b) = (tangent[i] / s, tangent[i + 1] / s);
-        let length = a.hypot(b);
+        let length = libm::hypot(a, b);
         if length > 3.0 {
             tangent[i] = 3.0 * a / length * s;
             tangent[i + 1] = 3.0 * b / length * s;

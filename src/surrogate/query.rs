@@ -244,8 +244,9 @@ fn mass_among(parameters: &BTreeMap<String, Parameter>, name: &str) -> Result<Op
 fn rebound_speed(model: &Model, v: f64, last_n: f64) -> Option<f64> {
     let (declared, body) = model.curves();
     let curves = if body.is_empty() { declared } else { body };
-    let of_force =
-        |force_n: f64| if force_n > 0.0 { force_n.powf(SEPARATION_SPEED_EXPONENT) } else { 0.0 };
+    let of_force = |force_n: f64| {
+        if force_n > 0.0 { libm::pow(force_n, SEPARATION_SPEED_EXPONENT) } else { 0.0 }
+    };
     let known = |(case, curve): (&ModelCase, &CaseCurve)| {
         let equal_v = model.energy_speed(case);
         let separates = case.rebound_speed_m_per_s? * (equal_v / case.speed_m_per_s);
@@ -254,14 +255,14 @@ fn rebound_speed(model: &Model, v: f64, last_n: f64) -> Option<f64> {
     };
     let known: Vec<(f64, f64)> = model.cases.iter().zip(curves).filter_map(known).collect();
     let line = relative_line(&known)?;
-    let beside = means(known.iter().map(|&(v, y)| (v, (y / line(v)).ln())));
+    let beside = means(known.iter().map(|&(v, y)| (v, libm::log(y / line(v)))));
     let speeds: Vec<f64> = beside.iter().map(|p| p.0).collect();
     let (low, high, share) = neighbours(&speeds, v);
     let beside = (1.0 - share).powi(2) * beside[low].1 + share.powi(2) * beside[high].1;
     let v_held = v.clamp(speeds[0], speeds[speeds.len() - 1]);
     let held = line(v_held);
     let slope = (line(v_held + 1.0) - held).clamp(0.0, held / v_held);
-    Some(of_force(last_n) * beside.exp() * (held + slope * (v - v_held)))
+    Some(of_force(last_n) * libm::exp(beside) * (held + slope * (v - v_held)))
 }
 
 /// `a + b v` with the least squares of its ratios to the points, which are above 0; their mean if it were

@@ -311,7 +311,7 @@ impl Rate {
         let lengths = (d - end_m) / (self.carried().fades * end_m);
         match lengths {
             ..=0.0 => 1.0,
-            ..LENGTHS => (-lengths).exp(),
+            ..LENGTHS => libm::exp(-lengths),
             _ => 0.0,
         }
     }
@@ -392,12 +392,12 @@ fn impact_sensitivity(cases: &[CaseCurve], sensitivity: f64) -> f64 {
         let end_m = pair[0].end_m().min(pair[1].end_m());
         let (slow, fast) = (quotient(&pair[0], end_m), quotient(&pair[1], end_m));
         let known = slow > 0.0 && fast > 0.0;
-        known.then(|| ((slow / fast).ln(), pair[0].speed_m_per_s, pair[1].speed_m_per_s))
+        known.then(|| (libm::log(slow / fast), pair[0].speed_m_per_s, pair[1].speed_m_per_s))
     };
     let pairs: Vec<(f64, f64, f64)> = cases.windows(2).filter_map(of_pair).collect();
     let error = |k: usize| -> f64 {
         let of = |&(found, slow, fast): &(f64, f64, f64)| {
-            (found - (factor(trial(k), slow) / factor(trial(k), fast)).ln()).powi(2)
+            (found - libm::log(factor(trial(k), slow) / factor(trial(k), fast))).powi(2)
         };
         pairs.iter().map(of).sum()
     };

@@ -272,8 +272,8 @@ pub(crate) fn is_known_apart(time: &[f64], above: usize, below: usize, digits: i
     let before = time[..above].iter().rev().find(|&&t| t != at);
     let behind = time[below..].iter().find(|&&t| t != at);
     let nearest = before.into_iter().chain(behind).map(|t| (t - at).abs()).reduce(f64::min);
-    let exponent = if at == 0.0 { f64::NEG_INFINITY } else { at.abs().log10().floor() };
-    nearest.is_some_and(|gap| gap >= STEPS * 10f64.powf(exponent - f64::from(digits - 1)))
+    let exponent = if at == 0.0 { f64::NEG_INFINITY } else { libm::log10(at.abs()).floor() };
+    nearest.is_some_and(|gap| gap >= STEPS * libm::pow(10.0, exponent - f64::from(digits - 1)))
 }
 
 /// Keeps the values of some states; none where no history is kept.

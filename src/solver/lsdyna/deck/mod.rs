@@ -241,7 +241,7 @@ impl Deck {
 }
 
 fn norm([x, y, z]: [f64; 3]) -> f64 {
-    x.hypot(y).hypot(z)
+    libm::hypot(libm::hypot(x, y), z)
 }
 
 #[cfg(test)]
