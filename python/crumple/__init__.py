@@ -53,9 +53,11 @@ def _quantity(name, value, unit):
     if isinstance(value, str):
         return value
     try:
-        return float(value)
+        if not isinstance(value, (bool, np.bool_)):
+            return float(value)
     except (TypeError, ValueError):
-        raise TypeError(f"{name} {value!r}: expected one number in {unit}, or text with a unit") from None
+        pass
+    raise TypeError(f"{name} {value!r}: expected one number in {unit}, or text with a unit")
 
 
 def _id(text):
@@ -359,6 +361,8 @@ class Model:
 
         Raises `crumple.Error` far outside the speeds of the runs (`range`, in m/s), unless `extrapolate`.
         """
+        if parameters is not None and not hasattr(parameters, "items"):
+            raise TypeError(f"parameters {parameters!r}: expected a dict, such as {{'other_mass_kg': 22e3}}")
         further = list((parameters or {}).items())
         if (speed is None) == (crush is None) or (extrapolate and crush is not None):
             raise TypeError("give a speed, with or without extrapolate, or a crush")

@@ -92,7 +92,7 @@ def test_what_is_exported_cannot_be_changed_by_its_arrays():
     assert np.array_equal(pickle.loads(pickle.dumps(worse)).force, 1.2 * curve.force)
 
 
-@pytest.mark.parametrize("speed", [np.array([10.0, 12.0]), [10.0]])
+@pytest.mark.parametrize("speed", [np.array([10.0, 12.0]), [10.0], True, np.True_])
 def test_what_is_not_one_speed_is_refused(speed):
     with pytest.raises(TypeError, match="^speed .*: expected one number in m/s, or text with a unit"):
         crumple.Model(DEMO / "lead.model").predict(speed)
@@ -187,6 +187,8 @@ def test_databases_models_and_curves(tmp_path):
         model.predict(crush="620")
     with pytest.raises(crumple.Error, match="angle"):
         model.predict(14.0, parameters={"angle_deg": 10.0})
+    with pytest.raises(TypeError, match="^parameters .*: expected a dict"):
+        model.predict(14.0, parameters=[1])
     # The model that was read answers, whatever becomes of its file.
     own = tmp_path / "own2.model"
     shutil.copy(DEMO / "lead.model", own)
