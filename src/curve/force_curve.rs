@@ -13,7 +13,7 @@
 //! 3. From there the force rises with the unloading stiffness (a steeper rise would change the unloading of tools that use the
 //!    steepest rise for it) to three times the curve's peak force.
 
-use super::body::{rebound_stiffness_n_per_m, recorded_force};
+use super::body::{body_motion, rebound_stiffness_n_per_m, recorded_force};
 use super::{Case, Envelope, ForceKind, loading};
 use crate::error::Error;
 use crate::unit::SpeedKind;
@@ -122,15 +122,25 @@ impl ForceCurve {
         if is_other && !case.moves_by_its_force() {
             return Self::recorded(case).ok_or(ForceCurveError::NoMotion);
         }
-        let by_energy = loading::stiffness_of_unloading_energy(&case.curves.original);
-        let is_of_body = force == ForceKind::Body || case.moves_by_its_force();
-        let stiffness = by_energy.filter(|_| is_of_body);
-        Ok(Self {
-            unloading: CurveUnloading::of(stiffness.or(case.curves.unloading_stiffness_n_per_m)),
+        let secant = case.curves.unloading_stiffness_n_per_m;
+        let curve = Self {
+            unloading: CurveUnloading::of(secant),
             kind: Some(force),
             speed_kind: Some(case.conditions.speed.kind),
             speed_m_per_s: Some(case.conditions.speed.m_per_s),
             ..Self::bare(case.loading()?.envelope)
+        };
+        // What moves a body lets it rebound as it did.
+        if case.moves_by_its_force() {
+            let by_energy = loading::stiffness_of_unloading_energy(&case.curves.original);
+            return Ok(Self { unloading: CurveUnloading::of(by_energy.or(secant)), ..curve });
+        }
+        Ok(match force {
+            ForceKind::Body => {
+                let rebound = body_motion(case).and_then(|motion| motion.rebound_speed_m_per_s);
+                curve.rebounding(case.conditions.masses.effective_kg(), rebound, secant)
+            }
+            ForceKind::Contact => curve,
         })
     }
 

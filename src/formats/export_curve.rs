@@ -202,7 +202,7 @@ impl ExportCurve {
     pub(crate) fn line_stiffness_n_per_m(&self) -> f64 {
         let own = self.stiffness_n_per_m();
         let more = self.restitution(TargetUnloading::Line(own)) / self.own_restitution();
-        if more > 1.01 { own * more.powi(2) } else { own }
+        if more > 1.01 && more.is_finite() { own * more.powi(2) } else { own }
     }
 
     /// The curve as it drives an interface, tail included.

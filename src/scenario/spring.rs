@@ -89,10 +89,11 @@ pub(super) fn spring(
                     error!(Scenario, "its samples contain no loading branch")
                 }
             })?;
-            if curve.kind == Some(ForceKind::Contact) && has_body {
-                // What it drives leaves it as it leaves the predicted curves: with the rebound of the run.
+            let is_line = matches!(curve.unloading, CurveUnloading::Stiffness(_));
+            if let Some(kind) = curve.kind.filter(|_| is_line && !case.has_contact_alone()) {
+                // What it drives leaves it as it leaves predicted curves: with the rebound of the run, from where it stops.
                 let driving = PredictedCurve::of_case(case)
-                    .and_then(|of| of.driving_member(ForceKind::Contact, None, slot.split));
+                    .and_then(|of| of.driving_member(kind, None, slot.split));
                 curve.unloading = driving.map_err(predict_error)?.unloading;
             }
             (curve, truncated.into_iter().collect())
