@@ -11,7 +11,7 @@ use crumple::curve::audit;
 use crumple::curve::unloading_stiffness;
 use crumple::curve::{
     Case, CaseId, Conditions, Curve, Envelope, ForceCurve, ForceKind, Masses, Parameter,
-    Provenance, Quality, RecordedCurves,
+    Provenance, Quality, RecordedCurves, SourceFile,
 };
 use crumple::database::Database;
 use crumple::dataset::{TrainingCase, TrainingSet};
@@ -702,6 +702,82 @@ fn several_parameters() {
             .unwrap();
     let unsuited = auto.leave_one_out.unwrap().unsuited;
     assert!(unsuited.iter().any(|n| n.starts_with("linear: ")), "{unsuited:?}");
+}
+
+/// Masses that scatter by less than half a per cent are one, as are numbers that differ by rounding.
+#[test]
+fn numbers_that_only_scatter_are_no_parameters() {
+    for change in [(1.0 + 4e-9, 0.0), (1.004, 0.0), (1.0, 1e-12)] {
+        let cases: Vec<Case> = [8.0, 10.0, 12.0]
+            .map(|v| {
+                let is_other = v == 10.0;
+                let mass_kg = 20e3 * if is_other { change.0 } else { 1.0 };
+                let mut case = case(&format!("{v}"), v, mass_kg, &law);
+                let number = 1.0 + if is_other { change.1 } else { 0.0 };
+                case.conditions.parameters.insert("x".into(), Parameter::Number(number));
+                case
+            })
+            .to_vec();
+        let model = train("made", &cases, Choice::Kind(ModelKind::linear())).unwrap();
+        assert!(model.features.is_empty(), "{change:?}");
+    }
+}
+
+/// Repeats of a speed that lie a little apart enter the spline of the reference method by their mean.
+#[test]
+fn speeds_that_nearly_repeat_are_one_for_the_spline() {
+    let cases: Vec<Case> = [6.0, 8.0, 9.98, 10.0, 10.02, 12.0, 14.0]
+        .map(|v: f64| {
+            let scatter = [(9.98, 1.02), (10.02, 0.98)].iter().find(|(of, _)| *of == v);
+            let weaker = scatter.map_or(1.0, |(_, factor)| *factor);
+            case(&format!("{v}"), v, 20e3, &|d, rate| weaker * law(d, rate))
+        })
+        .to_vec();
+    let model = train("made", &cases, Choice::Kind(ModelKind::linear())).unwrap();
+    let at = |v: f64, rule| {
+        let query = Query { rule: Some(rule), ..Query::at(v) };
+        predict(&model, &query).unwrap().max_deflection_m
+    };
+    for v in [7.0, 9.0, 11.0, 13.0] {
+        let motion = at(v, MaxCrushRule::Motion);
+        for rule in [MaxCrushRule::Spline, MaxCrushRule::Monotone] {
+            let found = at(v, rule);
+            assert!((found / motion - 1.0).abs() < 0.04, "{rule:?} at {v}: {found} for {motion}");
+        }
+    }
+}
+
+/// A title that differs is no other design where a parameter says so.
+#[test]
+fn titles_are_compared_among_equal_parameters() {
+    let titled = |with_parameters: bool| {
+        let cases: Vec<Case> = [(8.0, "bar"), (10.0, "bar"), (12.0, "plate"), (14.0, "plate")]
+            .map(|(v, title)| {
+                let mut case = case(&format!("{v}"), v, 20e3, &law);
+                case.provenance.sources = vec![SourceFile {
+                    path: "nodout".into(),
+                    absolute_path: None,
+                    size_bytes: 1,
+                    blake3: String::new(),
+                    format: "nodout".into(),
+                    solver: None,
+                    version: None,
+                    title: Some(title.into()),
+                    problems: 0,
+                }];
+                if with_parameters {
+                    let name = Parameter::Category(title.into());
+                    case.conditions.parameters.insert("absorber".into(), name);
+                }
+                case
+            })
+            .to_vec();
+        let kind = if with_parameters { of_parameters() } else { ModelKind::linear() };
+        let model = train("made", &cases, Choice::Kind(kind)).unwrap();
+        let all = model.cases.iter().flat_map(|case| &case.warnings);
+        all.filter(|warning| warning.contains("the title of its files")).count()
+    };
+    assert_eq!((titled(false), titled(true)), (2, 0));
 }
 
 /// Masses that differ become a parameter by themselves.

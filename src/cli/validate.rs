@@ -41,18 +41,19 @@ const MOST_BYTES: u64 = 64 << 20;
   crumple validate curves.h5 --group lead-car-wall --next
   crumple validate curves.h5 --json
 Without --verbose, only mean errors, choice, acceptance and bands are printed.
-Columns: force is sum|p-r|/sum|r| along FE's crush; energy and crush are prediction over FE (the
-means show crush by each rule, with the model's own marked); peaks are the first two of FE's curve
-(force and position); velocity and acceleration (CFC 60; unfiltered in brackets) are those of a
-multi-body run of one mass, driven by the model's body force, sum|p-r|/sum|r| to 30 ms after FE's
-maximum crush. The means are over inner speeds; the ends of the range are extrapolation and are listed
-separately. FE contact (floor) is FE's own contact force in that run: no prediction of that force
-can be expected to do better. FE body (check) is derived from FE's own speeds and only checks curve,
-force law and run. FE scatter (floor) is how far a run deviates from the mean of repeated runs at its
-speed: no model can remove this part of an error, though the mean over n runs has
-only its 1/sqrt(n). forest is the reference method (DDTCM), nearest is FDRM. --nested adds auto:
-model and rule chosen without the left-out speed. --subsets adds how auto and each model do with fewer
-runs; regret is by how much their errors exceed those of the model that turns out best.")]
+Columns: force is sum|p-r|/sum|r| along FE's crush; energy and crush are prediction over FE, each
+curve up to its own crush (the means show crush by each rule, with the model's own marked); peaks
+are the first two of FE's curve (force and position); velocity and acceleration (CFC 60; unfiltered
+in brackets) are those of a multi-body run of one mass, driven by the model's body force,
+sum|p-r|/sum|r| to 30 ms after FE's maximum crush. The means are over inner speeds; the ends of the
+range are extrapolation and are listed separately. FE contact (floor) is FE's own contact force in
+that run: no prediction of that force can be expected to do better. FE body (check) is derived from
+FE's own speeds and only checks curve, force law and run. FE scatter (floor) is how far a run
+deviates from the mean of repeated runs at its speed: no model can remove this part of an error,
+though the mean over n runs has only its 1/sqrt(n). forest is the reference method (DDTCM, train
+--paper), nearest is FDRM. --nested adds auto: model and rule chosen without the left-out speed.
+--subsets adds how auto and each model do with fewer runs; regret is by how much their errors exceed
+those of the model that turns out best.")]
 pub(super) struct Args {
     /// Curve database
     database: PathBuf,
@@ -229,7 +230,14 @@ fn print_speeds(out: &mut dyn Write, validation: &Validation) -> io::Result<()> 
         let peak = |row: &LeftOut, k: usize| row.peaks.get(k).map_or("-".into(), peak);
         let mut table = Table::of(rows.clone())
             .column("model", |row| marked(&row.model, &validation.chosen))
-            .column("speed", |row| km_per_h(row.speed_m_per_s))
+            .column("speed", |row| {
+                let is_other = |of: &&LeftOut| of.model == row.model && of.case != row.case;
+                let mut others = rows.clone().filter(is_other);
+                match others.any(|of| is_same_speed(of.speed_m_per_s, row.speed_m_per_s)) {
+                    true => format!("{}, {}", km_per_h(row.speed_m_per_s), row.case),
+                    false => km_per_h(row.speed_m_per_s),
+                }
+            })
             .column("force", |row| percent(row.force_l1))
             .column("energy", |row| signed(row.energy_error))
             .column("crush", |row| signed(row.max_crush_error))

@@ -1,6 +1,6 @@
 //! Comparison of the cases of one group: copies, another design, energy or impulse unlike the others'.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::from_table::IMPORTED;
@@ -159,11 +159,19 @@ fn wording(title: &str) -> String {
     words.collect::<Vec<_>>().join(" ").to_lowercase()
 }
 
-/// Titles of the solver files that differ by more than numbers from those of most cases.
+/// Titles of the solver files that differ by more than numbers from those of most cases that no parameter distinguishes.
 fn titles(cases: &[Case]) -> Vec<Remark> {
+    let mut alike: BTreeMap<String, Vec<&Case>> = BTreeMap::new();
+    for case in cases {
+        alike.entry(format!("{:?}", case.conditions.parameters)).or_default().push(case);
+    }
+    alike.values().flat_map(|cases| titles_of(cases)).collect()
+}
+
+fn titles_of(cases: &[&Case]) -> Vec<Remark> {
     let title = |case: &Case| case.provenance.sources.iter().find_map(|s| s.title.clone());
     let titled: Vec<(&Case, String)> =
-        cases.iter().filter_map(|case| Some((case, title(case)?))).collect();
+        cases.iter().filter_map(|&case| Some((case, title(case)?))).collect();
     let mut counts: HashMap<String, usize> = HashMap::new();
     for (_, title) in &titled {
         *counts.entry(wording(title)).or_default() += 1;

@@ -191,7 +191,7 @@ pub struct SourceFile {
 /// A further case parameter besides speed: a number whose name carries its unit
 /// (`angle_deg`), or a category (`obstacle`).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a number, or a text such as \"yes\"")]
 pub enum Parameter {
     /// A number, in the unit that the parameter's name ends with.
     Number(f64),

@@ -54,7 +54,7 @@ pub(super) fn check(manifest: &Manifest) -> Result<(), Error> {
     let mut names = HashSet::new();
     for (k, run) in manifest.run.iter().enumerate() {
         let of_run = KeyPath::of("run").item(k);
-        check_run(run, *kind).map_err(|error| error.inside(of_run.clone()))?;
+        check_run(run, *kind, *half_model).map_err(|error| error.inside(of_run.clone()))?;
         let name = run.case_name();
         if !names.insert(name.clone()) {
             return Err(error!(
@@ -92,7 +92,7 @@ fn name_key(entry: &RunEntry) -> &'static str {
 }
 
 /// Checks a run; keys are those of its table.
-fn check_run(entry: &RunEntry, kind: StudyKind) -> Result<(), Error> {
+fn check_run(entry: &RunEntry, kind: StudyKind, half_model: bool) -> Result<(), Error> {
     check_parameters(entry)?;
     let run = &entry.path;
     if entry.contact_time.is_some() && entry.gap.is_some() {
@@ -109,6 +109,13 @@ fn check_run(entry: &RunEntry, kind: StudyKind) -> Result<(), Error> {
         return Err(error!(
             Study at "other_mass",
             "run \"{run}\": other_mass needs kind = \"pair\""
+        )
+        .itself());
+    }
+    if half_model && entry.other_mass.as_ref().is_some_and(|other| other.0 != entry.mass.0) {
+        return Err(error!(
+            Study at "other_mass",
+            "run \"{run}\": the other body of a half model is its mirror image, of the same mass: remove other_mass"
         )
         .itself());
     }

@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Model;
 use crate::curve::Envelope;
+use crate::dataset::{is_within, nearly_same};
 use crate::error::{Error, error};
 
 /// Rule for the maximum crush.
@@ -179,7 +180,7 @@ pub(super) fn by_all_rules(
     // Crush over speed is a function only if nothing else differs.
     let points: Vec<(f64, f64)> = if model.features.is_empty() {
         let whole = model.cases.iter().filter(|c| !c.truncated);
-        whole.map(|c| (c.speed_m_per_s, c.max_deflection_m)).collect()
+        one_for_repeats(whole.map(|c| (c.speed_m_per_s, c.max_deflection_m)).collect())
     } else {
         Vec::new()
     };
@@ -190,6 +191,18 @@ pub(super) fn by_all_rules(
     let all = || [spline_m, monotone_m, energy_m, motion_m].into_iter().flatten();
     let spread_m = all().fold(f64::NEG_INFINITY, f64::max) - all().fold(f64::INFINITY, f64::min);
     MaxCrush { spline_m, monotone_m, energy_m, motion_m, spread_m: spread_m.max(0.0) }
+}
+
+/// The mean of points whose speeds nearly repeat each other, by rising speed: their scatter over a short interval would be a slope.
+fn one_for_repeats(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    let speeds: Vec<f64> = points.iter().map(|p| p.0).collect();
+    let repeat = |a: &(f64, f64), b: &(f64, f64)| is_within(b.0, nearly_same(&speeds, a.0));
+    let mean = |of: &[(f64, f64)]| {
+        let over =
+            |value: fn(&(f64, f64)) -> f64| of.iter().map(value).sum::<f64>() / of.len() as f64;
+        (over(|p| p.0), over(|p| p.1))
+    };
+    points.chunk_by(repeat).map(mean).collect()
 }
 
 impl MaxCrush {

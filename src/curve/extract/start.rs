@@ -371,8 +371,12 @@ impl ImpactSpeed {
         if let Some(recorded) = recorded
             && differ(first, recorded)
         {
+            let used = match setup.manifest_speed_m_per_s {
+                Some(_) => "",
+                None => "; the latter is used",
+            };
             remarks.warn(format!(
-                "speed: {} in the first state, {} in the last before contact; the latter is used",
+                "speed: {} in the first state, {} in the last before contact{used}",
                 km_per_h(first),
                 km_per_h(recorded)
             ));

@@ -5,6 +5,7 @@ use crate::error::{Error, error};
 use crate::guess;
 use std::cmp::Ordering;
 
+use super::MIN_POINTS;
 use super::curve::{Place, ReadCurve, shown};
 use crate::curve::loading::STEP_WIDTH_SHARE;
 use crate::curve::{Envelope, ForceCurve};
@@ -97,20 +98,20 @@ impl ReadCurve {
         }
     }
 
-    /// The curve of the columns as they are in the file, of `least` points. A record over time keeps its signs, which follow from its motion.
-    pub(super) fn sorted(mut self, least: usize) -> Result<Self, Error> {
+    /// The curve of the columns as they are in the file. A record over time keeps its signs, which follow from its motion.
+    pub(super) fn sorted(mut self) -> Result<Self, Error> {
         let points = self.force_n.len();
         if self.is_ready {
             return Ok(self);
         }
-        if points < least {
-            return Err(too_few(points, least, ""));
+        if points < MIN_POINTS {
+            return Err(too_few(points, ""));
         }
         self.check_finite()?;
         if self.time_s.is_none() {
             let mut points = Points::of(&self);
             let crush_m = self.facts.max_deflection_m;
-            let table = points.loading_then_unloading(crush_m, least, &mut self.notes)?;
+            let table = points.loading_then_unloading(crush_m, &mut self.notes)?;
             (self.deflection_m, self.force_n) = table.iter().map(|p| (p.d, p.f)).unzip();
         }
         Ok(self)
@@ -178,7 +179,6 @@ impl Points {
     fn loading_then_unloading(
         &mut self,
         crush_m: Option<f64>,
-        least: usize,
         notes: &mut Vec<String>,
     ) -> Result<Vec<Point>, Error> {
         self.turn(notes);
@@ -189,8 +189,8 @@ impl Points {
         self.remove_tail(crush_m, notes);
         self.set_steps_apart(notes);
         let points = self.list.len();
-        if points < least {
-            return Err(too_few(points, least, " without guard points and repeats"));
+        if points < MIN_POINTS {
+            return Err(too_few(points, " without guard points and repeats"));
         }
         self.check_order()?;
         if self.list[0].d > 0.0 {
@@ -378,8 +378,8 @@ impl Points {
     }
 }
 
-pub(super) fn too_few(points: usize, least: usize, of: &str) -> Error {
-    let points = crate::plural::counted(points, "point");
+pub(super) fn too_few(points: usize, of: &str) -> Error {
+    let (points, least) = (crate::plural::counted(points, "point"), MIN_POINTS);
     error!(CurveFile, "the curve has {points}{of}: expected at least {least}")
 }
 
@@ -420,7 +420,6 @@ fn steps_note(steps: &[(f64, Point, f64)]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::MIN_POINTS;
     use super::*;
 
     /// Points and notes of a table, or its error.
@@ -428,7 +427,7 @@ mod tests {
         let mut columns =
             ReadCurve { lines: (1..=points.len() as u64).collect(), ..ReadCurve::default() };
         (columns.deflection_m, columns.force_n) = points.iter().copied().unzip();
-        let curve = columns.sorted(MIN_POINTS).map_err(|e| e.to_string())?;
+        let curve = columns.sorted().map_err(|e| e.to_string())?;
         let points = curve.deflection_m.into_iter().zip(curve.force_n).collect();
         Ok((points, curve.notes.len()))
     }
@@ -464,7 +463,7 @@ mod tests {
             let mut columns = ReadCurve::default();
             (columns.deflection_m, columns.force_n) = points.iter().copied().unzip();
             columns.facts.max_deflection_m = Some(crush_m);
-            let curve = columns.sorted(MIN_POINTS).unwrap();
+            let curve = columns.sorted().unwrap();
             let last = (curve.deflection_m.last(), curve.force_n.last());
             assert_eq!(last, (Some(&end.0), Some(&end.1)));
             assert!(curve.notes[0].starts_with("points: 2 removed beyond the maximum crush"));
@@ -478,7 +477,7 @@ mod tests {
             let mut columns =
                 ReadCurve { lines: (1..=points.len() as u64).collect(), ..ReadCurve::default() };
             (columns.deflection_m, columns.force_n) = points.iter().copied().unzip();
-            let curve = columns.sorted(MIN_POINTS).unwrap();
+            let curve = columns.sorted().unwrap();
             let found = curve.deflection_m.iter().zip(&curve.force_n);
             for ((d, f), (de, fe)) in found.zip(expected) {
                 assert!((d - de).abs() < 1e-12 && f == fe, "{points:?}: {curve:?}");

@@ -47,7 +47,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     }
     let points = curve.deflection_m.len();
     if points < MIN_POINTS {
-        return Err(too_few(points, MIN_POINTS, ""));
+        return Err(too_few(points, ""));
     }
     if both {
         notes.push(match curve.body_force_n {

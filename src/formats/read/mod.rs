@@ -227,7 +227,7 @@ pub fn readers() -> impl Iterator<Item = &'static str> {
 /// It names the file, the place in it, what was expected there and what to do.
 pub fn read(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static str), Error> {
     let (found, format) = parse(path, options)?;
-    Ok((found.sorted(MIN_POINTS).map_err(curve::content(path))?, format))
+    Ok((found.sorted().map_err(curve::content(path))?, format))
 }
 
 /// A curve as it is in its file, and the name of the format.
@@ -280,9 +280,6 @@ pub(crate) enum DrivingFile {
     Curve(Box<ForceCurve>, Vec<String>),
 }
 
-/// Points of a curve that drives an interface; other tools want more.
-const LEAST_TO_DRIVE: usize = 2;
-
 /// Reads a file of any format as the curve of an interface. A plain table of increasing deflections from 0 is taken as it
 /// stands; of a record over time the loading branch drives.
 ///
@@ -303,7 +300,7 @@ pub(crate) fn driving(path: &Path, options: &ReadOptions) -> Result<DrivingFile,
     }
     // What lies beyond the maximum crush is of no use to a database; here it drives.
     let crush_m = found.facts.max_deflection_m.take();
-    let found = found.sorted(LEAST_TO_DRIVE).map_err(curve::content(path));
+    let found = found.sorted().map_err(curve::content(path));
     let mut curve = found.map_err(|sorted| error.unwrap_or(sorted))?;
     curve.facts.max_deflection_m = crush_m;
     let (curve, changes) = curve.driving().map_err(curve::content(path))?;
