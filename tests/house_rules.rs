@@ -211,7 +211,8 @@ fn no_unwrap_outside_tests() {
 fn functions_are_the_same_on_every_platform() {
     let functions = [
         "powf", "exp", "exp2", "exp_m1", "ln", "ln_1p", "log", "log2", "log10", "sin", "cos",
-        "tan", "sin_cos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "cbrt", "hypot",
+        "tan", "sin_cos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "asinh",
+        "acosh", "atanh", "cbrt", "hypot",
     ];
     for path in files(&root().join("src"), "rs") {
         let text = fs::read_to_string(&path).unwrap();
@@ -228,7 +229,7 @@ fn functions_are_the_same_on_every_platform() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 83732), ("files", 306), ("public types", 165), ("error types", 9)];
+    [("lines", 83754), ("files", 306), ("public types", 165), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {

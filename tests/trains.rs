@@ -894,7 +894,8 @@ fn a_curve_file_of_any_format_drives_an_interface() {
             let flown = -7.853_98 * (ms - 120.0);
             let crushed = 300.0 * (std::f64::consts::PI * ms / 120.0).sin();
             let d = if ms > 120.0 { flown } else { crushed };
-            format!("{ms},{},{}\n", sign * d, sign * (8.0 * d).max(0.0))
+            // With the offset of a load cell.
+            format!("{ms},{},{}\n", sign * d, sign * (8.0 * d).max(5.0))
         };
         let rows: String = (0..=360).map(row).collect();
         std::fs::write(here.join("back.csv"), format!("time_ms,d_mm,force_kN\n{rows}")).unwrap();

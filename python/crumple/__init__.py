@@ -396,7 +396,7 @@ class Curve:
     `pointwise_share`, the half width as a share of the level of the force around a deflection; `simultaneous_share`, how
     wide it would be to hold whole curves; `whole_curves`, the share of left-out curves that such a wide one held.
 
-    `document` is what `crumple predict --json` prints.
+    `document` is what `crumple predict --json` prints. The others follow from it, and cannot be replaced.
     """
 
     def __init__(self, document):
@@ -422,9 +422,10 @@ class Curve:
         of = document["provenance"].get("band")
         self.band_level = None if of is None else of["level"]
         self.warnings = document.get("warnings", [])
+        self._of_document = frozenset(self.__dict__)
 
     def __setattr__(self, name, value):
-        if name in self.__dict__:
+        if name in self.__dict__.get("_of_document", ()):
             raise AttributeError(
                 f"{name} is that of the document, which is what is exported: "
                 "give a changed one, crumple.Curve({**curve.document, 'force_N': list(...)})"

@@ -88,6 +88,8 @@ def test_what_is_exported_cannot_be_changed_by_its_arrays():
             values[:] = 1.0
     with pytest.raises(AttributeError, match="^force is that of the document"):
         curve.force = 1.2 * curve.force
+    curve.label = "worst"
+    curve.label = "best"
     worse = crumple.Curve({**curve.document, "force_N": list(1.2 * curve.force)})
     assert np.array_equal(pickle.loads(pickle.dumps(worse)).force, 1.2 * curve.force)
 

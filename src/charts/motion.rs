@@ -242,7 +242,9 @@ impl Motion {
             Quantity::Velocity => bodies.any(|body| !body.v_m_per_s.is_empty()),
             Quantity::Acceleration => bodies.any(|body| !body.a_m_per_s2.is_empty()),
             Quantity::Crush => interfaces.any(|of| !of.deflection_m.is_empty()),
-            Quantity::Force | Quantity::Energy => interfaces.any(|of| !of.force_n.is_empty()),
+            Quantity::Force => interfaces.any(|of| !of.force_n.is_empty()),
+            // That of a result is refused where it is drawn.
+            Quantity::Energy => true,
         }
     }
 
@@ -270,7 +272,7 @@ pub(crate) const USUAL_CLASS: u32 = 60;
 /// frequency class of SAE J211-1. More than six lines are drawn in a panel per body or interface.
 ///
 /// # Errors
-/// For a name that no run has, and for quantities that no result holds.
+/// For a name that no run has, and for a quantity that a result does not hold.
 pub fn motion(
     title: &str,
     runs: &[(String, Motion)],

@@ -164,6 +164,11 @@ impl Envelope {
         }
     }
 
+    /// Steepest rise in N/m, but for jumps whose points a reader has set apart, if it rises anywhere else.
+    pub(crate) fn steepest_rise(&self) -> f64 {
+        super::loading::steepest_rise(self.deflection_m(), self.force_n())
+    }
+
     /// Steepest rise, in N/m; 0 if the force never rises.
     pub fn max_slope(&self) -> f64 {
         let slope = |i: usize| {

@@ -169,7 +169,7 @@ impl ForceCurve {
     pub(crate) fn continued(mut self, tail: Tail) -> Result<Self, Error> {
         let data_end_m = self.data_end_m.unwrap_or(self.loading.end_m());
         let known = self.unloading.stiffness_n_per_m().filter(|k| *k > 0.0);
-        let stiffness_n_per_m = known.unwrap_or_else(|| self.loading.max_slope());
+        let stiffness_n_per_m = known.unwrap_or_else(|| self.loading.steepest_rise());
         // A force that never rises bottoms by no slope.
         let tail = if stiffness_n_per_m > 0.0 { tail } else { Tail::Hold };
         let (loading, beyond) = (&self.loading, self.beyond.take());
@@ -314,7 +314,7 @@ pub(crate) fn bottomed(
     let (crushed_m, level_n) = (held.end_m(), held.force_at(held.end_m()));
     let to_highest_m = (HIGHEST * peak_n - level_n) / stiffness_n_per_m;
     let on_grid_m = (to_highest_m / interval_m - 1e-9).ceil().max(1.0) * interval_m;
-    // Of a stiffness that a force rises by far in one interval the grid ends.
+    // A stiffness that would pass the peak within one interval leaves the grid, so that the force ends where it should.
     let is_steep = to_highest_m > 0.0 && stiffness_n_per_m * interval_m > peak_n;
     let rise_m = if is_steep { to_highest_m } else { on_grid_m };
     d.push(crushed_m + rise_m);

@@ -50,7 +50,7 @@ pub(crate) const STEP_WIDTH_SHARE: f64 = 1e-4;
 /// More such steps in a row are a fine record and no jump.
 const MOST_AT_ONE: usize = 3;
 
-/// Steepest rise of a loading branch, in N/m: that of a jump, whose width says nothing, only if it rises nowhere else.
+/// Steepest rise of a loading branch, in N/m: jumps, whose width is ours, count only if it rises nowhere else.
 pub(crate) fn steepest_rise(deflection_m: &[f64], force_n: &[f64]) -> f64 {
     let step_m = |i: &usize| deflection_m[*i] - deflection_m[i - 1];
     let jump_m = STEP_WIDTH_SHARE * (1.0 + 1e-6) * deflection_m.last().copied().unwrap_or(0.0);
@@ -86,7 +86,7 @@ pub fn unloading_stiffness(curve: &Curve) -> Option<f64> {
 }
 
 /// Stiffness in N/m of the straight line from the maximum deflection that gives back the energy of the unloading branch up to
-/// where its force is first zero, `F²/2E`: a branch that is not straight rebounds by its energy, not by its slope.
+/// where its force is first zero, or to its end, `F²/2E`: a branch that is not straight rebounds by its energy, not by its slope.
 ///
 /// `None` where the branch has no [`unloading_stiffness`], or gives back nothing.
 pub(crate) fn stiffness_of_unloading_energy(curve: &Curve) -> Option<f64> {

@@ -23,7 +23,7 @@ fn measured(recipe: &str) -> serde_json::Value {
         return recipe.into();
     };
     let imported = &whole["imported"];
-    let keys = ["has_times", "moves_by_its_force"];
+    let keys = ["has_times", "moves_by_its_force", "contact_alone"];
     serde_json::json!([whole["recipe"], whole["half_model"], keys.map(|key| &imported[key])])
 }
 
@@ -51,6 +51,10 @@ pub(crate) fn mean_of(first: &Case, others: &[&Case]) -> Result<Case, Error> {
     let mut of = first.clone();
     of.id.name = format!("{} (mean of {})", first.id.name, runs.len());
     of.conditions.speed.m_per_s = mean(|run| run.conditions.speed.m_per_s);
+    let masses = &mut of.conditions.masses;
+    masses.body_kg = mean(|run| run.conditions.masses.body_kg);
+    let others: Option<f64> = runs.iter().map(|run| run.conditions.masses.other_kg).sum();
+    masses.other_kg = others.map(|sum| sum / runs.len() as f64);
     of.curves.closing_speed_m_per_s = mean_over_time(&speeds, sampled.time_s());
     of.curves.sampled = sampled;
     of.curves.original = mean_curve(&runs, |run| &run.curves.original)?;

@@ -58,9 +58,9 @@ pub struct Feature {
 
 /// The parameter that masses become if they differ within a group.
 pub(crate) const MASS: &str = "mass_kg";
-/// Masses that differ by less than this share are one: so much a solver's mass scaling and rounding make of one design. No model
-/// of speed alone could take them otherwise.
-const SAME_MASS: f64 = 5e-3;
+/// Masses that differ by less than this share are one: mass scaling and rounding change one design by that much, and no model of
+/// speed alone could take them otherwise.
+pub(crate) const SAME_MASS: f64 = 5e-3;
 /// The same for other numbers, of which only the rounding is known.
 const SAME_NUMBER: f64 = 1e-9;
 /// The mass of the other body of a pair, where it is not that of the first.

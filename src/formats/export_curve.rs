@@ -205,6 +205,13 @@ impl ExportCurve {
         if more > 1.01 && more.is_finite() { own * more.powi(2) } else { own }
     }
 
+    /// The same curve with that stiffness for its own.
+    pub(crate) fn along_a_line(&self) -> Self {
+        let mut curve = self.clone();
+        curve.predicted.unloading_stiffness_n_per_m = self.line_stiffness_n_per_m();
+        curve
+    }
+
     /// The curve as it drives an interface, tail included.
     pub fn driving(&self) -> ForceCurve {
         ForceCurve {
@@ -394,7 +401,7 @@ impl ExportCurve {
             return "no run shows the rebound: at least the steepest rise, so as to generate no energy".into();
         }
         let (stop_m, max_crush_m) = (self.stop_m(&self.loading), self.max_crush_m());
-        // A contact force stops mass besides the body's, and so a body of one mass sooner.
+        // A force that does more work than the body has energy, as a contact force does, stops one mass sooner.
         let from = match stop_m < 0.99 * max_crush_m {
             true => format!("{stop_m:.3} m, where it has stopped a body of one mass,"),
             false => "the maximum crush".into(),

@@ -21,7 +21,7 @@ pub(crate) fn write(curves: &[ExportCurve]) -> Result<Exported, Error> {
             std::iter::once((-0.01 * reach, 0.0)).chain(points).collect()
         };
         let (end_m, end_n) = (curve.max_crush_m(), curve.end_n());
-        let k_u = curve.stiffness_n_per_m();
+        let k_u = curve.line_stiffness_n_per_m();
         let open_m = end_m - end_n / k_u;
         matrix(&mut bytes, &named("fd_load"), &columns(&guarded(curve.force_n())));
         matrix(&mut bytes, &named("fd_unload"), &columns(&[(open_m, 0.0), (end_m, end_n)]));

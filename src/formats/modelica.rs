@@ -75,7 +75,7 @@ fn combi_table(curves: &[ExportCurve], stem: &str) -> Result<Exported, Error> {
             (curve.tail != Tail::Bottom).then(|| (1.1 * reach, curve.loading.force_at(reach)));
         let loading: Vec<(f64, f64)> = guards.into_iter().chain(points).chain(held).collect();
         let (end_m, end_n) = (curve.max_crush_m(), curve.end_n());
-        let open_m = end_m - end_n / curve.stiffness_n_per_m();
+        let open_m = end_m - end_n / curve.line_stiffness_n_per_m();
         let unloading = [(open_m - 0.01 * reach, 0.0), (open_m, 0.0), (end_m, end_n)];
         for (name, points) in [("fd_load", &loading[..]), ("fd_unload", &unloading)] {
             line!(lines, "double {name}{suffix}({},2)  # d [m], F [N]", points.len());

@@ -202,7 +202,8 @@ impl Spring {
             Some(stiffness) => self.curve.unloading_with(stiffness.0),
             None => self.curve,
         };
-        let rises = curve.unloading.stiffness_n_per_m().unwrap_or(curve.loading.max_slope()) > 0.0;
+        let rises =
+            curve.unloading.stiffness_n_per_m().unwrap_or(curve.loading.steepest_rise()) > 0.0;
         let is_elastic = table.law == LawName::Elastic;
         if table.end == Some(EnvelopeEnd::Bottom) && is_elastic && !rises {
             return Err(
@@ -229,7 +230,7 @@ impl Spring {
     fn memory(&self, table: &Table) -> Result<(Option<Unloading>, Vec<String>), Error> {
         let asked = table.unloading.map(|u| u.0);
         let known = self.curve.unloading.stiffness_n_per_m();
-        let steepest = self.curve.loading.max_slope();
+        let steepest = self.curve.loading.steepest_rise();
         let mut warnings = Vec::new();
         if asked.is_none() && known.is_none() && steepest > 0.0 {
             warnings.push(format!(

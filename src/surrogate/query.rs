@@ -10,12 +10,10 @@ use super::warning::{Warning, is_far_outside, outside_of};
 use super::{CaseCurve, Model, QueryPoint};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{EnergyAudit, Envelope, Masses, Parameter};
-use crate::dataset::{MASS, OTHER_MASS, feature_values};
+use crate::dataset::{MASS, OTHER_MASS, SAME_MASS, feature_values};
 use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::unit::Speed;
 
-/// Deviation of the mass from the training runs' that needs no warning.
-const SAME_MASS: f64 = 1e-3;
 /// Share of a curve over which the force before its maximum crush is averaged.
 const LAST_SHARE_OF_CRUSH: f64 = 0.05;
 /// Power of that force with which the separation speed goes: the energy returned with its root.

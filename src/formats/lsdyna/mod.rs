@@ -105,14 +105,19 @@ fn resampling_note(curve: &ExportCurve) -> Option<String> {
 }
 
 fn describe(lines: &mut String, curve: &ExportCurve, units: InUnits, material: Material) {
+    let along_a_line;
+    let curve = match material {
+        Material::S08 => curve,
+        Material::Mat121 | Material::S06 => {
+            along_a_line = curve.along_a_line();
+            &along_a_line
+        }
+    };
     line!(lines, "$ {}", units.stated());
     line!(
         lines,
         "$ unloading stiffness in these units: {}",
-        nine_digits(units.stiffness(match material {
-            Material::S08 => curve.stiffness_n_per_m(),
-            Material::Mat121 | Material::S06 => curve.line_stiffness_n_per_m(),
-        }))
+        nine_digits(units.stiffness(curve.stiffness_n_per_m()))
     );
     let facts = match material {
         Material::S08 => curve.facts(),

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::encoding::number;
 use crate::curve::contact::{THRESHOLD, onset, threshold_n};
-use crate::curve::loading::{loading_branch, steepest_rise, stiffness_of_unloading_energy};
+use crate::curve::loading::{loading_branch, stiffness_of_unloading_energy};
 use crate::curve::{Curve, CurveUnloading, Envelope, ForceCurve, ForceKind, SourceFile};
 use crate::file::absolute;
 use crate::unit::{SpeedKind, UnitSystem};
@@ -62,9 +62,11 @@ impl ReadCurve {
                 })?;
                 let first = time_s.iter().position(|t| *t >= onset.time_s).unwrap_or(0);
                 let rest = &d[first..];
-                // The force pushes while it is crushed; afterwards the body may go back by more than the crush.
-                let pushed: f64 =
-                    rest.iter().zip(&f[first..]).map(|(v, f)| f * (v - rest[0])).sum();
+                // Until it first parts the force pushes; afterwards the body may go back by more than the crush.
+                let threshold = threshold_n(&f, THRESHOLD);
+                let pushes = rest.iter().zip(&f[first..]).skip_while(|(_, f)| **f < threshold);
+                let pushes = pushes.take_while(|(_, f)| **f >= threshold);
+                let pushed: f64 = pushes.map(|(v, f)| f * (v - rest[0])).sum();
                 let deflection_m = rest.iter().map(|v| (v - rest[0]) * pushed.signum()).collect();
                 changes.push(format!(
                     "it is a record over time: its loading branch from {:.2} ms on drives the interface (crumple db add keeps all of it)",
@@ -81,10 +83,8 @@ impl ReadCurve {
                 "the force of point {point} of its loading branch is below 0: an interface only pushes, so write compression positive and tension as 0"
             ));
         }
-        let (d, f) = (envelope.deflection_m(), envelope.force_n());
-        let rise = Some(steepest_rise(d, f)).filter(|rise| *rise < envelope.max_slope());
         let known = self.facts.unloading_stiffness_n_per_m;
-        let stiffness = known.or_else(|| stiffness_of_unloading_energy(&curve)).or(rise);
+        let stiffness = known.or_else(|| stiffness_of_unloading_energy(&curve));
         let unloading = CurveUnloading::of(stiffness);
         Ok((ForceCurve { unloading, ..self.facts.driving(envelope) }, changes))
     }

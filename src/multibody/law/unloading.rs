@@ -195,7 +195,7 @@ impl ForceLaw {
         let loading = curve.loading.clone();
         let own = || {
             let known = curve.unloading.stiffness_n_per_m();
-            let stiffness_n_per_m = known.unwrap_or_else(|| loading.max_slope());
+            let stiffness_n_per_m = known.unwrap_or_else(|| loading.steepest_rise());
             if stiffness_n_per_m > 0.0 {
                 Unloading::Memory { stiffness_n_per_m }
             } else {
