@@ -706,7 +706,7 @@ fn several_parameters() {
 
 /// Masses that scatter by less than half a per cent are one, as are numbers that differ by rounding.
 #[test]
-fn numbers_that_only_scatter_are_no_parameters() {
+fn numbers_that_only_scatter_are_not_parameters() {
     for change in [(1.0 + 4e-9, 0.0), (1.004, 0.0), (1.0, 1e-12)] {
         let cases: Vec<Case> = [8.0, 10.0, 12.0]
             .map(|v| {
@@ -747,7 +747,7 @@ fn speeds_that_nearly_repeat_are_one_for_the_spline() {
     }
 }
 
-/// A title that differs is no other design where a parameter says so.
+/// Titles that differ are only warned of where no parameter tells the designs apart.
 #[test]
 fn titles_are_compared_among_equal_parameters() {
     let titled = |with_parameters: bool| {

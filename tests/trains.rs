@@ -897,6 +897,13 @@ fn a_curve_file_of_any_format_drives_an_interface() {
             // With the offset of a load cell.
             format!("{ms},{},{}\n", sign * d, sign * (8.0 * d).max(5.0))
         };
+        // A touch of one state goes before.
+        let touch = format!("0.0,0,{}\n0.1,{},0\n", sign * 900.0, sign * 0.78);
+        let touched: String = (1..=360).map(row).collect();
+        std::fs::write(here.join("touch.csv"), format!("time_ms,d_mm,force_kN\n{touch}{touched}"))
+            .unwrap();
+        let (found, _) = crush("touch.csv", "");
+        assert!((found / expected - 1.0).abs() < 0.05, "{found} m for {expected} m");
         let rows: String = (0..=360).map(row).collect();
         std::fs::write(here.join("back.csv"), format!("time_ms,d_mm,force_kN\n{rows}")).unwrap();
         let (found, _) = crush("back.csv", "");

@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_jump_is_no_stiffness() {
+    fn a_jump_is_not_a_stiffness() {
         let d = [0.0, 0.06, 0.06 + 4.5e-5, 0.45];
         assert!((steepest_rise(&d, &[0.0, 0.6, 1.2, 1.2]) - 10.0).abs() < 1e-9);
         assert!((steepest_rise(&d, &[0.0, 0.0, 1.2, 1.2]) - 1.2 / 4.5e-5).abs() < 1e-6);

@@ -62,11 +62,16 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
         let units = InUnits(options.units.or(units).unwrap_or(UnitSystem::SI));
         // Of the loading branch and of the material; that of the unloading is one more.
         let id = options.id + 2 * k as u32;
-        describe(&mut lines, curve, units, options.material);
+        // These unload along a line whatever the curve's slopes are.
+        let written = &match options.material {
+            Material::S08 => curve.clone(),
+            Material::Mat121 | Material::S06 => curve.along_a_line(),
+        };
+        describe(&mut lines, written, units, options.material);
         match options.material {
-            Material::S08 => inelastic(&mut lines, curve, units, id),
-            Material::Mat121 => discrete_beam(&mut lines, curve, units, id),
-            Material::S06 => general(&mut lines, curve, units, id),
+            Material::S08 => inelastic(&mut lines, written, units, id),
+            Material::Mat121 => discrete_beam(&mut lines, written, units, id),
+            Material::S06 => general(&mut lines, written, units, id),
         }
         notes.extend(note(curve, options.material));
         notes.extend(resampling_note(curve));
@@ -105,14 +110,6 @@ fn resampling_note(curve: &ExportCurve) -> Option<String> {
 }
 
 fn describe(lines: &mut String, curve: &ExportCurve, units: InUnits, material: Material) {
-    let along_a_line;
-    let curve = match material {
-        Material::S08 => curve,
-        Material::Mat121 | Material::S06 => {
-            along_a_line = curve.along_a_line();
-            &along_a_line
-        }
-    };
     line!(lines, "$ {}", units.stated());
     line!(
         lines,
@@ -151,7 +148,7 @@ fn discrete_beam(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u3
     define_curve(lines, (id + 1, &format!("{text} unloaded")), &nothing, units, 0);
     // A discrete beam needs its own mass: with VOL 1, a millionth of the body's.
     let density = ten_columns(1e-6 * curve.predicted.mass_kg / units.0.mass_kg);
-    let k = ten_columns(units.stiffness(curve.line_stiffness_n_per_m()));
+    let k = ten_columns(units.stiffness(curve.stiffness_n_per_m()));
     let (text, unloading) = (title(&text, TITLE_WIDTH), id + 1);
     line!(lines, "*MAT_GENERAL_NONLINEAR_1DOF_DISCRETE_BEAM_TITLE\n{text}");
     line!(lines, "$#     mid        ro         k   unldopt    offset     dampf");
@@ -167,7 +164,7 @@ fn general(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u32) {
     let text = curve.headline();
     define_curve(lines, (id, &text), &points, units, resampling(&points));
     let highest = curve.loading.peak_force_n();
-    let length = highest / curve.line_stiffness_n_per_m();
+    let length = highest / curve.stiffness_n_per_m();
     let unloading = [(-length, -highest), (0.0, 0.0), (length, 0.0)];
     define_curve(lines, (id + 1, &format!("{text} unloading")), &unloading, units, 0);
     let (text, unloading) = (title(&text, TITLE_WIDTH), id + 1);

@@ -62,11 +62,10 @@ impl ReadCurve {
                 })?;
                 let first = time_s.iter().position(|t| *t >= onset.time_s).unwrap_or(0);
                 let rest = &d[first..];
-                // Until it first parts the force pushes; afterwards the body may go back by more than the crush.
+                // While the body is crushed; afterwards it may go back by more than that, with the offset of a load cell.
                 let threshold = threshold_n(&f, THRESHOLD);
-                let pushes = rest.iter().zip(&f[first..]).skip_while(|(_, f)| **f < threshold);
-                let pushes = pushes.take_while(|(_, f)| **f >= threshold);
-                let pushed: f64 = pushes.map(|(v, f)| f * (v - rest[0])).sum();
+                let above = f[first..].iter().map(|f| (f - threshold).max(0.0));
+                let pushed: f64 = rest.iter().zip(above).map(|(v, f)| f * (v - rest[0])).sum();
                 let deflection_m = rest.iter().map(|v| (v - rest[0]) * pushed.signum()).collect();
                 changes.push(format!(
                     "it is a record over time: its loading branch from {:.2} ms on drives the interface (crumple db add keeps all of it)",
