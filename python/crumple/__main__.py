@@ -1,15 +1,26 @@
 """The program: `python -m crumple`, and the command `crumple` that comes with the package."""
 
+import os
 import signal
+import subprocess
 import sys
 
 from crumple import _crumple
+from crumple._commands import _program
+from crumple._errors import Error
 
 
 def main():
     # Ctrl-C ends the program at once, as without Python; a sweep installs its own way to stop.
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     sys.stdout.flush()
+    if not hasattr(_crumple, "main"):
+        try:
+            words = [*_program(), *sys.argv[1:]]
+            # Not again, should it be this one.
+            return subprocess.call(words, env={name: value for name, value in os.environ.items() if name != "CRUMPLE"})
+        except Error as error:
+            return f"error: {error}"
     return _crumple.main(["crumple", *sys.argv[1:]])
 
 

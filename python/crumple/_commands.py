@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -29,6 +30,14 @@ sys.exit(module.main(["crumple", *sys.argv[2:]]))
 
 
 def _program():
+    """How the program is started: it is in the compiled part, or the one that CRUMPLE names."""
+    if not hasattr(_crumple, "main"):
+        named = os.environ.get("CRUMPLE")
+        if not named:
+            raise Error("this package was built without the program: set CRUMPLE to the path of one, such as a release has")
+        if not shutil.which(named):
+            raise Error(f"CRUMPLE={named}: there is no program of that name")
+        return [named]
     if not sys.executable or getattr(sys, "frozen", False):
         raise Error("commands need a Python interpreter (sys.executable) to run in; this one is embedded or frozen")
     return [sys.executable, "-I", "-S", "-c", _START, _crumple.__file__]

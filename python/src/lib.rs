@@ -3,7 +3,7 @@
 //! Functions give plain tuples and buffers; `crumple/__init__.py` makes of them what a user meets.
 
 use std::collections::HashMap;
-use std::ffi::{OsString, c_int};
+use std::ffi::c_int;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -389,8 +389,9 @@ impl Forest {
 }
 
 /// The program with these arguments, the first its own name; gives its exit code.
+#[cfg(feature = "program")]
 #[pyfunction]
-fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+fn main(py: Python<'_>, arguments: Vec<std::ffi::OsString>) -> u8 {
     py.detach(|| crumple::cli::run_program(arguments))
 }
 
@@ -403,5 +404,7 @@ fn _crumple(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(read, module)?)?;
     module.add_function(wrap_pyfunction!(database, module)?)?;
     module.add_function(wrap_pyfunction!(read_case, module)?)?;
-    module.add_function(wrap_pyfunction!(main, module)?)
+    #[cfg(feature = "program")]
+    module.add_function(wrap_pyfunction!(main, module)?)?;
+    Ok(())
 }
