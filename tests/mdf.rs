@@ -55,8 +55,39 @@ fn signals_of_mdf_files_are_rated() {
     assert_eq!(of_mdf, of_csv);
     let error = crumple_fails(here, 1, &["rate", "run.mf4:a A9", "run.csv:a_m_per_s2[A2]"]);
     says(&error, "run.mf4: there is no channel \"a A9\": name one of \"time [s]\", \"x A1 [m]\"");
-    let error = crumple_fails(here, 1, &["rate", "run.mf4", "run.mf4"]);
-    says(&error, "run.mf4: there are several columns: name one of");
+    let error = crumple_fails(here, 1, &["rate", "run.mf4", "run.mf4", "--column", "a A9"]);
+    says(&error, "run.mf4: there is no channel \"a A9\": name one of");
+}
+
+/// A result in MDF is drawn, and compared with another, as that in CSV; a file of another program is not taken for one.
+#[test]
+fn results_in_mdf_are_those_in_csv() {
+    let folder = demo_folder();
+    let here = folder.path();
+    for name in ["mdf/run.mf4", "csv/run.csv"] {
+        fs::create_dir_all(here.join(name).parent().unwrap()).unwrap();
+        crumple_ok(here, &["simulate", "two-sets.toml", "-q", "-o", name]);
+    }
+    for quantity in ["velocity", "acceleration", "force", "crush"] {
+        for (run, picture) in [("mdf/run.mf4", "mdf.svg"), ("csv/run.csv", "csv.svg")] {
+            crumple_ok(here, &["plot", run, "--quantity", quantity, "-q", "-o", picture]);
+        }
+        let drawn = |name: &str| fs::read(here.join(name)).unwrap();
+        assert!(drawn("mdf.svg") == drawn("csv.svg"), "{quantity}");
+    }
+    crumple_ok(here, &["simulate", "eight-on-eight.toml", "-q", "-o", "other.csv"]);
+    let rated = |a: &str| crumple_in(here, &["rate", a, "other.csv", "--json"]).stdout;
+    assert!(rated("mdf/run.mf4") == rated("csv/run.csv") && !rated("csv/run.csv").is_empty());
+    let error = crumple_fails(here, 1, &["inspect", "mdf/run.mf4"]);
+    says(&error, "the result of a multi-body run: crumple plot draws it");
+
+    let whole = fs::read(here.join("mdf/run.mf4")).unwrap();
+    fs::write(here.join("cut.mf4"), &whole[..whole.len() / 2]).unwrap();
+    let error = crumple_fails(here, 1, "plot cut.mf4 -o cut.svg");
+    says(&error, "cut.mf4: byte ");
+    crumple_ok(here, &[&["export"], &CASE[..], &["-q", "-o", "case.mf4"]].concat());
+    let error = crumple_fails(here, 1, &["rate", "case.mf4", "mdf/run.mf4"]);
+    says(&error, "case.mf4: there are several columns: name one of");
 }
 
 /// Between the common times of a recipe a record may have peaks that they do not show: exports of those times say so.

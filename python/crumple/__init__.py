@@ -27,6 +27,7 @@ import re
 import tempfile
 import warnings
 from collections.abc import Mapping
+from itertools import islice
 from numbers import Number
 from pathlib import Path
 
@@ -105,6 +106,19 @@ class _Mapping(Mapping):
         return f"<{type(self).__name__}: {', '.join(map(str, self._items)) or 'empty'}>"
 
 
+class _Table:
+    """Shown as a table in notebooks, where pandas is installed."""
+
+    def _repr_html_(self):
+        try:
+            return self._shown()._repr_html_()
+        except ImportError:
+            return None
+
+    def _shown(self):
+        return self.to_pandas()
+
+
 class Component(_Mapping):
     """One component of a section: an array per id, over time; `None` is the id of a global quantity.
 
@@ -148,7 +162,7 @@ class Component(_Mapping):
         return _array(super().__getitem__(_key(entity)))
 
 
-class Section(_Mapping):
+class Section(_Table, _Mapping):
     """A section of a file: components by name. `time` has shape (states,), in the file's unit.
 
     `problems` says what is damaged or missing, `notes` what was done to the values.
@@ -174,9 +188,16 @@ class Section(_Mapping):
 
     def to_pandas(self):
         """A DataFrame over time with columns (component, id), in the file's units: `frame["x_velocity", 900001]`."""
+        return self._frame(self._columns())
+
+    def _shown(self):
+        # A notebook shows no more columns of however many.
+        return self._frame(islice(self._columns(), 20))
+
+    def _frame(self, histories):
         import pandas as pd
 
-        columns = {(component, "" if entity is None else entity): values for component, entity, values in self._columns()}
+        columns = {(component, "" if entity is None else entity): values for component, entity, values in histories}
         frame = pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
         frame.columns = pd.MultiIndex.from_tuples(frame.columns, names=["component", "id"])
         return frame
@@ -257,7 +278,7 @@ def read(path, ids=None, components=None, section=None, format=None):
     return Histories(Path(path), [Section(*of) for of in sections])
 
 
-class Case:
+class Case(_Table):
     """One FE run of a database. Arrays have shape (states,), from contact to the end of the record: after the largest
     deflection they go back along the unloading.
 
@@ -283,7 +304,7 @@ class Case:
         return f"<Case {self.name}: {self.speed * 3.6:.4g} km/h ({self.speed_kind})>"
 
 
-class Group(_Mapping):
+class Group(_Table, _Mapping):
     """Cases by name, in order of speed. Each is read from the file when it is first asked for, and no other with it."""
 
     _what = "case"
@@ -310,6 +331,16 @@ class Group(_Mapping):
             return pd.DataFrame({"case": case.name, "speed": case.speed, **columns})
 
         return pd.concat([frame(case) for case in self.values()], ignore_index=True)
+
+    def _shown(self):
+        """A row for each case, of the first ones if there are many: a notebook shows no more, and each is read."""
+        import pandas as pd
+
+        def row(case):
+            crush, force = case.deflection.max(), case.force.max()
+            return {"case": case.name, "speed": case.speed, "mass": case.mass, "deflection.max()": crush, "force.max()": force}
+
+        return pd.DataFrame([row(self[name]) for name in islice(self, 50)])
 
 
 class Database(_Mapping):
@@ -466,7 +497,7 @@ class Curve:
         return f"<Curve at {self.speed * 3.6:.4g} km/h up to {self.max_deflection:.3f} m>"
 
 
-class Run(_Mapping):
+class Run(_Table, _Mapping):
     """A multi-body run: arrays over time by column, such as `v_m_per_s[A1]`; `summary` and `ledger` are dicts."""
 
     _what = "column"

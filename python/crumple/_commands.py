@@ -1,5 +1,6 @@
 """Commands of the program as functions: they give the document that `--json` prints, as a dict."""
 
+import html
 import json
 import os
 import re
@@ -16,6 +17,33 @@ from crumple._errors import Error
 
 class Warned(UserWarning):
     """A warning of the program."""
+
+
+class Document(dict):
+    """What a command prints with `--json`. Notebooks show the lists of rows in it as tables, where pandas is installed."""
+
+    def _repr_html_(self):
+        try:
+            import pandas as pd
+        except ImportError:
+            return None
+        tables = []
+
+        def look(into, name):
+            for key, value in into.items():
+                title = f"{name} {key}".strip()
+                if isinstance(value, dict):
+                    look(value, title)
+                elif isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
+                    rows = [{k: v for k, v in row.items() if not isinstance(v, (dict, list))} for row in value]
+                    tables.append(f"<p>{html.escape(title)}</p>{pd.DataFrame(rows)._repr_html_()}")
+                    # Lists within other rows would be a table each.
+                    for row in value:
+                        if "group" in row:
+                            look(row, row["group"])
+
+        look(self, "")
+        return "".join(tables) or None
 
 
 # The program in a Python of its own, which looks into no folder and no setting but the compiled part.
@@ -129,7 +157,7 @@ def run(*arguments, check=True):
         return printed.decode()
     if check and document is None:
         raise Error("\n".join(said).strip() or f"crumple ended with code {child.returncode}")
-    return document
+    return Document(document) if isinstance(document, dict) else document
 
 
 def _options(options):

@@ -209,6 +209,17 @@ def test_databases_models_and_curves(tmp_path):
     exported = curve.export(tmp_path / "curve.k", units="mm-t-s")
     assert (tmp_path / "curve.k").stat().st_size == exported["bytes"]
     assert curve._repr_svg_().startswith("<svg") and database._repr_svg_().startswith("<svg")
+    # Tables are shown as such, and documents as their rows.
+    group = database["lead-car-wall"]
+    section = crumple.read(NODOUT).only()
+    for table, shown in [(group, "36kmh"), (group["36kmh"], "closing_speed"), (section, "x_velocity")]:
+        assert table._repr_html_().startswith("<div") and f">{shown}</t" in table._repr_html_()
+    assert len(group._shown()) == len(group) and len(section._shown().columns) == 12
+    run = crumple.simulate(DEMO / "scenario.toml")
+    assert ">v_m_per_s[A1]</th>" in run._repr_html_()
+    shown = database.validate("lead-car-wall")._repr_html_()
+    assert "<p>lead-car-wall rows</p>" in shown and ">acceleration_l1</th>" in shown
+    assert crumple.run("db", "diff", DEMO / "curves.h5", DEMO / "curves.h5")._repr_html_() is None
     trained = database.train(tmp_path / "own.model", "lead-car-wall", model="linear")
     assert trained.name == "linear" and trained.predict(50 / 3.6).force.shape == (trained.predict(50 / 3.6).deflection.shape)
 

@@ -10,6 +10,7 @@ use super::{Failure, usage};
 use crate::curve::{ForceKind, Parameter};
 use crate::error::error;
 use crate::file;
+use crate::formats;
 use crate::formats::read::ReadOptions;
 use crate::import::Settings;
 use crate::solver::{Selection, WantedId};
@@ -229,7 +230,7 @@ impl FileKind {
             }
             () if text.trim_start().starts_with('{') => Self::Curve,
             () if is_toml => Self::Scenario,
-            () if text.starts_with("time_s,") => Self::Result,
+            () if text.starts_with("time_s,") || formats::is_run(&head) => Self::Result,
             () if text.starts_with("# crumple sweep") => Self::Sweep,
             () => Self::Solver,
         })

@@ -115,6 +115,9 @@ fn of_crumple(path: &Path) -> Option<Error> {
         }
         FileKind::Model => "a model: crumple predict takes it, crumple plot draws it",
         FileKind::Sweep => "the results of a sweep: crumple plot draws them",
+        FileKind::Result => {
+            "the result of a multi-body run: crumple plot draws it, crumple rate compares it with another"
+        }
         _ => return None,
     };
     Some(error!(SolverFile, "{path}: this is {what}", path = path.display()))

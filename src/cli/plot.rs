@@ -10,8 +10,8 @@ use crate::charts::{self, Motion, Quantity};
 use crate::curve::{ForceKind, Parameter};
 use crate::database::Database;
 use crate::file::{self, write_all_whole};
-use crate::formats::ReadOptions;
 use crate::formats::read::{self, json};
+use crate::formats::{ReadOptions, run_table};
 use crate::plot::Chart;
 use crate::scenario::{self, CurveOrigin};
 use crate::solver::{self, WantedId};
@@ -360,7 +360,8 @@ fn of_runs(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
             Motion::of_run(&prepared, &run, notes)
         } else {
             let text = file::read(file, MOST_RESULT).map_err(|e| failed_at(file, e))?;
-            Motion::of_csv(&text).map_err(|e| failed_at(file, e))?
+            let table = run_table(text).and_then(|table| Motion::of_csv(&table));
+            table.map_err(|e| failed_at(file, e))?
         };
         let is_alone = args.files.iter().filter(|other| stem(other) == stem(file)).count() == 1;
         runs.push((if is_alone { stem(file) } else { file.display().to_string() }, motion));

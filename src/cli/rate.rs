@@ -352,10 +352,13 @@ impl Args {
 
 /// Whether a table has deflections of interfaces, as `crumple simulate -o` writes them.
 fn has_deflections(path: &Path) -> bool {
-    let mut header = String::new();
-    let read =
-        file::open(path).map(|f| BufReader::new(f).take(MAX_TABLE_BYTES).read_line(&mut header));
-    read.is_ok() && header.contains(",deflection_m[")
+    let mut header = Vec::new();
+    let read = file::open(path)
+        .map(|f| BufReader::new(f).take(MAX_TABLE_BYTES).read_until(b'\n', &mut header));
+    // The MDF file of a run always has them.
+    read.is_ok()
+        && (header.starts_with(b"MDF ")
+            || String::from_utf8_lossy(&header).contains(",deflection_m["))
 }
 
 /// Interfaces that begin within so many s of each other have no order.
@@ -365,7 +368,9 @@ const TIE_S: f64 = 0.002;
 fn rate_runs(reference: &Path, prediction: &Path, options: GlobalOptions) -> CommandResult {
     let read = |path: &Path| -> Result<Motion, Failure> {
         let text = file::read(path, MAX_TABLE_BYTES).map_err(|e| failed_at(path, e))?;
-        Motion::of_csv(&text).map_err(|e| failed_at(path, e))
+        formats::run_table(text)
+            .and_then(|table| Motion::of_csv(&table))
+            .map_err(|e| failed_at(path, e))
     };
     let (r, p) = (read(reference)?, read(prediction)?);
     let Some(found) = accept(&r.stages(), &p.stages(), TIE_S) else {

@@ -54,7 +54,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         if is_mme(path) {
             write_channels(path, &prepared, &run)?;
         } else if is_mdf(path) {
-            write_whole(path, &mdf_of(&columns))?;
+            write_whole(path, &mdf::of_run(&columns))?;
         } else {
             let mut csv = Vec::new();
             write_csv(&mut csv, &columns)?;
@@ -90,31 +90,6 @@ fn is_mme(output: &Path) -> bool {
 
 fn is_mdf(output: &Path) -> bool {
     output.extension().is_some_and(|e| e.eq_ignore_ascii_case("mf4"))
-}
-
-/// The columns as channels, with their units beside their names.
-fn mdf_of(columns: &[(String, &[f64])]) -> Vec<u8> {
-    const UNITS: [(&str, &str); 5] =
-        [("_m_per_s2", "m/s^2"), ("_m_per_s", "m/s"), ("_m", "m"), ("_N", "N"), ("_s", "s")];
-    let named = |(name, _): &(String, &[f64])| {
-        let (quantity, of) = name.split_once('[').unwrap_or((name, ""));
-        let unit = UNITS.iter().find(|(end, _)| quantity.ends_with(end));
-        let (end, unit) = unit.copied().unwrap_or_default();
-        let name = format!("{} {}", quantity.trim_end_matches(end), of.trim_end_matches(']'));
-        (name.trim().to_string(), unit)
-    };
-    let channels: Vec<mdf::Channel> = columns
-        .iter()
-        .skip(1)
-        .map(|column| {
-            let (name, unit) = named(column);
-            mdf::Channel { name, unit, values: column.1 }
-        })
-        .collect();
-    let time_s = columns.first().map_or(&[][..], |(_, time_s)| time_s);
-    let about =
-        "multi-body run of crumple: x positive in the direction in which the first train moves";
-    mdf::file(about, "run", time_s, &channels)
 }
 
 /// Column names and values, in the order of the scenario.

@@ -50,13 +50,38 @@ pub(super) fn write_case(case: &Case) -> Result<Exported, Error> {
     Ok(Exported { files: vec![(format!("{name}.mf4"), bytes)], notes, ..Exported::default() })
 }
 
+/// Comment of a run's file.
+pub(super) const RUN: &str =
+    "multi-body run of crumple: x positive in the direction in which the first train moves";
+
+/// How the columns of a run end, and the units of their channels.
+const UNITS: [(&str, &str); 5] =
+    [("_m_per_s2", "m/s^2"), ("_m_per_s", "m/s"), ("_m", "m"), ("_N", "N"), ("_s", "s")];
+
+/// A run: of the times and columns such as `v_m_per_s[A1]` a channel "v A1" in m/s each.
+pub(crate) fn of_run(columns: &[(String, &[f64])]) -> Vec<u8> {
+    let channels = columns.iter().skip(1).map(|(name, values)| {
+        let (quantity, of) = name.split_once('[').unwrap_or((name, ""));
+        let unit = UNITS.iter().find(|(end, _)| quantity.ends_with(end));
+        let (end, unit) = unit.copied().unwrap_or_default();
+        let name = format!("{} {}", quantity.trim_end_matches(end), of.trim_end_matches(']'));
+        Channel { name: name.trim().to_string(), unit, values }
+    });
+    let channels: Vec<Channel<'_>> = channels.collect();
+    file(RUN, "run", columns.first().map_or(&[], |(_, time_s)| time_s), &channels)
+}
+
+/// The column of a run's channel, as [`of_run`] has got it.
+pub(super) fn column_of(name: &str, unit: &str) -> String {
+    let end = UNITS.iter().find(|(_, of)| *of == unit).map_or("", |(end, _)| end);
+    match name.split_once(' ') {
+        Some((quantity, of)) => format!("{quantity}{end}[{of}]"),
+        None => format!("{name}{end}"),
+    }
+}
+
 /// A file with these channels.
-pub(crate) fn file(
-    comment: &str,
-    group: &str,
-    time_s: &[f64],
-    channels: &[Channel<'_>],
-) -> Vec<u8> {
+fn file(comment: &str, group: &str, time_s: &[f64], channels: &[Channel<'_>]) -> Vec<u8> {
     let mut out = Blocks(Vec::new());
     out.0.extend_from_slice(b"MDF     4.10    crumple \0\0\0\0");
     out.0.extend_from_slice(&410u16.to_le_bytes());

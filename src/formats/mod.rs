@@ -34,8 +34,8 @@ pub use export_curve::ExportCurve;
 pub(crate) use export_curve::TargetUnloading;
 pub use fmu::{FmiVersion, Spring, archive, binaries};
 pub(crate) use lsdyna::Material;
-pub(crate) use read::history;
 pub use read::{ReadCurve, ReadOptions, read, readers};
+pub(crate) use read::{history, is_run, run_table};
 
 /// One target: its name, file extensions, capabilities and writer.
 pub struct Format {

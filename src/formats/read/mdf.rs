@@ -15,6 +15,7 @@ use super::curve::ReadCurve;
 use super::label::{Label, Quantity};
 use super::{Input, tables};
 use crate::error::{Error, error};
+use crate::formats::mdf::{RUN, column_of};
 use crate::guess;
 use crate::plural::counted;
 
@@ -46,6 +47,28 @@ fn opened(bytes: &[u8]) -> Result<(Blocks<'_>, Block<'_>, Vec<Group>), Error> {
     let header = file.block(64, b"HD")?;
     let groups = groups(&file, &header)?;
     Ok((file, header, groups))
+}
+
+/// Whether a file that begins so is a run's, as `crumple simulate -o` writes it.
+pub(crate) fn is_run(head: &[u8]) -> bool {
+    let mut parts = head.windows(RUN.len());
+    head.starts_with(BEGINNING)
+        && head[BEGINNING.len() * 2..].starts_with(OURS)
+        && parts.any(|part| part == RUN.as_bytes())
+}
+
+/// The table of a run's file, with the columns of its CSV file.
+pub(super) fn run(bytes: &[u8]) -> Result<String, Error> {
+    let (file, _, mut groups) = opened(bytes)?;
+    let [group] = &mut groups[..] else {
+        return Err(wrong("expected the one group of channels that crumple simulate writes"));
+    };
+    for channel in &mut group.channels {
+        channel.name = column_of(&channel.name, &std::mem::take(&mut channel.unit));
+    }
+    let mut text = String::new();
+    group.rows(&file, &mut text)?;
+    Ok(text)
 }
 
 /// The table of the group with the channel called `wanted`, and how the table calls it: of that channel and the times.

@@ -36,6 +36,7 @@ use crate::unit::UnitSystem;
 pub(crate) use curve::Metadata;
 pub use curve::ReadCurve;
 use label::Quantity;
+pub(crate) use mdf::is_run;
 
 /// One format of curves.
 #[derive(Debug)]
@@ -130,6 +131,11 @@ pub(crate) fn history(bytes: &[u8], wanted: Option<&str>) -> Result<tables::Hist
         Some((table, called)) => tables::history(table.as_bytes(), called.as_deref().or(wanted)),
         None => tables::history(bytes, wanted),
     }
+}
+
+/// The table of a multi-body run: of an MDF file, as its CSV file would be.
+pub(crate) fn run_table(bytes: Vec<u8>) -> Result<Vec<u8>, Error> {
+    if mdf::is_run(&bytes) { Ok(mdf::run(&bytes)?.into_bytes()) } else { Ok(bytes) }
 }
 
 /// What the user gives besides the file.
