@@ -241,8 +241,9 @@ impl Dimension {
         })?;
         let unit = unit.trim();
         if unit.is_empty() {
-            let units = self.units.iter().take(2);
-            let examples: Vec<String> = units.map(|(u, _)| format!("\"{number}{u}\"")).collect();
+            let in_si = self.units.iter().filter(|(name, size)| *size == 1.0 && *name != "mm/ms");
+            let units = [self.example_unit].into_iter().chain(in_si.map(|(name, _)| *name));
+            let examples: Vec<String> = units.map(|unit| format!("\"{number}{unit}\"")).collect();
             let example = examples.join(" or ");
             return Err(error!(
                 Other,

@@ -938,13 +938,34 @@ fn nothing_is_overwritten() {
     let error = crumple_fails(&here, 1, "init");
     says(
         &error,
-        "study.toml exists already and is not overwritten: name another with -o, or remove it",
+        "study.toml exists already and is not overwritten: name another with -o, or replace it with --overwrite",
     );
     assert_eq!(fs::read(here.join("study.toml")).unwrap(), b"mine");
     crumple_fails(&here, 1, "init -o 25kmh");
+    crumple_fails(&here, 1, "init -o 25kmh --overwrite");
+    crumple_ok(&here, "init --overwrite");
+    crumple_ok(&here, "build -q");
     let error = crumple_fails(&here, 2, "init -o - --json");
     says(&error, "-o - and --json both write to standard output");
     says(&crumple_fails(&here, 1, "init -o none/study.toml"), "the folder none does not exist");
+}
+
+/// A mass that the records contradict is taken, with a warning: it may be that of a wrong unit.
+#[test]
+fn a_given_mass_is_compared_with_the_records() {
+    let (_folder, here) = four_runs();
+    let said = |line: &str| {
+        let words: Vec<&str> = line.split(' ').collect();
+        String::from_utf8(crumple_in(&here, &words).stderr).unwrap()
+    };
+    let warned = said("init --mass 30t -o heavy.toml");
+    says(
+        &warned,
+        "mass: --mass is 30 t, but the record of 25kmh gives 24 t: check it, and its unit",
+    );
+    assert_eq!(warned.matches("--mass is").count(), 1);
+    assert!(!said("init --mass 25t -o near.toml").contains("--mass is"));
+    assert_eq!(study(&here, "heavy.toml")["run"][0]["mass"].as_str(), Some("30t"));
 }
 
 #[test]

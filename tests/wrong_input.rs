@@ -328,6 +328,7 @@ fn outputs_replace_no_other_kind_of_file() {
     let here = folder.path();
     let nodout = fixture("fe/lead-car-wall/25kmh/nodout");
     fs::copy(nodout, here.join("kept")).unwrap();
+    fs::write(here.join("own.csv"), "t_s,a_g\n0,1\n").unwrap();
     let before = |name: &str| fs::read(here.join(name)).unwrap();
     for (line, name, what) in [
         (
@@ -336,6 +337,11 @@ fn outputs_replace_no_other_kind_of_file() {
             "a manifest",
         ),
         ("train curves.h5 --group lead-car-wall --model linear -o kept", "kept", "a solver's file"),
+        (
+            "train curves.h5 --group lead-car-wall --model linear -o own.csv",
+            "own.csv",
+            "a file of another kind",
+        ),
         ("predict lead.model --speed 50km/h --to csv -o pair.model", "pair.model", "a model"),
         ("export lead50.json --to csv -o curves.h5", "curves.h5", "an HDF5 file"),
         ("export lead.model --to table -o curves.h5", "curves.h5", "an HDF5 file"),

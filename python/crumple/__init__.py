@@ -102,6 +102,13 @@ class _Mapping(Mapping):
     def __len__(self):
         return len(self._items)
 
+    # Two with equal arrays are not one, and arrays have no single truth value.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+    def _ipython_key_completions_(self):
+        return list(self)
+
     def __repr__(self):
         return f"<{type(self).__name__}: {', '.join(map(str, self._items)) or 'empty'}>"
 
@@ -156,6 +163,11 @@ class Component(_Mapping):
     def array(self):
         """All ids beside one another, as a new array of shape (states, ids)."""
         return np.column_stack(list(self.values()))
+
+    def __array__(self, dtype=None, copy=None):
+        if copy is False:
+            raise ValueError("the ids are arrays of their own: beside one another they are a copy")
+        return self.array.astype(np.float64 if dtype is None else dtype, copy=False)
 
     def __getitem__(self, entity):
         """The values of an id, given as a number, as text ("3:surfa"), or None."""
@@ -230,7 +242,7 @@ class Section(_Table, _Mapping):
         return "id" if all(ids == all_ids[0] for ids in all_ids) else f"id_{component.name}"
 
 
-class Histories(_Mapping):
+class Histories(_Table, _Mapping):
     """What a solver wrote, in its units: sections by name. A text file has one, named after its format.
 
     `histories["nodout"]["x_velocity"][900001]` is an array over time; `to_pandas()` a table of all.
@@ -265,6 +277,16 @@ class Histories(_Mapping):
         """`Section.to_xarray` of the only section."""
         return self.only().to_xarray()
 
+    def _shown(self):
+        import pandas as pd
+
+        def row(section, component):
+            first, last = (section.time[0], section.time[-1]) if len(section.time) else (None, None)
+            ids = len(component)
+            return {"section": section.name, "component": component.name, "ids": ids, "states": len(section.time), "from": first, "to": last}
+
+        return pd.DataFrame([row(section, component) for section in self.values() for component in section.values()])
+
 
 def read(path, ids=None, components=None, section=None, format=None):
     """Read a solver's file: any that the program reads (nodout, rcforc, binout, T01, ...). Values are in the file's units.
@@ -292,6 +314,12 @@ class Case(_Table):
         (self.mass, self.other_mass), self.force_kind = masses, force_kind
         self.time, self.deflection, self.force, self.body_force, self.closing_speed = map(_array, curves)
         self.tags, self.warnings = tags, warnings
+        self._is_read = True
+
+    def __setattr__(self, name, value):
+        if "_is_read" in self.__dict__:
+            raise AttributeError(f"{name}: a case is as it was read, and kept for the next who asks; compute with arrays of your own")
+        super().__setattr__(name, value)
 
     def to_pandas(self):
         """A DataFrame over time: deflection, force, body_force, closing_speed, in SI."""
@@ -309,9 +337,9 @@ class Group(_Table, _Mapping):
 
     _what = "case"
 
-    def __init__(self, path, name, cases):
+    def __init__(self, path, name, cases, state):
         super().__init__(dict.fromkeys(cases))
-        self.path, self.name = path, name
+        self.path, self.name, self._state = path, name, state
 
     def __contains__(self, name):
         return name in self._items
@@ -319,6 +347,8 @@ class Group(_Table, _Mapping):
     def __getitem__(self, name):
         case = super().__getitem__(name)
         if case is None:
+            if _state(self.path) != self._state:
+                raise Error(f"{self.path} has changed since it was opened, and its cases with it: open it again")
             case = self._items[name] = Case(*_crumple.case(os.fspath(self.path), self.name, name))
         return case
 
@@ -344,15 +374,17 @@ class Group(_Table, _Mapping):
 
 
 class Database(_Mapping):
-    """A curve database: groups by name. Open it again after another program has changed the file."""
+    """A curve database: groups by name. Open it again after the file was changed, by `build` or another program."""
 
     _what = "group"
 
     def __init__(self, path):
         # Cases are read later, perhaps from another folder.
         self.path = Path(path).resolve()
+        # Before it is read: a change in between is then found.
+        state = _state(self.path) if self.path.exists() else None
         groups = _crumple.database(os.fspath(path))
-        super().__init__({name: Group(self.path, name, cases) for name, cases in groups})
+        super().__init__({name: Group(self.path, name, cases, state) for name, cases in groups})
 
     def validate(self, group=None, **options):
         """As `crumple.validate`."""
@@ -517,6 +549,16 @@ class Run(_Table, _Mapping):
 def simulate(scenario):
     """Run a scenario (TOML)."""
     return Run(run("simulate", "--", scenario))
+
+
+def _state(path):
+    """What differs once a file was written anew."""
+    of = os.stat(path)
+    return of.st_ino, of.st_size, of.st_mtime_ns
+
+
+def __dir__():
+    return [*__all__, "__version__", "sklearn"]
 
 
 def _picture(path, *arguments):

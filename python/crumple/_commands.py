@@ -11,6 +11,8 @@ import sys
 import tempfile
 import warnings
 
+from numbers import Number
+
 from crumple import _crumple
 from crumple._errors import Error
 
@@ -30,13 +32,18 @@ class Document(dict):
         tables = []
 
         def look(into, name):
+            # Found, and from what, as by init.
+            if set(into) == {"value", "evidence", "from"}:
+                tables.append(f"<p>{html.escape(name)}: {html.escape(str(into['value']))} ({html.escape(into['evidence'])}: {html.escape(into['from'])})</p>")
+                return
             for key, value in into.items():
                 title = f"{name} {key}".strip()
                 if isinstance(value, dict):
                     look(value, title)
                 elif isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
-                    rows = [{k: v for k, v in row.items() if not isinstance(v, (dict, list))} for row in value]
-                    tables.append(f"<p>{html.escape(title)}</p>{pd.DataFrame(rows)._repr_html_()}")
+                    rows = pd.json_normalize(value, max_level=1)
+                    plain = [name for name in rows if not rows[name].map(lambda cell: isinstance(cell, (dict, list))).any()]
+                    tables.append(f"<p>{html.escape(title)}</p>{rows[plain]._repr_html_()}")
                     # Lists within other rows would be a table each.
                     for row in value:
                         if "group" in row:
@@ -129,7 +136,8 @@ def run(*arguments, check=True):
     `run("validate", "curves.h5", "--group", "lead-car-wall")`; warnings become Python warnings (`crumple.Warned`). Progress is
     shown by tqdm, if it is installed, on a terminal and in notebooks.
 
-    Raises `crumple.Error` if the command fails.
+    Raises `crumple.Error` if the command fails. Where only a part of its work does, such as a run of a study, that is a warning, and
+    in the document.
     """
     words = [os.fspath(a) if isinstance(a, os.PathLike) else str(a) for a in arguments]
     words = [*_program(), "--json", *words]
@@ -139,14 +147,18 @@ def run(*arguments, check=True):
             said = _ended(child, arguments[0] if arguments else "")
         out.seek(0)
         printed = out.read()
-    for line in said:
-        if line.startswith("warning: "):
-            warnings.warn(line.removeprefix("warning: "), Warned, stacklevel=3)
     try:
         document = json.loads(printed) if printed.strip() else None
     except ValueError:
         document = None
     failed = isinstance(document, dict) and set(document) == {"error"}
+    for line in said:
+        # Errors besides a document are of parts: a run of a study, a group.
+        kind, _, text = line.partition(": ")
+        if kind == "warning" or (kind == "error" and document is not None and not failed):
+            warnings.warn(text, Warned, stacklevel=3)
+    if check and child.returncode == 3:
+        raise Error("the work is done, but there are warnings, and strict was asked for")
     if check and failed:
         error = Error.of_document(printed)
         if re.search(r"(^|[\s'(])--[a-z]", str(error)):
@@ -160,6 +172,9 @@ def run(*arguments, check=True):
     return Document(document) if isinstance(document, dict) else document
 
 
+_SI = {"--mass": "kg", "--other-mass": "kg", "--speed": "m/s", "--crush": "m"}
+
+
 def _options(options):
     """Keyword arguments as options: `nsdm_seeds=3` is `--nsdm-seeds 3`, `True` a flag, a list an option each."""
     words = []
@@ -169,7 +184,9 @@ def _options(options):
             if one is True:
                 words.append(option)
             elif one is not None and one is not False:
-                words.append(f"{option}={one}")
+                # Numbers are in SI.
+                unit = _SI.get(option, "") if isinstance(one, Number) else ""
+                words.append(f"{option}={one}{unit}")
     return words
 
 
@@ -195,7 +212,10 @@ def init(runs, output=None, **options):
     runs = [runs] if isinstance(runs, (str, os.PathLike)) else list(runs)
     if not runs:
         raise Error("there are no run folders: name at least one")
-    return run("init", *_output(output), *_options(options), "--", *runs)
+    document = run("init", *_output(output), *_options(options), "--", *runs)
+    for left in document.get("left_out", []):
+        warnings.warn(f"{left['path']} is left out: {left['message']}", Warned, stacklevel=2)
+    return document
 
 
 def validate(database, group=None, **options):
@@ -203,7 +223,9 @@ def validate(database, group=None, **options):
 
     Of each of `["groups"]`, `chosen` is the model that `train` takes, `means` has each model's mean errors: `force_l1`, `velocity_l1` and
     `acceleration_l1` are mean absolute differences over the mean absolute value of FE, `max_crush_error` and `energy_error` relative. `inner`
-    marks speeds between others, of which the means are; `floors` say what FE's own curve leaves of the motion.
+    marks speeds between others, of which the means are; `floors` say what FE's own curve leaves of the motion. `rows` have the errors at each
+    speed, with signs where they have one, `peak_force_error` of the largest force among them; `acceptance` judges the chosen model there by
+    the rule for numerical crash models that rail practice quotes from EN 15227.
     Options are those of `crumple validate`: `against="old.json"`.
     """
     return run("validate", *_options({"group": group, **options}), "--", database)

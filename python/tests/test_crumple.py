@@ -40,6 +40,41 @@ def test_histories_are_those_of_the_file():
     assert histories.problems == [] and len(section.time) == 400
 
 
+def test_numpy_takes_the_values_of_a_component():
+    component = crumple.read(NODOUT).only()["x_velocity"]
+    assert np.array_equal(np.asarray(component), component.array) and np.max(component) == component[900001].max()
+    assert np.asarray(component, dtype=np.float32).dtype == np.float32
+    with pytest.raises(ValueError):
+        np.asarray(component, copy=False)
+
+
+def test_what_is_left_out_or_fails_is_a_warning(tmp_path):
+    runs = tmp_path / "runs"
+    for speed in ("25kmh", "36kmh", "48kmh"):
+        shutil.copytree(DEMO / "fe/lead-car-wall" / speed, runs / speed)
+    study = tmp_path / "study.toml"
+    found = crumple.init(runs, study)
+    assert "mass_kg.value" in found._repr_html_() and "<p>units: mm-t-s (" in found._repr_html_()
+    crumple.build(study, tmp_path / "own.h5")
+    database = crumple.Database(tmp_path / "own.h5")
+    assert len(database["runs"]["25kmh"].force) > 0
+    (runs / "36kmh/nodout").unlink()
+    with pytest.warns(crumple.Warned, match='36kmh has no file "nodout".*the case of an earlier build is kept'):
+        built = crumple.build(study, tmp_path / "own.h5", overwrite=True)
+    assert [run["outcome"] for run in built["runs"]] == ["unchanged", "failed", "unchanged"]
+    with pytest.raises(crumple.Error, match="already and is not overwritten: name another with -o, or replace it with --overwrite"):
+        crumple.init(runs, study)
+    with pytest.warns(crumple.Warned, match="36kmh is left out: it has no histories of nodes"):
+        crumple.init(runs, study, overwrite=True, mass=24e3)
+    with pytest.raises(crumple.Error, match="strict was asked for"), pytest.warns(crumple.Warned, match="gives 24 t: check it"):
+        crumple.init(runs, study, overwrite=True, mass=np.float64(30e3), strict=True)
+    # The file was written anew since it was opened.
+    crumple.build(study, tmp_path / "own.h5")
+    assert database["runs"]["25kmh"].mass == 24e3
+    with pytest.raises(crumple.Error, match="has changed since it was opened.*open it again"):
+        database["runs"]["48kmh"]
+
+
 def test_only_what_is_selected():
     histories = crumple.read(NODOUT, ids=[900001], components=["x_velocity"])
     assert list(histories.only()) == ["x_velocity"]
@@ -209,16 +244,22 @@ def test_databases_models_and_curves(tmp_path):
     exported = curve.export(tmp_path / "curve.k", units="mm-t-s")
     assert (tmp_path / "curve.k").stat().st_size == exported["bytes"]
     assert curve._repr_svg_().startswith("<svg") and database._repr_svg_().startswith("<svg")
+    # Only its own state is given.
+    case = database["lead-car-wall"]["36kmh"]
+    with pytest.raises(AttributeError, match="force: a case is as it was read"):
+        case.force = None
+    assert pickle.loads(pickle.dumps(case)).force.sum() == case.force.sum()
+    assert database != crumple.Database(DEMO / "curves.h5") and database == database
     # Tables are shown as such, and documents as their rows.
     group = database["lead-car-wall"]
     section = crumple.read(NODOUT).only()
-    for table, shown in [(group, "36kmh"), (group["36kmh"], "closing_speed"), (section, "x_velocity")]:
+    for table, shown in [(crumple.read(NODOUT), "x_velocity"), (group, "36kmh"), (group["36kmh"], "closing_speed"), (section, "x_velocity")]:
         assert table._repr_html_().startswith("<div") and f">{shown}</t" in table._repr_html_()
     assert len(group._shown()) == len(group) and len(section._shown().columns) == 12
     run = crumple.simulate(DEMO / "scenario.toml")
     assert ">v_m_per_s[A1]</th>" in run._repr_html_()
     shown = database.validate("lead-car-wall")._repr_html_()
-    assert "<p>lead-car-wall rows</p>" in shown and ">acceleration_l1</th>" in shown
+    assert "<p>lead-car-wall rows</p>" in shown and ">acceleration_l1</th>" in shown and ">passes</th>" in shown
     assert crumple.run("db", "diff", DEMO / "curves.h5", DEMO / "curves.h5")._repr_html_() is None
     trained = database.train(tmp_path / "own.model", "lead-car-wall", model="linear")
     assert trained.name == "linear" and trained.predict(50 / 3.6).force.shape == (trained.predict(50 / 3.6).deflection.shape)

@@ -192,6 +192,9 @@ impl<'a> LeftOutCase<'a> {
                 .rebound
                 .zip(self.own.motion.rebound_speed_m_per_s)
                 .map(|(predicted, fe)| predicted.speed_m_per_s / fe - 1.0),
+            peak_force_error: Some(
+                envelope.peak_force_n() / self.own.envelope.peak_force_n() - 1.0,
+            ),
             peaks: peak_errors(&self.own.envelope, &envelope),
             velocity_l1: body.velocity_l1,
             acceleration_l1: body.acceleration_l1,

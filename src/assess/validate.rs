@@ -49,6 +49,9 @@ pub(crate) enum GroupReport {
         /// Every model at every speed that was left out.
         #[serde(flatten)]
         validation: Box<Validation>,
+        /// The chosen model at each inner speed by the acceptance rule for numerical crash models.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        acceptance: Vec<Accepted>,
         /// Absent if it was not asked for, or if there is no gap to run in.
         #[serde(skip_serializing_if = "Option::is_none")]
         next_run: Option<NextRun>,
@@ -66,6 +69,28 @@ pub(crate) enum GroupReport {
         /// Why, in a sentence.
         error: String,
     },
+}
+
+/// The prediction of a left-out speed by the acceptance rule.
+#[derive(Debug, Serialize, JsonSchema)]
+pub(crate) struct Accepted {
+    /// Name of the case.
+    pub case: String,
+    /// Its speed, in m/s.
+    pub speed_m_per_s: f64,
+    #[serde(flatten)]
+    pub rule: Acceptance,
+}
+
+/// The chosen model at the inner speeds by the acceptance rule.
+pub(crate) fn accepted(validation: &Validation) -> Vec<Accepted> {
+    let rows = validation.rows.iter().filter(|row| row.inner && row.model == validation.chosen);
+    let of = |row: &LeftOut| Accepted {
+        case: row.case.clone(),
+        speed_m_per_s: row.speed_m_per_s,
+        rule: acceptance(row),
+    };
+    rows.map(of).collect()
 }
 
 /// A prediction of a left-out speed by the acceptance rule, the whole crush as one stage; FE's own work stands for the
@@ -590,6 +615,10 @@ pub(super) fn mean(model: &str, rule: MaxCrushRule, rows: &[LeftOut]) -> Option<
 fn mean_over(model: &str, rule: MaxCrushRule, rows: Vec<&LeftOut>) -> Option<Means> {
     let over =
         |of: fn(&LeftOut) -> f64| rows.iter().map(|r| of(r).abs()).sum::<f64>() / rows.len() as f64;
+    let over_known = |of: fn(&LeftOut) -> Option<f64>| {
+        let sum: Option<f64> = rows.iter().map(|r| Some(of(r)?.abs())).sum();
+        sum.map(|sum| sum / rows.len() as f64)
+    };
     (!rows.is_empty()).then(|| Means {
         model: model.into(),
         speeds: rows.len(),
@@ -605,11 +634,8 @@ fn mean_over(model: &str, rule: MaxCrushRule, rows: Vec<&LeftOut>) -> Option<Mea
                 Some((rule, errors?.iter().sum::<f64>() / rows.len() as f64))
             })
             .collect(),
-        rebound_error: rows
-            .iter()
-            .map(|r| Some(r.rebound_error?.abs()))
-            .sum::<Option<f64>>()
-            .map(|sum| sum / rows.len() as f64),
+        peak_force_error: over_known(|r| r.peak_force_error),
+        rebound_error: over_known(|r| r.rebound_error),
         velocity_l1: over(|r| r.velocity_l1),
         acceleration_l1: over(|r| r.acceleration_l1),
         acceleration_unfiltered_l1: over(|r| r.acceleration_unfiltered_l1),

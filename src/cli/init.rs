@@ -84,7 +84,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let default = if args.scenario { "scenario.toml" } else { "study.toml" };
     let output = args.output.clone().unwrap_or_else(|| default.into());
     if !options.on_stdout([&output])? {
-        init::refuse_existing(&output)?;
+        init::refuse_existing(&output, options.overwrite)?;
     }
     if args.scenario { scenario(args, &output, options) } else { study(args, &output, options) }
 }
@@ -133,7 +133,7 @@ fn study(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
     let text = proposal.to_toml();
     if !is_stdout(output) {
         // Another may have come there while the runs were read.
-        init::refuse_existing(output)?;
+        init::refuse_existing(output, options.overwrite)?;
         write_whole(output, text.as_bytes())?;
     }
     let outcome = options

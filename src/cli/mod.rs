@@ -156,6 +156,7 @@ impl GlobalOptions {
             FileKind::Database => "an HDF5 file",
             FileKind::Model => "a model",
             FileKind::Sweep => "a sweep's result",
+            _ if own == FileKind::Model => "a file of another kind",
             FileKind::Solver | FileKind::Curve | FileKind::Result => return Ok(()),
         };
         if kind == own && !(kind == FileKind::Database && database::is_database(output)) {

@@ -13,7 +13,7 @@ use crate::assess::against::{Against, Changed, Pair};
 use crate::assess::choose::{NextRun, Purpose, Selection, next_run};
 use crate::assess::subsets::{OverSubsets, subsets};
 use crate::assess::validate::{
-    GroupReport, MOST_SPEEDS, Report, acceptance, add_nested, validate_speeds,
+    GroupReport, MOST_SPEEDS, Report, acceptance, accepted, add_nested, validate_speeds,
 };
 use crate::curve::Case;
 use crate::database::Database;
@@ -120,7 +120,8 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     options.show(&report, |out| {
         let mut first = true;
         for group in &report.groups {
-            let GroupReport::Validated { validation, next_run, subsets, against } = group else {
+            let GroupReport::Validated { validation, next_run, subsets, against, .. } = group
+            else {
                 continue;
             };
             if !std::mem::take(&mut first) {
@@ -203,8 +204,9 @@ fn validated(
         validation.notes.push("the earlier validation does not have this group".into());
     }
     let against = before.map(|before| Box::new(Against::of(before, &validation)));
-    let validation = Box::new(validation);
-    Ok(GroupReport::Validated { validation, next_run: next, subsets: over_subsets, against })
+    let acceptance = accepted(&validation);
+    let (validation, subsets) = (Box::new(validation), over_subsets);
+    Ok(GroupReport::Validated { validation, acceptance, next_run: next, subsets, against })
 }
 
 fn percent(error: f64) -> String {
@@ -358,6 +360,7 @@ fn print_summary(out: &mut dyn Write, validation: &Validation) -> io::Result<()>
         let table = Table::of(&validation.means)
             .column("model", |m| marked(&m.model, &validation.chosen))
             .column("force", |m| percent(m.force_l1))
+            .column("peak force", |m| m.peak_force_error.map_or("-".into(), percent))
             .column("crush", |m| percent(m.max_crush_error))
             .column("velocity", |m| percent(m.velocity_l1))
             .column("acceleration", |m| percent(m.acceleration_l1));
@@ -391,8 +394,7 @@ fn print_summary(out: &mut dyn Write, validation: &Validation) -> io::Result<()>
 
 /// The chosen model at the inner speeds by the acceptance rule.
 fn print_acceptance(out: &mut dyn Write, validation: &Validation, prefix: &str) -> io::Result<()> {
-    let rows = validation.rows.iter().filter(|row| row.inner && row.model == validation.chosen);
-    let all: Vec<Acceptance> = rows.map(acceptance).collect();
+    let all: Vec<Acceptance> = accepted(validation).into_iter().map(|of| of.rule).collect();
     if all.is_empty() {
         return Ok(());
     }
@@ -438,6 +440,7 @@ fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
         let mut table = Table::of(&validation.means)
             .column("model", |m| marked(&m.model, &validation.chosen))
             .column("force", |m| percent(m.force_l1))
+            .column("peak", |m| m.peak_force_error.map_or("-".into(), percent))
             .column("energy", |m| percent(m.energy_error))
             .column("crush", |m| percent(m.max_crush_error));
         for rule in MaxCrushRule::ALL {

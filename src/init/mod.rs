@@ -28,13 +28,14 @@ pub(crate) use scenario::propose_scenario;
 pub(crate) use write::Proposal;
 pub(crate) use write::Proposed;
 
-pub(crate) fn refuse_existing(path: &Path) -> Result<(), Error> {
+/// Refuses a path where something is; with `overwrite` only where that is not a file.
+pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Result<(), Error> {
     if std::fs::symlink_metadata(path)
-        .is_ok_and(|meta| meta.is_file() || meta.is_dir() || meta.is_symlink())
+        .is_ok_and(|meta| (meta.is_file() && !overwrite) || meta.is_dir() || meta.is_symlink())
     {
         return Err(error!(
             Study,
-            "{path} exists already and is not overwritten: name another with -o, or remove it",
+            "{path} exists already and is not overwritten: name another with -o, or replace it with --overwrite",
             path = path.display()
         ));
     }

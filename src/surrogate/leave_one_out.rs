@@ -33,6 +33,9 @@ pub struct LeftOut {
     /// Speed of the rebound from the curve's maximum crush, where both are known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rebound_error: Option<f64>,
+    /// Largest force of the predicted curve; absent in older model files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub peak_force_error: Option<f64>,
     /// The first two peaks of FE's curve.
     pub(crate) peaks: Vec<PeakError>,
     /// Multi-body run driven by the model's body force; by the declared one if the two are
@@ -113,6 +116,9 @@ pub struct Means {
     pub max_crush_rule: MaxCrushRule,
     /// By every rule that has an answer at all inner speeds.
     pub max_crush_errors: BTreeMap<MaxCrushRule, f64>,
+    /// Of the largest force.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub peak_force_error: Option<f64>,
     /// Magnitude of the error of the rebound's speed, if it is known at all of these speeds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rebound_error: Option<f64>,

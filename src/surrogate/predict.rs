@@ -276,6 +276,7 @@ impl<'a> Prediction<'a> {
         if is_moving && body_energy.is_some_and(|e| (e - 1.0).abs() <= EnergyAudit::TOLERANCE) {
             warnings.extend(contact_mismatch(model, energy));
         }
+        warnings.extend(asked.unlike_peak(&declared));
         let (crush_m, data_end_m) = (declared.end_m(), model.largest_crush_m());
         if is_beyond(crush_m, data_end_m) {
             let by_speed_m = crush.monotone_m.filter(|_| !model.contains(v));

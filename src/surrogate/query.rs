@@ -194,6 +194,18 @@ impl<'a> ResolvedQuery<'a> {
         max_crush::by_all_rules(self.model, equal_v, declared, body, self.kinetic_energy_j)
     }
 
+    /// Whether the largest force of the curve is nothing like those of the runs on both sides.
+    pub(crate) fn unlike_peak(&self, declared: &Envelope) -> Option<Warning> {
+        let (curves, _) = self.model.curves();
+        let speeds: Vec<f64> = curves.iter().map(|curve| curve.speed_m_per_s).collect();
+        let (low, high, share) = neighbours(&speeds, self.v);
+        let is_between = share > 0.0 && self.same_mass && self.model.features.is_empty();
+        let peak = |k: usize| (speeds[k], curves[k].envelope().peak_force_n());
+        is_between
+            .then(|| Warning::peak_force(declared.peak_force_n(), [peak(low), peak(high)]))
+            .flatten()
+    }
+
     /// The unloading stiffness of the runs in N/m, interpolated in speed.
     pub(crate) fn unloading_n_per_m(&self) -> Option<f64> {
         let of = |case: &ModelCase| {

@@ -47,6 +47,8 @@ pub enum WarningCode {
     FarFromTraining,
     /// The collapse mode changes between the neighbouring training speeds.
     ModeSwitch,
+    /// The largest force lies outside those of the two neighbouring training runs.
+    PeakForce,
     /// Too few curves to assess the model.
     TooFewCurves,
     /// The force was scaled so that the curve absorbs the impact's energy.
@@ -56,6 +58,9 @@ pub enum WarningCode {
     /// A warning of the build of a training run, or of the recorded one.
     CaseWarning,
 }
+
+/// A largest force this share outside those of the neighbouring runs is not theirs.
+const FAR_PEAK: f64 = 0.1;
 
 /// Speeds further outside the training speeds than this share of their range are not answered
 /// without asking for it.
@@ -95,6 +100,7 @@ impl WarningCode {
             Self::OtherMass => "other_mass",
             Self::FarFromTraining => "far_from_training",
             Self::ModeSwitch => "mode_switch",
+            Self::PeakForce => "peak_force",
             Self::TooFewCurves => "too_few_curves",
             Self::EnergyCorrected => "energy_corrected",
             Self::NoBand => "no_band",
@@ -172,6 +178,33 @@ impl Warning {
                 km_per_h(above)
             ),
         }
+    }
+
+    /// If the largest force of a curve is a tenth below those of both neighbours, given by speed in m/s and force in N, or above them.
+    pub(crate) fn peak_force(peak_n: f64, neighbours: [(f64, f64); 2]) -> Option<Self> {
+        let [low_n, high_n] = [f64::min, f64::max].map(|of| of(neighbours[0].1, neighbours[1].1));
+        let (share, side, why) = match peak_n {
+            n if n < (1.0 - FAR_PEAK) * low_n => (
+                1.0 - n / low_n,
+                "below",
+                "peaks at different deflections lower each other in a blend",
+            ),
+            n if n > (1.0 + FAR_PEAK) * high_n => {
+                (n / high_n - 1.0, "above", "no run shows such a force")
+            }
+            _ => return None,
+        };
+        let shown = Shown::force(peak_n);
+        let [below, above] =
+            neighbours.map(|(v, n)| format!("{} at {}", shown.text(n), km_per_h(v)));
+        Some(Self {
+            code: WarningCode::PeakForce,
+            message: format!(
+                "the largest force, {}, is {:.0} % {side} those of both neighbouring runs ({below}, {above}): {why}",
+                shown.text(peak_n),
+                100.0 * share
+            ),
+        })
     }
 
     pub(crate) fn too_few_curves(curves: usize) -> Self {

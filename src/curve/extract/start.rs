@@ -16,6 +16,8 @@ const CERTAIN_SHARE: f64 = 0.01;
 const MISSING_SHARE: f64 = 0.005;
 /// Impulse before the contact that the manifest states, as a share of the loading branch's, likewise.
 const EARLY_SHARE: f64 = 0.001;
+/// A body slows down some milliseconds after the touch: a record that begins within these may not show it.
+const RESPONSE_S: f64 = 5e-3;
 /// Times that differ by less than this share are one: files print seven digits.
 const SAME_TIME: f64 = 1e-6;
 
@@ -71,8 +73,10 @@ impl Start {
         }
         let of_body = record.contact.is_none() && record.force_kind == ForceKind::Body;
         if of_body {
+            let since_s = onset.time_s - record.time_s.first().copied().unwrap_or_default();
             let earlier = match onset.interval_s {
-                Some(_) => "the first touch is some milliseconds earlier",
+                Some(_) if since_s > RESPONSE_S => "the first touch is some milliseconds earlier",
+                Some(_) => "the record begins shortly before, and the first touch may be earlier",
                 None => "the record begins there, and the first touch may be earlier",
             };
             remarks.warn(format!(
