@@ -612,8 +612,10 @@ fn one_to_five_curves() {
             let predicted = curve(&model, 9.0);
             assert_eq!((predicted.deflection_m[0], predicted.force_n[0]), (0.0, 0.0));
             assert!(predicted.force_n.iter().all(|f| f.is_finite() && *f >= 0.0));
-            let few = predicted.warnings.iter().any(|w| w.code.name() == "too_few_curves");
-            assert_eq!(few, n < 3, "{} on {n}", options.name());
+            // Of three, one can be left out, and nothing checks the band that rests on it.
+            let few = predicted.warnings.iter().find(|w| w.code.name() == "too_few_curves");
+            assert_eq!(few.is_some(), n <= 3, "{} on {n}", options.name());
+            assert!(n != 3 || few.unwrap().message.contains("the one speed that was left out"));
             let validation = model.leave_one_out.unwrap();
             assert_eq!(validation.means.is_empty(), n < 3);
             assert_eq!(validation.band.map(|b| b.curves), (n >= 3).then(|| n - 2));

@@ -510,7 +510,7 @@ class Curve:
 
         Options are those of `crumple export`: `force="body"`, the default, is what drives a body of one mass, `force="contact"` is for
         bodies whose crush zone is a separate mass; `units="mm-t-s"`. The file goes on beyond `max_deflection` by an assumption,
-        which it states, so that a run that crushes further has a force.
+        which it states, so that a run that crushes further has a force; with `tail="none"` it ends there.
         """
         from crumple._commands import _options, _output
 

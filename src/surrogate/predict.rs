@@ -238,6 +238,8 @@ impl<'a> Prediction<'a> {
             }
             None
         });
+        let alone = band.filter(|band| band.curves == 1).map(|_| Warning::band_of_one());
+        warnings.extend(alone.filter(|alone| !warnings.contains(alone)));
         let edges = band.map(|band| {
             let (mut low_n, mut high_n) = band.around(envelope.force_n());
             for branch in asked.model.branches(asked.v, force) {

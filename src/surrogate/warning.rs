@@ -49,7 +49,7 @@ pub enum WarningCode {
     ModeSwitch,
     /// The largest force lies outside those of the two neighbouring training runs.
     PeakForce,
-    /// Too few curves to assess the model.
+    /// Too few curves to assess the model, or to check its band.
     TooFewCurves,
     /// The force was scaled so that the curve absorbs the impact's energy.
     EnergyCorrected,
@@ -205,6 +205,13 @@ impl Warning {
                 100.0 * share
             ),
         })
+    }
+
+    pub(crate) fn band_of_one() -> Self {
+        Self {
+            code: WarningCode::TooFewCurves,
+            message: "the band rests on the one speed that was left out, and nothing was left to check it".into(),
+        }
     }
 
     pub(crate) fn too_few_curves(curves: usize) -> Self {
