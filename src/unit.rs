@@ -241,6 +241,7 @@ impl Dimension {
         })?;
         let unit = unit.trim();
         if unit.is_empty() {
+            // mm/ms is of that size, too, but nobody would write it first.
             let in_si = self.units.iter().filter(|(name, size)| *size == 1.0 && *name != "mm/ms");
             let units = [self.example_unit].into_iter().chain(in_si.map(|(name, _)| *name));
             let examples: Vec<String> = units.map(|unit| format!("\"{number}{unit}\"")).collect();

@@ -942,7 +942,16 @@ fn nothing_is_overwritten() {
     );
     assert_eq!(fs::read(here.join("study.toml")).unwrap(), b"mine");
     crumple_fails(&here, 1, "init -o 25kmh");
-    crumple_fails(&here, 1, "init -o 25kmh --overwrite");
+    let error = crumple_fails(&here, 1, "init -o 25kmh --overwrite");
+    says(
+        &error,
+        "25kmh exists already and is not a TOML file, which init writes: name another with -o",
+    );
+    // Runs are only read, whatever is asked.
+    let nodout = fs::read(here.join("25kmh/nodout")).unwrap();
+    let error = crumple_fails(&here, 1, "init -o 25kmh/nodout --overwrite");
+    says(&error, "is not a TOML file");
+    assert!(fs::read(here.join("25kmh/nodout")).unwrap() == nodout);
     crumple_ok(&here, "init --overwrite");
     crumple_ok(&here, "build -q");
     let error = crumple_fails(&here, 2, "init -o - --json");

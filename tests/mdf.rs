@@ -79,12 +79,20 @@ fn results_in_mdf_are_those_in_csv() {
     let rated = |a: &str| crumple_in(here, &["rate", a, "other.csv", "--json"]).stdout;
     assert!(rated("mdf/run.mf4") == rated("csv/run.csv") && !rated("csv/run.csv").is_empty());
     let error = crumple_fails(here, 1, &["inspect", "mdf/run.mf4"]);
-    says(&error, "the result of a multi-body run: crumple plot draws it");
+    says(
+        &error,
+        "a table over time, as crumple simulate writes it: crumple plot draws such results",
+    );
 
     let whole = fs::read(here.join("mdf/run.mf4")).unwrap();
     fs::write(here.join("cut.mf4"), &whole[..whole.len() / 2]).unwrap();
     let error = crumple_fails(here, 1, "plot cut.mf4 -o cut.svg");
     says(&error, "cut.mf4: byte ");
+    for bytes in (0..72).step_by(5) {
+        fs::write(here.join("cut.mf4"), &whole[..bytes]).unwrap();
+        crumple_fails(here, 1, "plot cut.mf4 -o cut.svg");
+        crumple_fails(here, 1, "inspect cut.mf4");
+    }
     crumple_ok(here, &[&["export"], &CASE[..], &["-q", "-o", "case.mf4"]].concat());
     let error = crumple_fails(here, 1, &["rate", "case.mf4", "mdf/run.mf4"]);
     says(&error, "case.mf4: there are several columns: name one of");

@@ -615,7 +615,7 @@ fn one_to_five_curves() {
             // Of three, one can be left out, and nothing checks the band that rests on it.
             let few = predicted.warnings.iter().find(|w| w.code.name() == "too_few_curves");
             assert_eq!(few.is_some(), n <= 3, "{} on {n}", options.name());
-            assert!(n != 3 || few.unwrap().message.contains("the one speed that was left out"));
+            assert!(n != 3 || few.unwrap().message.contains("only one speed could be left out"));
             let validation = model.leave_one_out.unwrap();
             assert_eq!(validation.means.is_empty(), n < 3);
             assert_eq!(validation.band.map(|b| b.curves), (n >= 3).then(|| n - 2));
@@ -1251,6 +1251,12 @@ fn a_front_in_two_stages_is_predicted_by_its_events() {
     let message = warned(50.0).unwrap();
     assert!(message.contains("% below those of both neighbouring runs (10.9"), "{message}");
     assert_eq!([warned(24.0), warned(44.0), warned(62.0), warned(72.0)], [None, None, None, None]);
+    // What smooths has not the largest force of the run itself.
+    let kind = ModelKind::named("gaussian-process", 0).unwrap();
+    let smooth = train(group, database.cases(group), Choice::Kind(kind)).unwrap();
+    let own = curve(&smooth, database.cases(group)[2].conditions.speed.m_per_s);
+    let message = own.warnings.iter().find(|w| w.code.name() == "peak_force").unwrap();
+    assert!(message.message.contains("below that of the run at this speed"), "{message}");
 }
 
 /// 12 km/h above the fastest run that the model has, and below the slowest: the band holds most of FE's points, and one can still

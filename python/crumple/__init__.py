@@ -16,11 +16,12 @@ From folders of runs to a curve at a speed that was never run:
 Numbers of databases, models, curves and multi-body runs are SI: m, s, N, kg, J, speeds m/s. What `read` gives is in the units
 of its file.
 
-`init`, `build`, `validate`, `train`, `sweep`, `rate` and `run` are the program's commands. Their options are keyword
+`init`, `build`, `add`, `validate`, `train`, `sweep`, `rate` and `run` are the program's commands. Their options are keyword
 arguments: `--nsdm-seeds 3` is `nsdm_seeds=3`, a flag such as `--extrapolate` is `extrapolate=True`. `crumple build --help` in
 a shell, or `python -m crumple build --help`, describes them. They return the document that `--json` prints, as a dict.
 """
 
+import importlib
 import json
 import os
 import re
@@ -34,13 +35,13 @@ from pathlib import Path
 import numpy as np
 
 from crumple import _crumple
-from crumple._commands import Warned, build, init, rate, run, sweep, train, validate
+from crumple._commands import Warned, add, build, init, rate, run, sweep, train, validate
 from crumple._errors import Error
 
 __version__ = _crumple.__version__
 __all__ = [
     "Case", "Component", "Curve", "Database", "Error", "Group", "Histories", "Model", "Run", "Section", "Warned",
-    "build", "init", "rate", "read", "run", "simulate", "sweep", "train", "validate",
+    "add", "build", "init", "rate", "read", "run", "simulate", "sweep", "train", "validate",
 ]
 
 
@@ -162,11 +163,11 @@ class Component(_Mapping):
     @property
     def array(self):
         """All ids beside one another, as a new array of shape (states, ids)."""
-        return np.column_stack(list(self.values()))
+        return np.column_stack(list(self.values())) if self else np.empty((len(self.time), 0))
 
     def __array__(self, dtype=None, copy=None):
         if copy is False:
-            raise ValueError("the ids are arrays of their own: beside one another they are a copy")
+            raise ValueError("each id has its own array, so a combined array is always a copy")
         return self.array.astype(np.float64 if dtype is None else dtype, copy=False)
 
     def __getitem__(self, entity):
@@ -313,13 +314,21 @@ class Case(_Table):
         self.name, (self.speed, self.speed_kind) = name, speed
         (self.mass, self.other_mass), self.force_kind = masses, force_kind
         self.time, self.deflection, self.force, self.body_force, self.closing_speed = map(_array, curves)
-        self.tags, self.warnings = tags, warnings
+        self.tags, self.warnings = tuple(tags), tuple(warnings)
         self._is_read = True
 
     def __setattr__(self, name, value):
         if "_is_read" in self.__dict__:
-            raise AttributeError(f"{name}: a case is as it was read, and kept for the next who asks; compute with arrays of your own")
+            raise AttributeError(f"{name}: a case cannot be changed, because its group gives the same one to every caller; copy its arrays instead")
         super().__setattr__(name, value)
+
+    def __delattr__(self, name):
+        self.__setattr__(name, None)
+
+    def __setstate__(self, state):
+        self.__dict__.update(state)
+        for values in (self.time, self.deflection, self.force, self.body_force, self.closing_speed):
+            values.flags.writeable = False
 
     def to_pandas(self):
         """A DataFrame over time: deflection, force, body_force, closing_speed, in SI."""
@@ -347,9 +356,11 @@ class Group(_Table, _Mapping):
     def __getitem__(self, name):
         case = super().__getitem__(name)
         if case is None:
+            read = _crumple.case(os.fspath(self.path), self.name, name)
+            # Afterwards, so that what was read is of the file that was opened.
             if _state(self.path) != self._state:
                 raise Error(f"{self.path} has changed since it was opened, and its cases with it: open it again")
-            case = self._items[name] = Case(*_crumple.case(os.fspath(self.path), self.name, name))
+            case = self._items[name] = Case(*read)
         return case
 
     def to_pandas(self):
@@ -382,7 +393,7 @@ class Database(_Mapping):
         # Cases are read later, perhaps from another folder.
         self.path = Path(path).resolve()
         # Before it is read: a change in between is then found.
-        state = _state(self.path) if self.path.exists() else None
+        state = _state(self.path)
         groups = _crumple.database(os.fspath(path))
         super().__init__({name: Group(self.path, name, cases, state) for name, cases in groups})
 
@@ -552,16 +563,28 @@ def simulate(scenario):
 
 
 def _state(path):
-    """What differs once a file was written anew."""
-    of = os.stat(path)
-    return of.st_ino, of.st_size, of.st_mtime_ns
+    """What differs once a file was written anew; of no file None."""
+    try:
+        of = os.stat(path)
+    except OSError:
+        return None
+    return of.st_size, of.st_mtime_ns
+
+
+def __getattr__(name):
+    if name == "sklearn":
+        return importlib.import_module("crumple.sklearn")
+    raise AttributeError(f"module 'crumple' has no attribute {name!r}")
 
 
 def __dir__():
-    return [*__all__, "__version__", "sklearn"]
+    return [*(name for name in globals() if name.startswith("__")), *__all__, "sklearn"]
 
 
 def _picture(path, *arguments):
+    # Nothing is shown where nothing can draw it.
+    if not hasattr(_crumple, "main") and not os.environ.get("CRUMPLE"):
+        return None
     with tempfile.TemporaryDirectory() as folder:
         picture = Path(folder) / "picture.svg"
         run("plot", *arguments, "-o", picture, "--", path)

@@ -10,6 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from crumple._commands import Warned as Warned
+from crumple._commands import add as add
 from crumple._commands import build as build
 from crumple._commands import init as init
 from crumple._commands import rate as rate
@@ -26,7 +27,7 @@ type _Array = NDArray[np.float64]
 __version__: str
 __all__ = [
     "Case", "Component", "Curve", "Database", "Error", "Group", "Histories", "Model", "Run", "Section", "Warned",
-    "build", "init", "rate", "read", "run", "simulate", "sweep", "train", "validate",
+    "add", "build", "init", "rate", "read", "run", "simulate", "sweep", "train", "validate",
 ]
 
 class _Mapping[K, V](Mapping[K, V]):
@@ -100,8 +101,8 @@ class Case:
     force: _Array
     body_force: _Array
     closing_speed: _Array
-    tags: list[str]
-    warnings: list[str]
+    tags: tuple[str, ...]
+    warnings: tuple[str, ...]
     def __init__(
         self,
         name: str,
@@ -117,7 +118,7 @@ class Case:
 class Group(_Mapping[str, Case]):
     path: Path
     name: str
-    def __init__(self, path: Path, name: str, cases: Iterable[str], state: tuple[int, int, int] | None) -> None: ...
+    def __init__(self, path: Path, name: str, cases: Iterable[str], state: tuple[int, int] | None) -> None: ...
     def __contains__(self, name: object) -> bool: ...
     def __getitem__(self, name: str) -> Case: ...
     def to_pandas(self) -> pd.DataFrame: ...

@@ -17,10 +17,13 @@ def main():
     if not hasattr(_crumple, "main"):
         try:
             words = [*_program(), *sys.argv[1:]]
-            # Not again, should it be this one.
-            return subprocess.call(words, env={name: value for name, value in os.environ.items() if name != "CRUMPLE"})
         except Error as error:
             return f"error: {error}"
+        if os.name == "posix":
+            os.execvp(words[0], words)
+        # Ctrl-C is the program's, which says where it stopped.
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
+        return subprocess.call(words)
     return _crumple.main(["crumple", *sys.argv[1:]])
 
 

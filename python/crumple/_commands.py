@@ -1,5 +1,6 @@
 """Commands of the program as functions: they give the document that `--json` prints, as a dict."""
 
+import functools
 import html
 import json
 import os
@@ -32,9 +33,12 @@ class Document(dict):
         tables = []
 
         def look(into, name):
-            # Found, and from what, as by init.
+            # Found, and from what, or why not, as by init.
             if set(into) == {"value", "evidence", "from"}:
                 tables.append(f"<p>{html.escape(name)}: {html.escape(str(into['value']))} ({html.escape(into['evidence'])}: {html.escape(into['from'])})</p>")
+                return
+            if set(into) == {"missing"}:
+                tables.append(f"<p>{html.escape(name)}: missing ({html.escape(str(into['missing']))})</p>")
                 return
             for key, value in into.items():
                 title = f"{name} {key}".strip()
@@ -43,7 +47,8 @@ class Document(dict):
                 elif isinstance(value, list) and value and all(isinstance(row, dict) for row in value):
                     rows = pd.json_normalize(value, max_level=1)
                     plain = [name for name in rows if not rows[name].map(lambda cell: isinstance(cell, (dict, list))).any()]
-                    tables.append(f"<p>{html.escape(title)}</p>{rows[plain]._repr_html_()}")
+                    if plain:
+                        tables.append(f"<p>{html.escape(title)}</p>{rows[plain].to_html(max_rows=20, max_cols=20)}")
                     # Lists within other rows would be a table each.
                     for row in value:
                         if "group" in row:
@@ -64,14 +69,26 @@ sys.exit(module.main(["crumple", *sys.argv[2:]]))
 """
 
 
+@functools.cache
+def _version(program):
+    """What a program says of its version; empty if it cannot be run."""
+    try:
+        environment = {name: value for name, value in os.environ.items() if name != "CRUMPLE"}
+        return subprocess.run([program, "--version"], capture_output=True, text=True, timeout=60, env=environment).stdout.strip()
+    except (OSError, subprocess.SubprocessError, UnicodeDecodeError):
+        return ""
+
+
 def _program():
     """How the program is started: it is in the compiled part, or the one that CRUMPLE names."""
     if not hasattr(_crumple, "main"):
         named = os.environ.get("CRUMPLE")
         if not named:
-            raise Error("this package was built without the program: set CRUMPLE to the path of one, such as a release has")
+            raise Error("this package was built without the program: set CRUMPLE to the path of the crumple program, which every release contains")
         if not shutil.which(named):
             raise Error(f"CRUMPLE={named}: there is no program of that name")
+        if (version := _version(named)) != f"crumple {_crumple.__version__}":
+            raise Error(f"CRUMPLE={named}: expected crumple {_crumple.__version__}, found {version or 'another program'}")
         return [named]
     if not sys.executable or getattr(sys, "frozen", False):
         raise Error("commands need a Python interpreter (sys.executable) to run in; this one is embedded or frozen")
@@ -137,7 +154,8 @@ def run(*arguments, check=True):
     shown by tqdm, if it is installed, on a terminal and in notebooks.
 
     Raises `crumple.Error` if the command fails. Where only a part of its work does, such as a run of a study, that is a warning, and
-    in the document.
+    in the document; with `--strict` (`strict=True`) it is an error, as any warning is, and the document its attribute. With
+    `check=False` nothing is raised.
     """
     words = [os.fspath(a) if isinstance(a, os.PathLike) else str(a) for a in arguments]
     words = [*_program(), "--json", *words]
@@ -157,8 +175,12 @@ def run(*arguments, check=True):
         kind, _, text = line.partition(": ")
         if kind == "warning" or (kind == "error" and document is not None and not failed):
             warnings.warn(text, Warned, stacklevel=3)
-    if check and child.returncode == 3:
-        raise Error("the work is done, but there are warnings, and strict was asked for")
+    for left in document.get("left_out", ()) if isinstance(document, dict) else ():
+        warnings.warn(f"{left['path']} is left out: {left['message']}", Warned, stacklevel=3)
+    if check and "--strict" in words and child.returncode and not failed:
+        error = Error("there were warnings, damage or failures, which strict does not allow; what could be done is done, and in the error's document")
+        error.document = document
+        raise error
     if check and failed:
         error = Error.of_document(printed)
         if re.search(r"(^|[\s'(])--[a-z]", str(error)):
@@ -180,13 +202,16 @@ def _options(options):
     words = []
     for name, value in options.items():
         option = "--" + name.rstrip("_").replace("_", "-")
+        # Of NumPy: arrays as lists, its numbers and truth values as Python's.
+        value = value.tolist() if hasattr(value, "tolist") else value
         for one in value if isinstance(value, (list, tuple)) else [value]:
+            one = one.item() if hasattr(one, "item") else one
             if one is True:
                 words.append(option)
             elif one is not None and one is not False:
                 # Numbers are in SI.
-                unit = _SI.get(option, "") if isinstance(one, Number) else ""
-                words.append(f"{option}={one}{unit}")
+                is_quantity = option in _SI and isinstance(one, Number)
+                words.append(f"{option}={float(one)}{_SI[option]}" if is_quantity else f"{option}={one}")
     return words
 
 
@@ -203,6 +228,18 @@ def build(study, output, **options):
     return run("build", *_output(output), *_options(options), "--", study)
 
 
+def add(database, files, **options):
+    """Add measured or legacy curves from files to a database, which is created if it is not there: CSV, MDF, ISO-MME, LS-DYNA, ...
+
+    Options are those of `crumple db add`: `group="tests"`, `speed="36km/h"` (or in m/s; a list for several files), `mass="24t"`,
+    `kind="wall"`, `force="body"`, `units="mm-t-s"`.
+    """
+    files = [files] if isinstance(files, (str, os.PathLike)) else list(files)
+    if not files:
+        raise Error("there are no files: name at least one")
+    return run("db", "add", *_options(options), "--", database, *files)
+
+
 def init(runs, output=None, **options):
     """Examine run folders and write a study of them (study.toml in the working folder if `output` is None), which `build` takes.
 
@@ -212,10 +249,7 @@ def init(runs, output=None, **options):
     runs = [runs] if isinstance(runs, (str, os.PathLike)) else list(runs)
     if not runs:
         raise Error("there are no run folders: name at least one")
-    document = run("init", *_output(output), *_options(options), "--", *runs)
-    for left in document.get("left_out", []):
-        warnings.warn(f"{left['path']} is left out: {left['message']}", Warned, stacklevel=2)
-    return document
+    return run("init", *_output(output), *_options(options), "--", *runs)
 
 
 def validate(database, group=None, **options):

@@ -53,10 +53,13 @@ with tempfile.TemporaryDirectory() as folder:
 
     without = said(COMMAND, folder)
     assert without == (
-        "refused: this package was built without the program: set CRUMPLE to the path of one, such as a release has\n"
+        "refused: this package was built without the program: set CRUMPLE to the path of the crumple program, which every release contains\n"
     ), without
     assert said(COMMAND, folder, CRUMPLE="nowhere") == "refused: CRUMPLE=nowhere: there is no program of that name\n"
-    assert said(COMMAND, folder, CRUMPLE=str(program)) == said(COMMAND) != ""
+    other = said(COMMAND, folder, CRUMPLE=sys.executable)
+    assert other.startswith("refused: CRUMPLE=") and f"expected crumple {crumple.__version__}, found Python" in other, other
+    listed = said(COMMAND, folder, CRUMPLE=str(program))
+    assert listed == said(COMMAND) and "lead-car-wall" in listed, listed
     words = ["-m", "crumple", "--version"]
     assert said(words, folder, CRUMPLE=str(program)) == said(words) == f"crumple {crumple.__version__}\n"
     assert said(words, folder).startswith("error: this package was built without the program")

@@ -40,11 +40,27 @@ def test_histories_are_those_of_the_file():
     assert histories.problems == [] and len(section.time) == 400
 
 
+def test_measured_curves_are_added(tmp_path):
+    table = pd.DataFrame({"d_mm": [0.0, 100.0, 200.0, 400.0], "force_kN": [0.0, 900.0, 1100.0, 1300.0]})
+    for name in ("a b.csv", "b.csv"):
+        table.to_csv(tmp_path / name, index=False)
+    database = tmp_path / "tests.h5"
+    speeds = [np.float64(6.0), "8m/s"]
+    with pytest.warns(crumple.Warned):
+        crumple.add(database, [tmp_path / "a b.csv", tmp_path / "b.csv"], group="tests", speed=speeds, mass=24e3, kind="wall", accept_energy=True)
+    cases = crumple.Database(database)["tests"]
+    assert [(case.speed, case.mass, round(case.force.max(), -3)) for case in cases.values()] == [(6.0, 24e3, 1.3e6), (8.0, 24e3, 1.3e6)]
+    with pytest.raises(crumple.Error, match="--speed|speed"):
+        crumple.add(database, tmp_path / "b.csv", group="tests")
+    with pytest.raises(crumple.Error, match="there are no files"):
+        crumple.add(database, [])
+
+
 def test_numpy_takes_the_values_of_a_component():
     component = crumple.read(NODOUT).only()["x_velocity"]
     assert np.array_equal(np.asarray(component), component.array) and np.max(component) == component[900001].max()
     assert np.asarray(component, dtype=np.float32).dtype == np.float32
-    with pytest.raises(ValueError):
+    with pytest.raises(ValueError, match="always a copy"):
         np.asarray(component, copy=False)
 
 
@@ -58,6 +74,7 @@ def test_what_is_left_out_or_fails_is_a_warning(tmp_path):
     crumple.build(study, tmp_path / "own.h5")
     database = crumple.Database(tmp_path / "own.h5")
     assert len(database["runs"]["25kmh"].force) > 0
+    shutil.copy(study, tmp_path / "all.toml")
     (runs / "36kmh/nodout").unlink()
     with pytest.warns(crumple.Warned, match='36kmh has no file "nodout".*the case of an earlier build is kept'):
         built = crumple.build(study, tmp_path / "own.h5", overwrite=True)
@@ -66,12 +83,19 @@ def test_what_is_left_out_or_fails_is_a_warning(tmp_path):
         crumple.init(runs, study)
     with pytest.warns(crumple.Warned, match="36kmh is left out: it has no histories of nodes"):
         crumple.init(runs, study, overwrite=True, mass=24e3)
-    with pytest.raises(crumple.Error, match="strict was asked for"), pytest.warns(crumple.Warned, match="gives 24 t: check it"):
-        crumple.init(runs, study, overwrite=True, mass=np.float64(30e3), strict=True)
+    with pytest.warns(crumple.Warned, match="gives 24 t: check it"):
+        crumple.init(runs, study, overwrite=np.True_, mass=np.array(30e3))
+    for strict in (lambda: crumple.init(runs, study, overwrite=True, strict=True), lambda: crumple.build(tmp_path / "all.toml", tmp_path / "own.h5", strict=True)):
+        with pytest.raises(crumple.Error, match="strict does not allow") as raised, pytest.warns(crumple.Warned, match="36kmh"):
+            strict()
+        assert raised.value.document["study" if "study" in raised.value.document else "runs"]
     # The file was written anew since it was opened.
     crumple.build(study, tmp_path / "own.h5")
     assert database["runs"]["25kmh"].mass == 24e3
     with pytest.raises(crumple.Error, match="has changed since it was opened.*open it again"):
+        database["runs"]["48kmh"]
+    (tmp_path / "own.h5").unlink()
+    with pytest.raises(crumple.Error):
         database["runs"]["48kmh"]
 
 
@@ -246,9 +270,12 @@ def test_databases_models_and_curves(tmp_path):
     assert curve._repr_svg_().startswith("<svg") and database._repr_svg_().startswith("<svg")
     # Only its own state is given.
     case = database["lead-car-wall"]["36kmh"]
-    with pytest.raises(AttributeError, match="force: a case is as it was read"):
+    with pytest.raises(AttributeError, match="force: a case cannot be changed"):
         case.force = None
-    assert pickle.loads(pickle.dumps(case)).force.sum() == case.force.sum()
+    with pytest.raises(AttributeError):
+        del case.force
+    again = pickle.loads(pickle.dumps(case))
+    assert again.force.sum() == case.force.sum() and not again.force.flags.writeable and isinstance(case.tags, tuple)
     assert database != crumple.Database(DEMO / "curves.h5") and database == database
     # Tables are shown as such, and documents as their rows.
     group = database["lead-car-wall"]

@@ -116,7 +116,7 @@ fn of_crumple(path: &Path) -> Option<Error> {
         FileKind::Model => "a model: crumple predict takes it, crumple plot draws it",
         FileKind::Sweep => "the results of a sweep: crumple plot draws them",
         FileKind::Result => {
-            "the result of a multi-body run: crumple plot draws it, crumple rate compares it with another"
+            "a table over time, as crumple simulate writes it: crumple plot draws such results, crumple rate compares two"
         }
         _ => return None,
     };

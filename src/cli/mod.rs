@@ -70,7 +70,7 @@ pub(crate) struct GlobalOptions {
     /// Accept databases, models and unfinished sweeps that were changed after they were written
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub accept_changed: bool,
-    /// Replace an output that is a file of another kind: a database, a model, a manifest, a solver file
+    /// Replace an output that exists and is of another kind (a database, a model, a manifest, a solver file), or the study of init
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub overwrite: bool,
 }

@@ -40,7 +40,7 @@ use super::{
   crumple plot run/nodout --id 900001 --component x_velocity --units mm-t-s --cfc 60 -o nodout.svg
 The kind of file is recognised by its content. SVG and PNG show the same drawing; \"-o -\" is SVG on standard output.")]
 pub(super) struct Args {
-    /// Database, model, predicted curve, scenario, result (CSV), sweep (CSV, HDF5), solver file, or a curve's file (crumple db
+    /// Database, model, predicted curve, scenario, result (CSV, MDF), sweep (CSV, HDF5), solver file, or a curve's file (crumple db
     /// add --list); several scenarios or results are drawn over one another
     #[arg(required = true)]
     files: Vec<PathBuf>,

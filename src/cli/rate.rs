@@ -41,10 +41,10 @@ choose with --from and --to. Of two results of crumple simulate, without a colum
 rated by the acceptance rule for numerical crash models that rail practice quotes from EN 15227:2020+A1:2024: the same
 sequence, dissipated energy within 10 % of the initial one, displacement and mean force of each stage within 10 %.")]
 pub(super) struct Args {
-    /// Reference: CSV or solver file, with the column or history to take
+    /// Reference: CSV, MDF or solver file, with the column or history to take
     #[arg(value_name = "A", value_parser = Address::parse, allow_hyphen_values = true)]
     reference: Address,
-    /// Prediction: CSV or solver file, with the column or history to take
+    /// Prediction: CSV, MDF or solver file, with the column or history to take
     #[arg(value_name = "B", value_parser = Address::parse, allow_hyphen_values = true)]
     prediction: Address,
     #[command(flatten)]

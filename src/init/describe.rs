@@ -9,7 +9,7 @@ use super::measure::{self, Impact, MassEstimates, SAME_MASS, SAME_SPEED, is_near
 use super::recipe::{CommonRecipe, FOLLOWS, names_centre_of_gravity, percent};
 use super::record::Record;
 use super::sources::MOTION;
-use super::units::{digits, shown_mass};
+use super::units::digits;
 use super::write::Evidence::{Computed, Given, Guessed, Read};
 use super::write::{Proposal, Proposed, ProposedRun};
 use crate::curve::recipe::{DeflectionSource, Filter, ForceSource, RecordedMotion};
@@ -476,20 +476,16 @@ impl Facts<'_> {
             None => measure::agree(&estimates(0).unwrap_or_default(), &why, warnings),
         };
         if let Some(given) = mass_kg {
-            let of_runs = estimates(0).unwrap_or_default();
-            let found = measure::agree(&of_runs, &why, &mut Vec::new());
-            let other = |((name, _), found): (&(String, _), &Proposed<f64>)| {
-                let kg = found.value().filter(|kg| !is_near(**kg, given, UNEQUAL))?;
-                Some(format!(
-                    "mass: --mass is {}, but the record of {name} gives {}: check it, and its unit",
-                    shown_mass(given),
-                    shown_mass(*kg)
-                ))
-            };
-            warnings.extend(of_runs.iter().zip(&found).find_map(other));
+            warnings.extend(measure::contradicts(
+                &estimates(0).unwrap_or_default(),
+                "--mass",
+                given,
+            ));
         }
         warnings.extend(measure::differ(&bodies));
         if let Some(kg) = other_mass_kg {
+            let of_runs = estimates(1).unwrap_or_default();
+            warnings.extend(measure::contradicts(&of_runs, "--other-mass", kg));
             return (bodies, Some(stated(kg, "by --other-mass")));
         }
         if mass_kg.is_none()

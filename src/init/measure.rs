@@ -142,6 +142,29 @@ impl MassEstimates {
     }
 }
 
+/// A mass given by the user that differs from that of a record by this share, and more than the record leaves open, may have another unit.
+const CONTRADICTS: f64 = 0.1;
+
+/// What to say if a mass that the user gives by `option` is not that of the records.
+pub(super) fn contradicts(
+    runs: &[(String, MassEstimates)],
+    option: &str,
+    given_kg: f64,
+) -> Option<String> {
+    let other = |(name, mass): &(String, MassEstimates)| {
+        let (kg, _) = mass.kg()?;
+        let open = CONTRADICTS + mass.unexplained + 0.5 * mass.coarseness;
+        (!is_near(kg, given_kg, open)).then(|| {
+            format!(
+                "mass: {option} is {}, but the record of {name} gives {}: check it, and its unit",
+                shown_mass(given_kg),
+                shown_mass(kg)
+            )
+        })
+    };
+    runs.iter().find_map(other)
+}
+
 /// The mass of each run: one for all runs that scatter about it.
 ///
 /// `why`: why a run has none. Warns where the two ways differ.

@@ -28,18 +28,23 @@ pub(crate) use scenario::propose_scenario;
 pub(crate) use write::Proposal;
 pub(crate) use write::Proposed;
 
-/// Refuses a path where something is; with `overwrite` only where that is not a file.
+/// Refuses a path where something is; with `overwrite` all but a TOML file, since runs and models are inputs.
 pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Result<(), Error> {
-    if std::fs::symlink_metadata(path)
-        .is_ok_and(|meta| (meta.is_file() && !overwrite) || meta.is_dir() || meta.is_symlink())
-    {
-        return Err(error!(
+    let Ok(there) = std::fs::symlink_metadata(path) else { return Ok(()) };
+    let is_toml = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
+    let is_ours = there.is_file() && is_toml;
+    let path = path.display();
+    match (is_ours, overwrite) {
+        (true, true) => Ok(()),
+        (true, false) => Err(error!(
             Study,
-            "{path} exists already and is not overwritten: name another with -o, or replace it with --overwrite",
-            path = path.display()
-        ));
+            "{path} exists already and is not overwritten: name another with -o, or replace it with --overwrite"
+        )),
+        (false, _) => Err(error!(
+            Study,
+            "{path} exists already and is not a TOML file, which init writes: name another with -o"
+        )),
     }
-    Ok(())
 }
 
 /// What the caller already knows; it overrides what is found.

@@ -199,9 +199,12 @@ impl<'a> ResolvedQuery<'a> {
         let (curves, _) = self.model.curves();
         let speeds: Vec<f64> = curves.iter().map(|curve| curve.speed_m_per_s).collect();
         let (low, high, share) = neighbours(&speeds, self.v);
-        let is_between = share > 0.0 && self.same_mass && self.model.features.is_empty();
+        // At the speed of a run, that run alone.
+        let high = if share > 0.0 { high } else { low };
+        let is_inside =
+            self.model.contains(self.v) && self.same_mass && self.model.features.is_empty();
         let peak = |k: usize| (speeds[k], curves[k].envelope().peak_force_n());
-        is_between
+        is_inside
             .then(|| Warning::peak_force(declared.peak_force_n(), [peak(low), peak(high)]))
             .flatten()
     }

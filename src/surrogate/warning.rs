@@ -180,27 +180,32 @@ impl Warning {
         }
     }
 
-    /// If the largest force of a curve is a tenth below those of both neighbours, given by speed in m/s and force in N, or above them.
+    /// If the largest force of a curve is a tenth below those of both neighbours, given by speed in m/s and force in N, or above
+    /// them. At the speed of a run, both are that run.
     pub(crate) fn peak_force(peak_n: f64, neighbours: [(f64, f64); 2]) -> Option<Self> {
         let [low_n, high_n] = [f64::min, f64::max].map(|of| of(neighbours[0].1, neighbours[1].1));
         let (share, side, why) = match peak_n {
             n if n < (1.0 - FAR_PEAK) * low_n => (
                 1.0 - n / low_n,
                 "below",
-                "peaks at different deflections lower each other in a blend",
+                "it may be too low, because blending and smoothing lower peaks",
             ),
             n if n > (1.0 + FAR_PEAK) * high_n => {
-                (n / high_n - 1.0, "above", "no run shows such a force")
+                (n / high_n - 1.0, "above", "no run there shows such a force")
             }
             _ => return None,
         };
         let shown = Shown::force(peak_n);
         let [below, above] =
             neighbours.map(|(v, n)| format!("{} at {}", shown.text(n), km_per_h(v)));
+        let of = match neighbours[0] == neighbours[1] {
+            true => format!("{side} that of the run at this speed ({below})"),
+            false => format!("{side} those of both neighbouring runs ({below}, {above})"),
+        };
         Some(Self {
             code: WarningCode::PeakForce,
             message: format!(
-                "the largest force, {}, is {:.0} % {side} those of both neighbouring runs ({below}, {above}): {why}",
+                "the largest force, {}, is at least {:.0} % {of}: {why}",
                 shown.text(peak_n),
                 100.0 * share
             ),
@@ -210,7 +215,8 @@ impl Warning {
     pub(crate) fn band_of_one() -> Self {
         Self {
             code: WarningCode::TooFewCurves,
-            message: "the band rests on the one speed that was left out, and nothing was left to check it".into(),
+            message: "only one speed could be left out, so the width of the band is unchecked"
+                .into(),
         }
     }
 

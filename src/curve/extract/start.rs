@@ -76,7 +76,9 @@ impl Start {
             let since_s = onset.time_s - record.time_s.first().copied().unwrap_or_default();
             let earlier = match onset.interval_s {
                 Some(_) if since_s > RESPONSE_S => "the first touch is some milliseconds earlier",
-                Some(_) => "the record begins shortly before, and the first touch may be earlier",
+                Some(_) => {
+                    "the record begins less than 5 ms before, so the first touch may lie before it"
+                }
                 None => "the record begins there, and the first touch may be earlier",
             };
             remarks.warn(format!(

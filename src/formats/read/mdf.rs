@@ -53,7 +53,7 @@ fn opened(bytes: &[u8]) -> Result<(Blocks<'_>, Block<'_>, Vec<Group>), Error> {
 pub(crate) fn is_run(head: &[u8]) -> bool {
     let mut parts = head.windows(RUN.len());
     head.starts_with(BEGINNING)
-        && head[BEGINNING.len() * 2..].starts_with(OURS)
+        && head.get(2 * BEGINNING.len()..).is_some_and(|writer| writer.starts_with(OURS))
         && parts.any(|part| part == RUN.as_bytes())
 }
 
