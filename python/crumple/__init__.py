@@ -292,13 +292,34 @@ class Histories(_Table, _Mapping):
 def read(path, ids=None, components=None, section=None, format=None):
     """Read a solver's file: any that the program reads (nodout, rcforc, binout, T01, ...). Values are in the file's units.
 
+    Of a run's folder all these files are read, without those that lack what is selected; of two sections of one name each has that of
+    its file before it, "binout0000/nodout".
+
     Only what is selected is parsed: `ids` (numbers, or texts such as "3:surfa"), `components` (named as in binout), one or
     several, a `section` of a binout. Damage is not an error: `problems` names it.
 
     Raises `crumple.Error` if the file cannot be opened or read.
     """
-    sections = _crumple.read(os.fspath(path), _listed(ids), _listed(components), section, format)
-    return Histories(Path(path), [Section(*of) for of in sections])
+    def sections(file):
+        return [Section(*of) for of in _crumple.read(os.fspath(file), _listed(ids), _listed(components), section, format)]
+
+    if not os.path.isdir(path):
+        return Histories(Path(path), sections(path))
+    found, error = [], Error(f"{os.fspath(path)}: there are no solver files in this folder")
+    for file in _crumple.files(os.fspath(path)):
+        try:
+            found += [(file, of) for of in sections(file)]
+        except Error as lacks:
+            if ids is components is section is None:
+                raise
+            error = lacks
+    if not found:
+        raise error
+    names = [of.name for _, of in found]
+    for file, of in found:
+        if names.count(of.name) > 1:
+            of.name = f"{file.name}/{of.name}"
+    return Histories(Path(path), [of for _, of in found])
 
 
 class Case(_Table):

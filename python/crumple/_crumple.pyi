@@ -1,8 +1,9 @@
 """The compiled part; its functions give plain tuples and buffers."""
 
+from pathlib import Path
 from typing import final
 
-__all__ = ["__version__", "Floats", "TrainedModel", "Forest", "read", "database", "case", "main"]
+__all__ = ["__version__", "Floats", "TrainedModel", "Forest", "read", "files", "database", "case", "main"]
 
 __version__: str
 
@@ -17,6 +18,7 @@ type _Case = tuple[str, tuple[float, str], tuple[float, float | None], str, list
 def read(
     path: str, ids: list[str] | None, components: list[str] | None, section_name: str | None, format: str | None
 ) -> list[_Section]: ...
+def files(folder: str) -> list[Path]: ...
 def database(path: str) -> list[tuple[str, list[str]]]: ...
 def case(path: str, group: str, name: str) -> _Case: ...
 def main(arguments: list[str]) -> int: ...

@@ -166,6 +166,15 @@ fn read(
     Ok(sections.into_iter().map(section).collect())
 }
 
+/// The solver files of a folder, by which it is a run.
+#[pyfunction]
+fn files(py: Python<'_>, folder: PathBuf) -> PyResult<Vec<PathBuf>> {
+    py.detach(|| {
+        solver::output_files(&folder).map_err(|source| crumple::Error::io(&folder, source))
+    })
+    .map_err(|error| failed(py, &error))
+}
+
 /// Name, speed in m/s and its kind, masses in kg, force's kind; times, deflections, forces, body forces and closing speeds; tags,
 /// warnings.
 type DatabaseCase = (
@@ -402,6 +411,7 @@ fn _crumple(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<TrainedModel>()?;
     module.add_class::<Forest>()?;
     module.add_function(wrap_pyfunction!(read, module)?)?;
+    module.add_function(wrap_pyfunction!(files, module)?)?;
     module.add_function(wrap_pyfunction!(database, module)?)?;
     module.add_function(wrap_pyfunction!(read_case, module)?)?;
     #[cfg(feature = "program")]

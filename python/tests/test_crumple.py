@@ -40,6 +40,20 @@ def test_histories_are_those_of_the_file():
     assert histories.problems == [] and len(section.time) == 400
 
 
+def test_a_run_is_read_from_its_folder(tmp_path):
+    run = crumple.read(NODOUT.parent)
+    assert {"nodout", "rwforc"} <= set(run)
+    assert np.array_equal(run["nodout"]["x_velocity"].array, crumple.read(NODOUT).only()["x_velocity"].array)
+    assert list(crumple.read(NODOUT.parent, ids=900001)) == ["nodout"]
+    with pytest.raises(crumple.Error):
+        crumple.read(NODOUT.parent, ids=5)
+    with pytest.raises(crumple.Error, match="there are no solver files in this folder"):
+        crumple.read(tmp_path)
+    for name in ("nodout", "other.nodout"):
+        shutil.copy(NODOUT, tmp_path / name)
+    assert list(crumple.read(tmp_path)) == ["nodout/nodout", "other.nodout/nodout"]
+
+
 def test_measured_curves_are_added(tmp_path):
     table = pd.DataFrame({"d_mm": [0.0, 100.0, 200.0, 400.0], "force_kN": [0.0, 900.0, 1100.0, 1300.0]})
     for name in ("a b.csv", "b.csv"):

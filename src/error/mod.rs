@@ -50,7 +50,7 @@ impl Error {
     }
 
     /// A file that cannot be opened, read or written.
-    pub(crate) fn io(path: &Path, source: io::Error) -> Self {
+    pub fn io(path: &Path, source: io::Error) -> Self {
         Self::new(ErrorCode::Io, format!("{}: {source}", path.display())).caused_by(source)
     }
 

@@ -49,6 +49,7 @@ pub use lsdyna::deck::{Deck, DeckEntity, DeckPlace, parse_deck};
 pub use problem::{Problem, ProblemCode};
 pub(crate) use runs::family;
 use runs::missing_continuation;
+pub use runs::output_files;
 use selection::check_selection;
 pub(crate) use selection::no_component;
 pub use selection::{Entity, NoDataReason, Selection, SolverFile, WantedId, WithoutData};

@@ -44,7 +44,10 @@ pub(crate) fn run_folders(root: &Path) -> io::Result<RunFolders> {
 }
 
 /// The solver files of a folder in order of their names, each family of a binary file once.
-pub(crate) fn output_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
+///
+/// # Errors
+/// If the folder, or what continues a file, cannot be read.
+pub fn output_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in folder.read_dir()?.take(MOST_NAMES) {
         let path = entry?.path();
