@@ -204,7 +204,7 @@ class Section(_Table, _Mapping):
         return self._frame(self._columns())
 
     def _shown(self):
-        # A notebook shows no more columns of however many.
+        # A notebook shows no more columns, however many there are.
         return self._frame(islice(self._columns(), 20))
 
     def _frame(self, histories):
@@ -309,10 +309,13 @@ def read(path, ids=None, components=None, section=None, format=None):
     for file in _crumple.files(os.fspath(path)):
         try:
             found += [(file, of) for of in sections(file)]
-        except Error as lacks:
+        except Error as unread:
             if ids is components is section is None:
                 raise
-            error = lacks
+            # A file that can be read lacks what is selected, unless that lies in a part that is damaged.
+            if any(problems for _, _, _, problems, *_ in _crumple.read(os.fspath(file), [], None, None, format)):
+                warnings.warn(f"{unread}; the file is damaged, and left out", Warned, stacklevel=2)
+            error = unread
     if not found:
         raise error
     names = [of.name for _, of in found]

@@ -49,6 +49,13 @@ def test_a_run_is_read_from_its_folder(tmp_path):
         crumple.read(NODOUT.parent, ids=5)
     with pytest.raises(crumple.Error, match="there are no solver files in this folder"):
         crumple.read(tmp_path)
+    # What is damaged is not left out silently.
+    (tmp_path / "nodout").write_text("garbage\n" * 5)
+    shutil.copy(NODOUT.parent / "rwforc", tmp_path)
+    assert crumple.read(tmp_path)["nodout"].problems
+    with pytest.warns(crumple.Warned, match="the file is damaged, and left out"):
+        assert list(crumple.read(tmp_path, ids=1)) == ["rwforc"]
+    (tmp_path / "rwforc").unlink()
     for name in ("nodout", "other.nodout"):
         shutil.copy(NODOUT, tmp_path / name)
     assert list(crumple.read(tmp_path)) == ["nodout/nodout", "other.nodout/nodout"]

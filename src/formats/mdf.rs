@@ -71,7 +71,7 @@ pub(crate) fn of_run(columns: &[(String, &[f64])]) -> Vec<u8> {
     file(RUN, "run", columns.first().map_or(&[], |(_, time_s)| time_s), &channels)
 }
 
-/// The column of a run's channel, as [`of_run`] has got it.
+/// The column of which [`of_run`] made a channel.
 pub(super) fn column_of(name: &str, unit: &str) -> String {
     let end = UNITS.iter().find(|(_, of)| *of == unit).map_or("", |(end, _)| end);
     match name.split_once(' ') {
