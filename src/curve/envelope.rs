@@ -118,6 +118,7 @@ impl Envelope {
         self.force_in(*near, deflection_m)
     }
 
+    #[inline]
     fn force_in(&self, i: usize, deflection_m: f64) -> f64 {
         let (d0, d1) = (self.deflection_m[i], self.deflection_m[i + 1]);
         let (f0, f1) = (self.force_n[i], self.force_n[i + 1]);

@@ -64,6 +64,43 @@ pub(super) fn write_keeping(
     })
 }
 
+/// Cases of which the bytes are made at once, 100 kB each. With fewer, the names of those that are in the file would be
+/// searched more often.
+pub(super) const AT_ONCE: usize = 3000;
+
+/// Writes a large database to a file at `path`, so many cases at once.
+pub(super) fn write_in_parts(
+    database: &Database,
+    path: &Path,
+    at_once: usize,
+) -> Result<(), Error> {
+    let written = write_by_path(path, |draft| {
+        let first = fs::File::create(draft).map_err(|source| Error::io(draft, source))?;
+        layout::encode(database, at_once)?.finish_to(first)?;
+        let mut there = at_once;
+        for name in database.groups() {
+            let cases = database.cases(name);
+            let rest = &cases[cases.len().min(there)..];
+            there -= cases.len() - rest.len();
+            for part in rest.chunks(at_once) {
+                let file = open(draft)?;
+                let group = file.root().group(name)?;
+                for (case, content) in layout::contents(database, part) {
+                    add(&group, case, content?)?;
+                }
+                drop(group);
+                file.close()?;
+            }
+        }
+        Ok(())
+    });
+    written.map_err(|e| match e {
+        EditError::Hdf5(hdf5::Error::Io(source)) => Error::io(path, source),
+        EditError::Hdf5(e) => layout::not_encoded(e),
+        EditError::Content(e) => e,
+    })
+}
+
 /// Writes a case, whose tags or notes alone have changed, into a copy of the file at `path`, which takes its place; the
 /// other cases are copied, not read. `false` if the file is such that the crate cannot edit it.
 ///

@@ -61,6 +61,17 @@ fn of_stopped_mass(stopped: &StoppedMass) -> [(&'static str, AttrValue); 4] {
     ]
 }
 
+/// The stopped mass that is stored with a group.
+pub(super) fn stored_stopped_mass(found: &HashMap<String, AttrValue>) -> Option<StoppedMass> {
+    let of = |name| {
+        found.get(name).map(numbers).filter(|n| !n.is_empty() && n.iter().all(|x| x.is_finite()))
+    };
+    let (deflection_m, stopped_kg) = (of(DEFLECTION)?, of(STOPPED)?);
+    let residual_kg = of(RESIDUAL)?[0];
+    let is_whole = deflection_m.len() == stopped_kg.len();
+    is_whole.then_some(StoppedMass { deflection_m, stopped_kg, residual_kg })
+}
+
 /// The first attribute of a stopped mass that does not follow from the cases, with what is wrong; a group
 /// of an earlier version, which has none, differs in nothing.
 pub(super) fn differs(

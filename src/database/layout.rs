@@ -103,11 +103,19 @@ pub(crate) fn labels(path: &str) -> [(&'static str, AttrValue); 2] {
 
 impl<'a> Content<'a> {
     pub(crate) fn of(case: &'a Case) -> Result<Self, Error> {
+        let mut content = Self::recorded(case)?;
+        let body_force = (BODY_FORCE.into(), Cow::Owned(body_force_n(case)));
+        content.datasets.insert(4, body_force);
+        Ok(content)
+    }
+
+    /// All but the body force, which follows from it.
+    fn recorded(case: &'a Case) -> Result<Self, Error> {
         let mut content = Self { attributes: Vec::new(), datasets: Vec::new() };
         content.describe(case)?;
         content.curve("", &case.curves.sampled);
-        content.dataset("closing_speed_m_per_s", Cow::Borrowed(&case.curves.closing_speed_m_per_s));
-        content.dataset(BODY_FORCE, Cow::Owned(body_force_n(case)));
+        let closing = Cow::Borrowed(&*case.curves.closing_speed_m_per_s);
+        content.datasets.push(("closing_speed_m_per_s".into(), closing));
         content.curve("original/", &case.curves.original);
         Ok(content)
     }
@@ -174,10 +182,6 @@ impl<'a> Content<'a> {
         self.attributes.push((name, value));
     }
 
-    fn dataset(&mut self, name: &'static str, values: Cow<'a, [f64]>) {
-        self.datasets.push((name.into(), values));
-    }
-
     /// All attributes of the case, those for other programs among them.
     pub(crate) fn written(&mut self) -> impl Iterator<Item = (&'static str, AttrValue)> {
         let plot = PLOT.map(|(name, value)| (name, AttrValue::String(value.into())));
@@ -212,18 +216,23 @@ impl<'a> Content<'a> {
 const RECORD_ATTRIBUTES: [&str; 6] =
     ["speed_m_per_s", "speed_kind", "mass_kg", "other_mass_kg", "parameters", "force_kind"];
 
-impl Content<'_> {
-    /// BLAKE3 of the recorded curves and of what they are of.
-    pub(crate) fn record_hash(self) -> String {
-        let attributes = self.attributes.into_iter().filter(|(n, _)| RECORD_ATTRIBUTES.contains(n));
-        let datasets = self.datasets.into_iter().filter(|(path, _)| path != BODY_FORCE);
-        let record = Self { attributes: attributes.collect(), datasets: datasets.collect() };
-        let mut hash = blake3::Hasher::new();
-        for (path, of_values) in record.hashes() {
-            hash.update(path.as_bytes()).update(b"\0").update(of_values.as_bytes()).update(b"\0");
-        }
-        hash.finalize().to_hex().to_string()
+/// BLAKE3 of the recorded curves of a case and of what they are of: speed, masses, parameters and kinds, and
+/// not of names, notes or where it is from.
+pub(crate) fn record_hash(case: &Case) -> Result<String, Error> {
+    let mut record = Content::recorded(case)?;
+    record.attributes.retain(|(name, _)| RECORD_ATTRIBUTES.contains(name));
+    let mut hash = blake3::Hasher::new();
+    for (path, of_values) in record.hashes() {
+        hash.update(path.as_bytes()).update(b"\0").update(of_values.as_bytes()).update(b"\0");
     }
+    Ok(hash.finalize().to_hex().to_string())
+}
+
+/// Whether a case is not the one that its hashes are of. That of the body force is not compared: the force is computed
+/// where it is needed, and `db check` looks at the stored one.
+pub(crate) fn is_altered(case: &Case, hashes: &BTreeMap<String, String>) -> Result<bool, Error> {
+    let stored = hashes.iter().filter(|(path, _)| *path != BODY_FORCE);
+    Ok(!Content::recorded(case)?.hashes().iter().eq(stored))
 }
 
 pub(crate) fn hash_of(values: &[f64]) -> String {
@@ -259,8 +268,8 @@ pub(crate) fn root_attributes(database: &Database) -> Vec<(&'static str, AttrVal
 /// Cases whose content is made at once, on all processors.
 const HASHED_AT_ONCE: usize = 64;
 
-/// A database as the HDF5 file that it will be.
-pub(crate) fn encode(database: &Database) -> Result<FileBuilder, Error> {
+/// A database as the HDF5 file that it will be: all groups, and the first `most` cases.
+pub(crate) fn encode(database: &Database, mut most: usize) -> Result<FileBuilder, Error> {
     let mut file = FileBuilder::new();
     for (name, value) in root_attributes(database) {
         file.set_attr(name, value);
@@ -270,11 +279,9 @@ pub(crate) fn encode(database: &Database) -> Result<FileBuilder, Error> {
         for (attribute, value) in group::attributes(name, cases) {
             group.set_attr(attribute, value);
         }
-        let contents = cases.chunks(HASHED_AT_ONCE).flat_map(|cases| {
-            let contents = cases.par_iter().map(|case| with_hashes(database, case));
-            cases.iter().zip(contents.collect::<Vec<_>>())
-        });
-        for (case, content) in contents {
+        let cases = &cases[..cases.len().min(most)];
+        most -= cases.len();
+        for (case, content) in contents(database, cases) {
             let mut content = content?;
             let mut builder = group.create_group(&case.id.name);
             for (name, value) in content.written() {
@@ -297,6 +304,17 @@ pub(crate) fn encode(database: &Database) -> Result<FileBuilder, Error> {
         file.add_group(group.finish());
     }
     Ok(file)
+}
+
+/// What is written for each of these cases of a database.
+pub(crate) fn contents<'a>(
+    database: &'a Database,
+    cases: &'a [Case],
+) -> impl Iterator<Item = (&'a Case, Result<Content<'a>, Error>)> {
+    cases.chunks(HASHED_AT_ONCE).flat_map(|cases| {
+        let contents = cases.par_iter().map(|case| with_hashes(database, case));
+        cases.iter().zip(contents.collect::<Vec<_>>())
+    })
 }
 
 pub(crate) struct Opened<'a> {
@@ -460,15 +478,6 @@ impl<'a> Opened<'a> {
         serde_json::from_str(attributes.get(HASHES)?.as_str()?).ok()
     }
 
-    /// The hashes that a case in this file has by its content.
-    pub(crate) fn hashes_of(&self, content: &Content<'_>) -> BTreeMap<String, String> {
-        let mut hashes = content.hashes();
-        if self.version == OLDEST {
-            hashes.remove(BODY_FORCE);
-        }
-        hashes
-    }
-
     /// Reads one case from its group.
     pub(crate) fn case(&self, group: &str, name: &str, case: &Group) -> Result<FoundCase, Error> {
         let place = Location { opened: self, name: format!("{group}/{name}") };
@@ -490,10 +499,8 @@ fn decode_opened(opened: &Opened<'_>) -> Result<Database, Error> {
             let FoundCase { case, hashes, .. } = opened.case(&group.name, &name, &case)?;
             found.push((case, hashes));
         }
-        let is_altered = |(case, hashes): &(Case, BTreeMap<String, String>)| {
-            Ok(opened.hashes_of(&Content::of(case)?) != *hashes)
-        };
-        let altered: Vec<bool> = found.par_iter().map(is_altered).collect::<Result<_, Error>>()?;
+        let altered = found.par_iter().map(|(case, hashes)| is_altered(case, hashes));
+        let altered: Vec<bool> = altered.collect::<Result<_, Error>>()?;
         let mut cases = Vec::with_capacity(found.len());
         for ((case, hashes), altered) in found.into_iter().zip(altered) {
             if altered {
@@ -752,7 +759,7 @@ mod tests {
     fn bytes_read(cases: usize) -> (u64, u64) {
         let mut database = Database::default();
         database.put_all((0..cases).map(|k| case(format!("case {k:05}")))).unwrap();
-        let bytes = encode(&database).unwrap().finish().unwrap();
+        let bytes = encode(&database, usize::MAX).unwrap().finish().unwrap();
         let count = |work: &dyn Fn(&Opened<'_>)| {
             let read = Arc::new(AtomicU64::new(0));
             let source = Counting { bytes: bytes.clone(), read: read.clone() };
@@ -776,6 +783,28 @@ mod tests {
             }
         });
         (all, one)
+    }
+
+    #[test]
+    fn a_database_written_in_parts_is_the_one_written_as_a_whole() {
+        let of = |group: &str, k: usize| {
+            let mut case = case(format!("case {k}"));
+            case.id.group = group.into();
+            case
+        };
+        let mut database = Database::default();
+        database.put_all((0..3).map(|k| of("a", k)).chain((0..8).map(|k| of("b", k)))).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let (whole, parts) = (folder.path().join("whole.h5"), folder.path().join("parts.h5"));
+        database.write(&whole).unwrap();
+        for at_once in [1, 2, 3, 5, 10] {
+            super::super::edit::write_in_parts(&database, &parts, at_once).unwrap();
+            assert!(decode(&parts).unwrap() == database);
+            let found = |path| open(path).unwrap().groups().unwrap();
+            for (a, b) in found(&whole).iter().zip(found(&parts)) {
+                assert_eq!((&a.name, &a.listed), (&b.name, &b.listed));
+            }
+        }
     }
 
     #[test]

@@ -28,6 +28,7 @@ mod group;
 mod layout;
 
 pub(crate) use edit::replace_labels;
+pub(crate) use layout::record_hash;
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
@@ -38,7 +39,7 @@ use crate::curve::{Case, CaseId, Origin, StoppedMass};
 use crate::error::{Error, error};
 use crate::file::{accepts_changed, is_file, write_at, write_whole};
 use crate::hdf5;
-use layout::{Content, FoundCase};
+use layout::FoundCase;
 
 /// The cases of one database file.
 ///
@@ -120,7 +121,7 @@ impl Database {
         let opened = layout::open(path)?;
         if let Some((group, found)) = opened.find(group, case) {
             let FoundCase { case, hashes, .. } = opened.case(&group, case, &found)?;
-            if opened.hashes_of(&Content::of(&case)?) != hashes && !accepts_changed() {
+            if layout::is_altered(&case, &hashes)? && !accepts_changed() {
                 return Err(changed(path, &CasePath::of(&case), 1));
             }
             return Ok(case);
@@ -170,8 +171,12 @@ impl Database {
                 return edit::write_keeping(self, path, &foreign);
             }
         }
-        let file = layout::encode(self)?;
-        if path.exists() && !is_there {
+        let is_device = path.exists() && !is_there;
+        if !is_device && self.all().nth(edit::AT_ONCE).is_some() {
+            return edit::write_in_parts(self, path, edit::AT_ONCE);
+        }
+        let file = layout::encode(self, usize::MAX)?;
+        if is_device {
             return write_whole(path, &file.finish().map_err(layout::not_encoded)?);
         }
         write_at(path, |draft| {
@@ -374,12 +379,6 @@ impl Database {
             .collect()
     }
 
-    /// The mass that the crush zone of a group stops at each deflection, as its cases are now; `None` if
-    /// there is no such group, or it does not follow from them.
-    pub(crate) fn stopped_mass(&self, group: &str) -> Option<StoppedMass> {
-        group::stopped_mass(group, self.cases(group))
-    }
-
     /// All cases, by group, speed and name.
     pub fn all(&self) -> impl Iterator<Item = &Case> {
         self.groups.values().flatten()
@@ -400,10 +399,15 @@ pub(crate) fn remember_origin(case: &mut Case) {
     }
 }
 
-/// BLAKE3 of the curves of a case and of what they are of: speed, masses, parameters and kinds, and
-/// not of names, notes or where it is from.
-pub(crate) fn record_hash(case: &Case) -> Result<String, Error> {
-    Ok(Content::of(case)?.record_hash())
+/// The mass that the crush zone of a group stops at each deflection, as it is stored with the group; where it is not,
+/// as it follows from the cases. `None` if it does not.
+pub(crate) fn stopped_mass(
+    path: &Path,
+    group: &str,
+    cases: &[Case],
+) -> Result<Option<StoppedMass>, Error> {
+    let stored = group::stored_stopped_mass(&layout::open(path)?.group_attributes(group)?);
+    Ok(stored.or_else(|| group::stopped_mass(group, cases)))
 }
 
 /// What other programs have put into the file at `path`, as a message lists it; `None` if nothing.

@@ -408,6 +408,11 @@ impl Damping {
         }
     }
 
+    /// Its coefficient if that is the same at all speeds.
+    pub(super) fn constant_n_s_per_m(&self) -> Option<f64> {
+        <[f64; 1]>::try_from(&*self.coefficient_n_s_per_m).ok().map(|[c]| c)
+    }
+
     fn largest(&self) -> f64 {
         self.coefficient_n_s_per_m.iter().copied().fold(0.0, f64::max)
     }
@@ -438,7 +443,14 @@ pub struct RateFactor {
 impl RateFactor {
     /// At a closing speed of the two bodies in m/s; 1 while they separate.
     pub(super) fn at(&self, closing_m_per_s: f64) -> f64 {
-        1.0 + self.sensitivity_sqrt_s_per_m * (self.share * closing_m_per_s).max(0.0).sqrt()
+        Self::of(self.sensitivity_sqrt_s_per_m, self.share * closing_m_per_s)
+    }
+
+    /// At the speed in m/s that counts.
+    #[inline(always)]
+    pub(super) fn of(sensitivity_sqrt_s_per_m: f64, m_per_s: f64) -> f64 {
+        let m_per_s = if m_per_s > 0.0 { m_per_s } else { 0.0 };
+        1.0 + sensitivity_sqrt_s_per_m * m_per_s.sqrt()
     }
 
     /// Closing speed in m/s of its two bodies, whose speeds `speed_m_per_s` gives.
@@ -465,11 +477,6 @@ impl Stopping {
     /// Mass of the zone in kg once its maximum deflection was `largest_m`; `least_kg` at first.
     pub(super) fn zone_kg(&self, largest_m: f64, least_kg: f64) -> f64 {
         self.stopped_kg.force_at(largest_m.max(0.0)).max(least_kg)
-    }
-
-    /// The same, looked for near a segment of the stopped mass, which it becomes.
-    pub(super) fn zone_near_kg(&self, near: &mut usize, largest_m: f64, least_kg: f64) -> f64 {
-        self.stopped_kg.force_near(near, largest_m.max(0.0)).max(least_kg)
     }
 
     /// Mass that is stopped per deflection, in kg/m.

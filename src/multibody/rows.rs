@@ -40,6 +40,11 @@ impl LaneIndex {
         self.0 / LANES
     }
 
+    /// Counted along the rows.
+    pub(crate) fn flat(self) -> usize {
+        self.0
+    }
+
     #[inline(always)]
     pub(crate) fn lane(self) -> usize {
         self.0 % LANES
@@ -118,6 +123,17 @@ impl Rows {
         &mut self.0[..n]
     }
 
+    /// All values, row by row, those of the last row too.
+    #[inline(always)]
+    pub(crate) fn flat(&self) -> &[f64] {
+        self.0.as_flattened()
+    }
+
+    #[inline(always)]
+    pub(crate) fn flat_mut(&mut self) -> &mut [f64] {
+        self.0.as_flattened_mut()
+    }
+
     /// Sum of the first `n` rows.
     #[inline(always)]
     pub(crate) fn sum(&self, n: usize) -> f64 {
@@ -129,20 +145,36 @@ impl Rows {
     }
 }
 
-/// Of the neighbours in front of row `c`; the last body never moves.
-#[inline(always)]
-pub(super) fn ahead(rows: &[Row], c: usize) -> Row {
-    if c + 1 < rows.len() { rows[c + 1] } else { [rows[0][1], rows[0][2], rows[0][3], 0.0] }
+/// The neighbours of rows: those of an end of the stretches are put together before a pass, so that it loads whole vectors.
+pub(super) struct Neighbours<'r> {
+    rows: &'r [Row],
+    at_end: Row,
 }
 
-/// Of the neighbours behind row `c`; there is nothing behind the first body.
-#[inline(always)]
-pub(super) fn behind(rows: &[Row], c: usize) -> Row {
-    if c > 0 {
-        rows[c - 1]
-    } else {
+impl<'r> Neighbours<'r> {
+    /// In front; the last body never moves.
+    #[inline(always)]
+    pub(crate) fn ahead(rows: &'r [Row]) -> Self {
+        Self { rows, at_end: [rows[0][1], rows[0][2], rows[0][3], 0.0] }
+    }
+
+    /// Behind; there is nothing behind the first body.
+    #[inline(always)]
+    pub(crate) fn behind(rows: &'r [Row]) -> Self {
         let last = &rows[rows.len() - 1];
-        [0.0, last[0], last[1], last[2]]
+        Self { rows, at_end: [0.0, last[0], last[1], last[2]] }
+    }
+
+    /// In front of row `c`.
+    #[inline(always)]
+    pub(crate) fn after(&self, c: usize) -> &Row {
+        self.rows.get(c + 1).unwrap_or(&self.at_end)
+    }
+
+    /// Behind row `c`.
+    #[inline(always)]
+    pub(crate) fn before(&self, c: usize) -> &Row {
+        if c > 0 { &self.rows[c - 1] } else { &self.at_end }
     }
 }
 

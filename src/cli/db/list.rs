@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::{Chosen, CommandResult, Failure, GlobalOptions, output};
 use crate::cli::train::stopped_mass_line;
 use crate::curve::{Case, Masses, StoppedMass, group as siblings};
-use crate::database::Database;
+use crate::database::{self, Database};
 use crate::dataset::of_one_kind;
 use crate::table::{Table, TableOf};
 use crate::unit::{Shown, km_per_h};
@@ -51,8 +51,11 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         }
     }
     let outcome = options.warn_all(warnings.iter().chain(&of_cases));
-    let of_group = |group: &&'_ str| Some((group.to_string(), database.stopped_mass(group)?));
-    let stopped_mass: BTreeMap<String, StoppedMass> = groups.keys().filter_map(of_group).collect();
+    let mut stopped_mass: BTreeMap<String, StoppedMass> = BTreeMap::new();
+    for group in groups.keys() {
+        let of_group = database::stopped_mass(&args.database, group, database.cases(group))?;
+        stopped_mass.extend(of_group.map(|stopped| (group.to_string(), stopped)));
+    }
     let rows = groups.iter().map(|(group, cases)| {
         (*group, cases.iter().map(|case| case_row(case)).collect::<Vec<_>>())
     });

@@ -6,7 +6,7 @@
 mod contact;
 
 use super::law::{ForceLaw, Piece};
-use super::rows::{LANES, LaneIndex, Layout, Row, Rows, ahead, each, larger};
+use super::rows::{LANES, LaneIndex, Layout, Neighbours, Row, Rows, each, larger};
 pub(super) use contact::Move;
 use contact::{Contact, Stage, Totals};
 
@@ -162,6 +162,12 @@ impl<'a> Contacts<'a> {
         &self.force_n[at as usize]
     }
 
+    /// Where the present pieces of a row begin; −∞ of what is open.
+    #[inline(always)]
+    pub(crate) fn begins_m(&self, row: usize) -> Row {
+        self.lanes[row].from_m
+    }
+
     pub(crate) fn slope_n_per_m(&self, slot: LaneIndex) -> f64 {
         self.lanes[slot.row()].slope_n_per_m[slot.lane()]
     }
@@ -218,10 +224,11 @@ impl<'a> Contacts<'a> {
         let outside = self.outside_m.values_mut(n);
         let x = x_m.values(n);
         let all = &mut self.lanes[..n];
+        let neighbours = Neighbours::ahead(x);
         for c in 0..n {
             let lanes = &mut all[c];
             // Whole rows at a time, which the compiler turns into vectors.
-            let ahead = ahead(x, c);
+            let ahead = neighbours.after(c);
             let deflection = each(|j| sign * (x[c][j] - ahead[j]) - gaps[c][j]);
             forces[c] = each(|j| lanes.at_zero_n[j] + lanes.slope_n_per_m[j] * deflection[j]);
             let below = each(|j| lanes.from_m[j] - deflection[j]);
@@ -247,9 +254,10 @@ impl<'a> Contacts<'a> {
         let a = a.values(n);
         let gradient = self.gradient_n.values_mut(n);
         let all = &self.lanes[..n];
+        let neighbours = Neighbours::ahead(a);
         for c in 0..n {
             let slope = &all[c].slope_n_per_m;
-            let ahead = ahead(a, c);
+            let ahead = neighbours.after(c);
             gradient[c] = each(|j| factor * slope[j] * (a[c][j] - ahead[j]));
         }
     }

@@ -1,9 +1,45 @@
 //! Forces and accelerations at the present positions and speeds.
 
 use super::super::contacts::{Contacts, StepPoint};
-use super::super::rows::{LANES, LaneIndex, Rows, ahead, behind, each, larger};
+use super::super::rows::{LANES, Neighbours, Rows, each, larger};
 use super::events::Speeds;
-use super::state::Engine;
+use super::state::{Engine, Fixed, Taken};
+use crate::multibody::chain::RateFactor;
+use multiversion::multiversion;
+
+/// Accelerations with tension, dampers, rates and resistance, then speeds by `kick_s`.
+#[multiversion(targets("x86_64+avx+avx2"))]
+fn accelerate_by_all<'a>(engine: &mut Engine<'a>, at: StepPoint, lag_s: f64, kick_s: f64) {
+    let n = engine.fixed.layout.rows();
+    let Some(mut net) = engine.net_n.take() else { return };
+    net.clone_from(engine.push.forces_n(at));
+    if let Some(pull) = &engine.pull {
+        let pulls = pull.forces_n(at).values(n);
+        for (net, pull) in net.values_mut(n).iter_mut().zip(pulls) {
+            *net = each(|j| net[j] - pull[j]);
+        }
+    }
+    engine.add_rates(&mut net, at, lag_s);
+    if engine.fixed.has_plain_dampers {
+        engine.add_plain_dampers(&mut net, at, lag_s);
+    }
+    engine.losses.power.damper_w = engine.losses.power_of_w.sum(n);
+    engine.add_dampers(&mut net, at, lag_s);
+    if engine.by_contacts.is_some() {
+        engine.accelerate_against_resistance(&net, lag_s);
+        engine.kick::<0>(kick_s);
+    } else {
+        let (net, per_kg) = (net.values(n), engine.per_kg.values(n));
+        let neighbours = Neighbours::behind(net);
+        let (a, v) = (engine.a.values_mut(n), engine.v.values_mut(n));
+        for c in 0..n {
+            let behind = neighbours.before(c);
+            a[c] = each(|j| (behind[j] - net[c][j]) * per_kg[c][j]);
+            v[c] = each(|j| v[c][j] + kick_s * a[c][j]);
+        }
+    }
+    engine.net_n = Some(net);
+}
 
 impl Engine<'_> {
     /// Forces at the present positions; interfaces that have left their piece are settled.
@@ -26,119 +62,130 @@ impl Engine<'_> {
         kick_s: f64,
     ) {
         if self.net_n.is_some() {
-            self.accelerate_by_all(at, lag_s);
-            return self.kick::<N>(kick_s);
+            return accelerate_by_all(self, at, lag_s, kick_s);
         }
         let n = self.fixed.layout.known::<N>();
         let forces = self.push.forces_n(at).values(n);
         let per_kg = self.per_kg.values(n);
         let (a, v) = (self.a.values_mut(n), self.v.values_mut(n));
+        let neighbours = Neighbours::behind(forces);
         for c in 0..n {
-            let behind = behind(forces, c);
+            let behind = neighbours.before(c);
             a[c] = each(|j| (behind[j] - forces[c][j]) * per_kg[c][j]);
             v[c] = each(|j| v[c][j] + kick_s * a[c][j]);
         }
     }
 
-    /// Accelerations with tension, dampers and resistance.
-    #[inline(never)]
-    fn accelerate_by_all(&mut self, at: StepPoint, lag_s: f64) {
-        let n = self.fixed.layout.rows();
-        let Some(mut net) = self.net_n.take() else { return };
-        net.clone_from(self.push.forces_n(at));
-        if let Some(pull) = &self.pull {
-            let pulls = pull.forces_n(at).values(n);
-            for (net, pull) in net.values_mut(n).iter_mut().zip(pulls) {
-                *net = each(|j| net[j] - pull[j]);
-            }
-        }
-        self.add_rates(&mut net, at, lag_s);
-        self.add_dampers(&mut net, at, lag_s);
-        if self.by_contacts.is_some() {
-            self.accelerate_against_resistance(&net, lag_s);
-        } else {
-            let (net, per_kg) = (net.values(n), self.per_kg.values(n));
-            for (c, a) in self.a.values_mut(n).iter_mut().enumerate() {
-                let behind = behind(net, c);
-                *a = each(|j| (behind[j] - net[c][j]) * per_kg[c][j]);
-            }
-        }
-        self.net_n = Some(net);
-    }
-
     /// Multiplies the forces of crush zones by what the speeds of their vehicles make of them.
+    #[inline(always)]
     fn add_rates(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
-        let n = self.fixed.layout.rows();
-        self.losses.power.damper_w = 0.0;
+        let Fixed { rated, layout, sensitivity, share, .. } = &self.fixed;
+        let n = layout.rows();
+        let (sensitivity, share) = (sensitivity.values(n), share.values(n));
         self.losses.power_of_w.values_mut(n).fill([0.0; LANES]);
-        let (v, a, forces) = (&self.v, &self.a_start, self.push.forces_n(at));
-        let mut acts = false;
-        for rated in &self.fixed.rated {
-            // Nothing times any factor; what crosses its begin in this step needs the factor all the same.
-            if forces[rated.slot] == 0.0 && self.crossings.is_empty() {
-                continue;
-            }
-            let speed = |slot: LaneIndex| v[slot] + lag_s * a[slot];
-            let closing = speed(rated.behind) - rated.ahead.map_or(0.0, speed);
-            self.rate_factors[rated.slot] = rated.rate.at(closing);
-            acts = true;
+        let (v, a) = (self.v.values(n), self.a_start.values(n));
+        let forces = self.push.forces_n(at).values(n);
+        let mut most = [0.0; LANES];
+        for (c, speed) in self.speeds.values_mut(n).iter_mut().enumerate() {
+            *speed = each(|j| v[c][j] + lag_s * a[c][j]);
+            most = larger(most, each(|j| share[c][j] * forces[c][j].abs()));
         }
+        // Nothing times any factor; what crosses its begin in this step needs the factor all the same.
+        let acts =
+            most.iter().any(|&n| n > 0.0) || !(self.crossings.is_empty() || rated.is_empty());
         if !acts {
             return;
         }
-        let (v, a, forces) = (v.values(n), a.values(n), forces.values(n));
+        let speeds = self.speeds.flat();
         let power = self.losses.power_of_w.values_mut(n);
         let peaks = self.peaks_n.values_mut(n);
+        let (next_v, next_a) = (Neighbours::ahead(v), Neighbours::ahead(a));
         for (c, net) in net_n.values_mut(n).iter_mut().enumerate() {
-            let factors = &self.rate_factors.values(n)[c];
+            let sides = &rated[c];
+            let closing = each(|j| speeds[sides[j][0]] - speeds[sides[j][1]]);
+            let factors = each(|j| RateFactor::of(sensitivity[c][j], share[c][j] * closing[j]));
+            self.rate_factors.values_mut(n)[c] = factors;
             let extra = each(|j| (factors[j] - 1.0) * forces[c][j]);
-            let (v_ahead, a_ahead) = (ahead(v, c), ahead(a, c));
+            let (v_ahead, a_ahead) = (next_v.after(c), next_a.after(c));
             power[c] = each(|j| extra[j] * (v[c][j] - v_ahead[j] + lag_s * (a[c][j] - a_ahead[j])));
             *net = each(|j| net[j] + extra[j]);
             peaks[c] = larger(peaks[c], *net);
         }
-        self.losses.power.damper_w = self.losses.power_of_w.sum(n);
+    }
+
+    /// Adds the dampers that only push and have one coefficient, such as those of end plates.
+    #[inline(always)]
+    fn add_plain_dampers(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
+        let n = self.fixed.layout.rows();
+        let (v, a) = (self.v.values(n), self.a_start.values(n));
+        let deflections = self.push.deflections_m(at).values(n);
+        let power = self.losses.power_of_w.values_mut(n);
+        let peaks = self.peaks_n.values_mut(n);
+        let damping = self.fixed.damping.values(n);
+        let (next_v, next_a) = (Neighbours::ahead(v), Neighbours::ahead(a));
+        for (c, net) in net_n.values_mut(n).iter_mut().enumerate() {
+            let (all, deflection, from_m) = (&damping[c], &deflections[c], self.push.begins_m(c));
+            // Of a deflection of 0 only where bodies meet at the start.
+            let touching = each(|j| if deflection[j] >= 0.0 { all[j] } else { 0.0 });
+            let acting = each(|j| if from_m[j] > f64::NEG_INFINITY { touching[j] } else { 0.0 });
+            let (v_ahead, a_ahead) = (next_v.after(c), next_a.after(c));
+            let closing = each(|j| v[c][j] - v_ahead[j] + lag_s * (a[c][j] - a_ahead[j]));
+            let spring = *net;
+            // No tension where it opens fast.
+            let least = each(|j| if acting[j] > 0.0 { 0.0 } else { f64::NEG_INFINITY });
+            *net = larger(each(|j| spring[j] + acting[j] * closing[j]), least);
+            power[c] = each(|j| power[c][j] + (net[j] - spring[j]) * closing[j]);
+            peaks[c] = larger(peaks[c], each(|j| if acting[j] > 0.0 { net[j] } else { 0.0 }));
+        }
     }
 
     /// Crush zones take the mass that has been stopped in the step; their speed and that of what
     /// they take become one, which loses energy and no momentum.
-    pub(super) fn stop_mass(&mut self) {
+    ///
+    /// `turned` says whether a deflection may have been larger within the step than at its end.
+    #[inline(always)]
+    pub(super) fn stop_mass(&mut self, turned: bool) {
         let ahead_s = self.fixed.ahead_s();
+        let deflections_m = self.push.deflections_m(StepPoint::End).flat();
+        let (v, a) = (self.v.flat_mut(), self.a.flat_mut());
+        let (mass_kg, per_kg) = (self.mass_kg.flat_mut(), self.per_kg.flat_mut());
+        let damped_of_j = self.losses.damped_of_j.flat_mut();
         for taken in &mut self.taken {
-            let k = taken.interface;
             // Only a zone that is crushed further takes mass.
-            let largest_m = self.push.largest_m(StepPoint::End, k).max(0.0);
+            if !turned && deflections_m[taken.slot] <= taken.largest_m {
+                continue;
+            }
+            let largest_m = self.push.largest_m(StepPoint::End, taken.interface).max(0.0);
             if largest_m == taken.largest_m {
                 continue;
             }
             taken.largest_m = largest_m;
-            let Some(stopping) = &self.fixed.chain.interfaces()[k].stopping else { continue };
-            let least_kg = self.fixed.chain.bodies()[stopping.zone].mass_kg;
-            let body = self.fixed.layout.of(stopping.body);
-            let zone = self.fixed.layout.of(stopping.zone);
-            let before_kg = self.mass_kg[zone];
-            let now_kg = stopping.zone_near_kg(&mut taken.segment, largest_m, least_kg);
+            let Taken { body, zone, .. } = *taken;
+            let before_kg = mass_kg[zone];
+            let now_kg = taken.stopped_kg.force_near(&mut taken.segment, largest_m);
+            let now_kg = now_kg.max(taken.least_kg);
             let taken_kg = now_kg - before_kg;
             if taken_kg <= 0.0 {
                 continue;
             }
-            let difference = self.v[body] - self.v[zone];
+            let difference = v[body] - v[zone];
             // At the step's end: speeds are `ahead_s` ahead, and the force of what is taken stays with the body.
-            let mean = 0.5 * difference + ahead_s * self.a[zone];
+            let mean = 0.5 * difference + ahead_s * a[zone];
             let lost_j = before_kg * taken_kg / now_kg * difference * mean;
             self.losses.damped_j += lost_j;
-            self.losses.damped_of_j[self.fixed.layout.of(k)] += lost_j;
-            self.v[zone] += taken_kg / now_kg * difference;
-            for (slot, mass_kg) in [(zone, now_kg), (body, self.mass_kg[body] - taken_kg)] {
+            damped_of_j[taken.slot] += lost_j;
+            v[zone] += taken_kg / now_kg * difference;
+            for (i, now_kg) in [(zone, now_kg), (body, mass_kg[body] - taken_kg)] {
                 // The forces stay, and so does the momentum that the next half step takes back.
-                let per_kg = 1.0 / mass_kg;
-                self.a[slot] *= self.mass_kg[slot] * per_kg;
-                self.mass_kg[slot] = mass_kg;
-                self.per_kg[slot] = per_kg;
+                let now_per_kg = 1.0 / now_kg;
+                a[i] *= mass_kg[i] * now_per_kg;
+                mass_kg[i] = now_kg;
+                per_kg[i] = now_per_kg;
             }
         }
     }
 
+    /// Adds all other dampers.
     fn add_dampers(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
         for &k in &self.fixed.damped {
             let slot = self.fixed.layout.of(k);
@@ -214,8 +261,9 @@ impl Engine<'_> {
         let (a, v) = (self.a.values_mut(n), self.v.values_mut(n));
         let x = self.x_m.values_mut(n);
         let per_kg = self.per_kg.values(n);
+        let neighbours = Neighbours::behind(gradient);
         for c in 0..n {
-            let behind = behind(gradient, c);
+            let behind = neighbours.before(c);
             a[c] = each(|j| a[c][j] + (behind[j] - gradient[c][j]) * per_kg[c][j]);
             v[c] = each(|j| v[c][j] + kick_s * a[c][j]);
             x[c] = each(|j| x[c][j] + drift_s * v[c][j]);

@@ -33,16 +33,16 @@ mod state;
 
 use multiversion::multiversion;
 
-use super::chain::{Chain, Interface, Tension};
+use super::chain::{Chain, Damping, Interface, RateFactor, Stopping, Tension};
 use super::contacts::{Contacts, Direction, StepPoint};
 use super::recorder::{EventRecorder, LOOK_S, Moment};
-use super::rows::{Layout, Rows};
+use super::rows::{LANES, Layout, Rows};
 use super::run::{Grid, Record, Run};
 use crate::error::Error;
 use events::Speeds;
 use outputs::OutputRecorder;
 pub(super) use state::Scheme;
-use state::{Engine, Fixed, Losses, Rated, Taken};
+use state::{Engine, Fixed, Losses, Taken};
 
 /// Runs the chain and fills in `run`.
 pub(super) fn run(
@@ -94,11 +94,12 @@ fn all_outputs<'a, const N: usize>(
                 Scheme::FourthOrder => engine.fourth_order::<N>(h),
                 Scheme::Verlet => engine.verlet::<N>(h),
             }
-            if !engine.crossings.is_empty() {
+            let crossed = !engine.crossings.is_empty();
+            if crossed {
                 engine.finish()?;
             }
             if stops {
-                engine.stop_mass();
+                engine.stop_mass(crossed);
             }
             until_look = until_look.saturating_sub(1);
             if looks && (until_look == 0 || step == grid.steps_per_output) {
@@ -188,24 +189,52 @@ impl<'a> Engine<'a> {
         });
         let of = |value: &dyn Fn(usize) -> f64| Rows::of(&layout, bodies.len(), value);
         let has_net = couples || chain.has_rates();
-        let zones = (0..interfaces.len())
-            .filter(|&k| interfaces[k].stopping.is_some())
-            .map(|k| Taken { interface: k, largest_m: f64::NAN, segment: 0 });
-        let rated = |(k, interface): (usize, &Interface)| {
-            let rate = interface.rate.clone()?;
-            let (slot, behind) = (layout.of(k), layout.of(rate.behind));
-            let ahead = rate.ahead.map(|body| layout.of(body));
-            Some(Rated { slot, behind, ahead, rate })
+        let zone = |(k, interface): (usize, &'a Interface)| {
+            let Stopping { body, zone, stopped_kg } = interface.stopping.as_ref()?;
+            let [slot, body, zone] = [k, *body, *zone].map(|i| layout.of(i).flat());
+            let least_kg = bodies[interface.stopping.as_ref()?.zone].mass_kg;
+            Some(Taken {
+                interface: k,
+                slot,
+                body,
+                zone,
+                least_kg,
+                stopped_kg,
+                largest_m: f64::NAN,
+                segment: 0,
+            })
         };
-        let rated: Vec<Rated> = interfaces.iter().enumerate().filter_map(rated).collect();
-        let has_damper = |k: &usize| interfaces[*k].damping.is_some();
-        let damped = (0..interfaces.len()).filter(has_damper).collect();
+        let taken = interfaces.iter().enumerate().filter_map(zone).collect();
+        let nothing = [layout.of(bodies.len()).flat(); 2];
+        let mut rated = Vec::new();
+        for (k, interface) in interfaces.iter().enumerate() {
+            let Some(rate) = &interface.rate else { continue };
+            rated.resize(layout.rows(), [nothing; LANES]);
+            // The wall is after the last body and never moves.
+            let ahead = rate.ahead.unwrap_or(bodies.len());
+            let slot = layout.of(k);
+            rated[slot.row()][slot.lane()] = [rate.behind, ahead].map(|i| layout.of(i).flat());
+        }
+        let of_rate = |value: fn(&RateFactor) -> f64| {
+            Rows::of(&layout, interfaces.len(), |k| interfaces[k].rate.as_ref().map_or(0.0, value))
+        };
+        let sensitivity = of_rate(|rate| rate.sensitivity_sqrt_s_per_m);
+        let share = of_rate(|rate| rate.share);
+        let plain = |k: usize| {
+            let damper = interfaces[k].damping.as_ref().filter(|_| interfaces[k].tension.is_none());
+            damper.and_then(Damping::constant_n_s_per_m).filter(|&c| c > 0.0)
+        };
+        let damping = Rows::of(&layout, interfaces.len(), |k| plain(k).unwrap_or(0.0));
+        let has_plain_dampers = (0..interfaces.len()).any(|k| plain(k).is_some());
+        let has_other = |k: &usize| interfaces[*k].damping.is_some() && plain(*k).is_none();
+        let damped = (0..interfaces.len()).filter(has_other).collect();
         let mut engine = Self {
             mass_kg: of(&|i| bodies[i].mass_kg),
             per_kg: of(&|i| 1.0 / bodies[i].mass_kg),
+            speeds: of(&|_| 0.0),
             rate_factors: of(&|_| 1.0),
             peaks_n: of(&|_| 0.0),
-            taken: zones.collect(),
+            taken,
             x_m: of(&|_| 0.0),
             v: of(&|i| bodies[i].speed_m_per_s),
             a: of(&|_| 0.0),
@@ -220,7 +249,18 @@ impl<'a> Engine<'a> {
             losses: Losses::new(&layout),
             wall_impulse: 0.0,
             events: EventRecorder::new(chain, &layout),
-            fixed: Fixed { chain, scheme, step_s, layout, rated, damped },
+            fixed: Fixed {
+                chain,
+                scheme,
+                step_s,
+                layout,
+                rated,
+                sensitivity,
+                share,
+                damped,
+                damping,
+                has_plain_dampers,
+            },
         };
         engine.move_to_first_contact();
         engine.accelerate_and_kick::<0>(StepPoint::End, 0.0, 0.0);

@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
-use super::super::chain::{Chain, RateFactor};
+use super::super::chain::Chain;
 use super::super::contacts::{Contacts, Direction, Move, StepPoint};
 use super::super::recorder::EventRecorder;
-use super::super::rows::{LaneIndex, Layout, Rows, each};
+use super::super::rows::{LANES, LaneIndex, Layout, Rows, each};
+use crate::curve::Envelope;
 
 /// How the engine steps.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,24 +21,28 @@ pub(super) struct Fixed<'a> {
     pub layout: Layout,
     pub scheme: Scheme,
     pub step_s: f64,
-    /// Interfaces whose force follows a speed, and those with dampers.
-    pub rated: Vec<Rated>,
+    /// Places in [`Rows::flat`] of the two bodies whose closing speed an interface's force follows; empty without such.
+    pub rated: Vec<[[usize; 2]; LANES]>,
+    /// Of the rate factors; 0 where there is none.
+    pub sensitivity: Rows,
+    pub share: Rows,
+    /// Interfaces with other dampers than plain ones.
     pub damped: Vec<usize>,
+    /// Coefficients in N s/m of dampers that only push and have one; 0 where there is none.
+    pub damping: Rows,
+    pub has_plain_dampers: bool,
 }
 
-/// An interface whose force follows the closing speed of two bodies.
-pub(super) struct Rated {
-    pub slot: LaneIndex,
-    /// The bodies whose speed counts.
-    pub behind: LaneIndex,
-    pub ahead: Option<LaneIndex>,
-    pub rate: RateFactor,
-}
-
-/// What a crush zone was when it last took mass.
-pub(super) struct Taken {
+/// A crush zone that takes mass of its body, at the interface with this index and slot.
+pub(super) struct Taken<'a> {
     pub interface: usize,
-    /// Its maximum deflection, and the segment of the stopped mass that holds it.
+    /// Places in [`Rows::flat`].
+    pub slot: usize,
+    pub body: usize,
+    pub zone: usize,
+    pub least_kg: f64,
+    pub stopped_kg: &'a Envelope,
+    /// Maximum deflection when it last took mass, and the segment of the stopped mass that holds it.
     pub largest_m: f64,
     pub segment: usize,
 }
@@ -72,11 +77,13 @@ pub(super) struct Engine<'a> {
     pub pull: Option<Contacts<'a>>,
     /// Net forces if more than the pushing ones act; for a while their gradient.
     pub net_n: Option<Rows>,
+    /// Of the bodies, where forces depend on them.
+    pub speeds: Rows,
     /// What the speeds multiply the force of each interface by, and the largest forces with it.
     pub rate_factors: Rows,
     pub peaks_n: Rows,
     /// Of every interface with a crush zone.
-    pub taken: Vec<Taken>,
+    pub taken: Vec<Taken<'a>>,
     /// What has happened in the step.
     pub crossings: Vec<Crossing>,
     /// Interfaces that have left their pieces, pulling ones after pushing ones.
