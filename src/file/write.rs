@@ -68,17 +68,28 @@ pub fn write_at<T>(
     write().map_err(|source| not_written(path, source))
 }
 
-/// Writes a file as `write_whole` does, by a function that is given the path of the temporary
-/// file and may do with it what it likes but remove it.
+/// Writes a file as `write_whole` does, by a function that is given the path of a temporary file, which is not there yet.
+/// It is not the locked draft: on Windows nobody writes to that by another handle, not even its own process.
 pub(crate) fn write_by_path<E: From<Error>>(
     path: &Path,
     fill: impl FnOnce(&Path) -> Result<(), E>,
 ) -> Result<(), E> {
     let failed = |source| not_written(path, source);
     let draft = Draft::beside(path).map_err(failed)?;
-    fill(&draft.path)?;
-    draft.file.sync_all().and_then(|()| draft.place()).map_err(failed)?;
-    Ok(())
+    let work = draft.path.with_extension("work");
+    // Of a process that was killed.
+    if_there(fs::remove_file(&work)).map_err(failed)?;
+    let place = || {
+        let permissions = fs::metadata(&draft.path)?.permissions();
+        fs::set_permissions(&work, permissions)?;
+        OpenOptions::new().write(true).open(&work)?.sync_all()?;
+        fs::rename(&work, &draft.target)
+    };
+    let done = fill(&work).and_then(|()| Ok(place().map_err(failed)?));
+    if done.is_err() {
+        let _ = fs::remove_file(&work);
+    }
+    done
 }
 
 /// Writes the bytes to a draft next to their target; to a device at once.
@@ -303,6 +314,26 @@ mod tests {
         write_whole(&folder.path().join("a.csv"), b"new").unwrap();
         assert_eq!(fs::read(&victim).unwrap(), b"mine");
         assert_eq!(fs::read(folder.path().join("a.csv")).unwrap(), b"new");
+    }
+
+    #[test]
+    fn a_file_written_by_its_path_replaces_the_old_one_or_leaves_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.h5");
+        fs::write(&path, "old").unwrap();
+        // What a killed process left.
+        fs::write(folder.path().join(".crumple-a.h5.work"), "half").unwrap();
+        let failed = write_by_path(&path, |work| {
+            assert!(!work.exists());
+            fs::write(work, "half").unwrap();
+            Err(crate::error::error!(Other, "no"))
+        });
+        assert_eq!(failed.unwrap_err().to_string(), "no");
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        write_by_path(&path, |work| fs::write(work, "new").map_err(|e| Error::io(work, e)))
+            .unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
     }
 
     #[test]
