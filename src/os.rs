@@ -32,6 +32,10 @@ pub(crate) fn is_pipe(kind: fs::FileType) -> bool {
     }
 }
 
+/// Whether a locked file is written and read by the handle alone that holds the lock, so that not even its own process
+/// opens it once more.
+pub(crate) const LOCKS_EXCLUDE_ALL: bool = cfg!(windows);
+
 /// Reads bytes at a position; how many there were.
 pub(crate) fn read_at(file: &File, buffer: &mut [u8], offset: u64) -> io::Result<usize> {
     #[cfg(unix)]

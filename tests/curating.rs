@@ -1122,6 +1122,44 @@ fn killed_commands_leave_the_old_or_the_new() {
     assert!(looked > CHANGING.len(), "{looked}");
 }
 
+/// `db ls` takes the stored stopped mass while it is that of the cases, and else computes it.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn a_list_of_what_h5py_changed_has_the_stopped_mass_of_the_cases() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    build_fixture(here, "lead-car-wall");
+    let list = |database: &str| json(&ok(here, &["db", "ls", database, "--json", "-q"]));
+    let stored = list("curves.h5")["stopped_mass"].clone();
+    assert!(stored["lead-car-wall"]["residual_kg"].is_f64());
+    let altered = |name: &str, change: &str| {
+        fs::copy(here.join("curves.h5"), here.join(name)).unwrap();
+        let script = format!(
+            "import h5py\nwith h5py.File('{name}', 'a') as f:\n    g = f['lead-car-wall']\n    {change}"
+        );
+        assert!(python().current_dir(here).args(["-c", &script]).status().unwrap().success());
+        list(name)["stopped_mass"].clone()
+    };
+    for (k, change) in [
+        "del g.attrs['stopped_mass_kg']",
+        "g.attrs['stopped_mass_kg'] = [1.0, float('nan')]",
+        "g.attrs['stopped_mass_residual_kg'] = [1.0, 2.0]",
+    ]
+    .into_iter()
+    .enumerate()
+    {
+        assert_eq!(altered(&format!("{k}.h5"), change), stored, "{change}");
+    }
+    assert_eq!(
+        altered("number.h5", "g.attrs['stopped_mass_residual_kg'] = 12.5")["lead-car-wall"]["residual_kg"],
+        12.5
+    );
+    let fewer = altered("fewer.h5", "del g['36kmh']");
+    ok(here, &["db", "rm", "curves.h5", "--case", "lead-car-wall/36kmh", "-q"]);
+    assert_eq!(fewer, list("curves.h5")["stopped_mass"]);
+    assert_ne!(fewer, stored);
+}
+
 /// h5py, which is the C library, judges the files.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]

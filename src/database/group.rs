@@ -61,15 +61,19 @@ fn of_stopped_mass(stopped: &StoppedMass) -> [(&'static str, AttrValue); 4] {
     ]
 }
 
-/// The stopped mass that is stored with a group.
-pub(super) fn stored_stopped_mass(found: &HashMap<String, AttrValue>) -> Option<StoppedMass> {
+/// The stopped mass that is stored with a group of which these are the cases.
+pub(super) fn stored_stopped_mass(
+    found: &HashMap<String, AttrValue>,
+    cases: &[Case],
+) -> Option<StoppedMass> {
     let of = |name| {
         found.get(name).map(numbers).filter(|n| !n.is_empty() && n.iter().all(|x| x.is_finite()))
     };
     let (deflection_m, stopped_kg) = (of(DEFLECTION)?, of(STOPPED)?);
-    let residual_kg = of(RESIDUAL)?[0];
+    let [residual_kg] = of(RESIDUAL)?[..] else { return None };
+    let is_of_these = found.get(CASES)?.as_strings()?.iter().eq(cases.iter().map(|c| &c.id.name));
     let is_whole = deflection_m.len() == stopped_kg.len();
-    is_whole.then_some(StoppedMass { deflection_m, stopped_kg, residual_kg })
+    (is_of_these && is_whole).then_some(StoppedMass { deflection_m, stopped_kg, residual_kg })
 }
 
 /// The first attribute of a stopped mass that does not follow from the cases, with what is wrong; a group

@@ -379,6 +379,20 @@ impl Database {
             .collect()
     }
 
+    /// The mass that the crush zone of a group stops at each deflection: as the file at `path`, of which this is the
+    /// content, stores it, and as it follows from the cases where others have changed them. `None` if it does not follow.
+    pub(crate) fn stopped_mass(
+        &self,
+        path: &Path,
+        group: &str,
+    ) -> Result<Option<StoppedMass>, Error> {
+        let cases = self.cases(group);
+        let is_as_written = !self.altered.keys().any(|case| case.group == group);
+        let attributes = layout::open(path)?.group_attributes(group)?;
+        let stored = is_as_written.then(|| group::stored_stopped_mass(&attributes, cases));
+        Ok(stored.flatten().or_else(|| group::stopped_mass(group, cases)))
+    }
+
     /// All cases, by group, speed and name.
     pub fn all(&self) -> impl Iterator<Item = &Case> {
         self.groups.values().flatten()
@@ -397,17 +411,6 @@ pub(crate) fn remember_origin(case: &mut Case) {
         let (group, run) = (case.id.group.clone(), case.id.name.clone());
         case.provenance.origin = Some(Origin { manifest: String::new(), group, run });
     }
-}
-
-/// The mass that the crush zone of a group stops at each deflection, as it is stored with the group; where it is not,
-/// as it follows from the cases. `None` if it does not.
-pub(crate) fn stopped_mass(
-    path: &Path,
-    group: &str,
-    cases: &[Case],
-) -> Result<Option<StoppedMass>, Error> {
-    let stored = group::stored_stopped_mass(&layout::open(path)?.group_attributes(group)?);
-    Ok(stored.or_else(|| group::stopped_mass(group, cases)))
 }
 
 /// What other programs have put into the file at `path`, as a message lists it; `None` if nothing.

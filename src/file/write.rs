@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use super::{explained, folder_of, if_there, target_of};
 use crate::error::{Error, error};
-use crate::os::is_at;
+use crate::os::{LOCKS_EXCLUDE_ALL, is_at};
 
 /// The error of a file that cannot be written; what was there before still is.
 pub(crate) fn not_written(path: &Path, source: io::Error) -> Error {
@@ -68,20 +68,31 @@ pub fn write_at<T>(
     write().map_err(|source| not_written(path, source))
 }
 
-/// Writes a file as `write_whole` does, by a function that is given the path of a temporary file, which is not there yet.
-/// It is not the locked draft: on Windows nobody writes to that by another handle, not even its own process.
+/// Writes a file as `write_whole` does, by a function that is given the path of the temporary
+/// file and may do with it what it likes but remove it.
 pub(crate) fn write_by_path<E: From<Error>>(
     path: &Path,
     fill: impl FnOnce(&Path) -> Result<(), E>,
 ) -> Result<(), E> {
+    write_beside(path, LOCKS_EXCLUDE_ALL, fill)
+}
+
+/// The same; `beside` says that the temporary file is not the locked draft, which is written by no other handle.
+fn write_beside<E: From<Error>>(
+    path: &Path,
+    beside: bool,
+    fill: impl FnOnce(&Path) -> Result<(), E>,
+) -> Result<(), E> {
     let failed = |source| not_written(path, source);
     let draft = Draft::beside(path).map_err(failed)?;
-    let work = draft.path.with_extension("work");
-    // Of a process that was killed.
-    if_there(fs::remove_file(&work)).map_err(failed)?;
+    if !beside {
+        fill(&draft.path)?;
+        draft.file.sync_all().and_then(|()| draft.place()).map_err(failed)?;
+        return Ok(());
+    }
+    let work = draft.work();
     let place = || {
-        let permissions = fs::metadata(&draft.path)?.permissions();
-        fs::set_permissions(&work, permissions)?;
+        fs::set_permissions(&work, fs::metadata(&draft.path)?.permissions())?;
         OpenOptions::new().write(true).open(&work)?.sync_all()?;
         fs::rename(&work, &draft.target)
     };
@@ -151,10 +162,17 @@ impl Draft {
         })?;
         let draft = Self { file, path, target };
         draft.file.set_len(0)?;
+        // Of a process that was killed.
+        let _ = fs::remove_file(draft.work());
         if let Some(permissions) = existing {
             draft.file.set_permissions(permissions)?;
         }
         Ok(draft)
+    }
+
+    /// Where a file is made that is written beside it.
+    fn work(&self) -> PathBuf {
+        self.path.with_extension("work")
     }
 
     /// Renames it over its target.
@@ -318,22 +336,24 @@ mod tests {
 
     #[test]
     fn a_file_written_by_its_path_replaces_the_old_one_or_leaves_it() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("a.h5");
-        fs::write(&path, "old").unwrap();
-        // What a killed process left.
-        fs::write(folder.path().join(".crumple-a.h5.work"), "half").unwrap();
-        let failed = write_by_path(&path, |work| {
-            assert!(!work.exists());
-            fs::write(work, "half").unwrap();
-            Err(crate::error::error!(Other, "no"))
-        });
-        assert_eq!(failed.unwrap_err().to_string(), "no");
-        assert_eq!(fs::read(&path).unwrap(), b"old");
-        write_by_path(&path, |work| fs::write(work, "new").map_err(|e| Error::io(work, e)))
-            .unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"new");
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
+        for beside in [false, true] {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("a.h5");
+            fs::write(&path, "old").unwrap();
+            for left in [".crumple-a.h5.part", ".crumple-a.h5.work"] {
+                fs::write(folder.path().join(left), "of a process that was killed").unwrap();
+            }
+            let failed = write_beside(&path, beside, |work| {
+                fs::write(work, "half").unwrap();
+                Err(crate::error::error!(Other, "no"))
+            });
+            assert_eq!(failed.unwrap_err().to_string(), "no");
+            assert_eq!(fs::read(&path).unwrap(), b"old");
+            let write = |work: &Path| fs::write(work, "new").map_err(|e| Error::io(work, e));
+            write_beside(&path, beside, write).unwrap();
+            assert_eq!(fs::read(&path).unwrap(), b"new");
+            assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
+        }
     }
 
     #[test]
