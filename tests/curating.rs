@@ -1142,7 +1142,7 @@ fn a_list_of_what_h5py_changed_has_the_stopped_mass_of_the_cases() {
     };
     for (k, change) in [
         "del g.attrs['stopped_mass_kg']",
-        "g.attrs['stopped_mass_kg'] = [1.0, float('nan')]",
+        "kg = g.attrs['stopped_mass_kg']; kg[3] = float('nan'); g.attrs['stopped_mass_kg'] = kg",
         "g.attrs['stopped_mass_residual_kg'] = [1.0, 2.0]",
     ]
     .into_iter()

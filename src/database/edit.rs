@@ -1,6 +1,6 @@
 //! Rewriting a database file that contains objects of other programs, and one case of a large file: a copy of the file is
 //! edited, read back to check that nothing is missing, and renamed into place. So
-//! links, types and attributes stay as they were encoded.
+//! links, types and attributes stay as they were encoded. And writing a large database in parts.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::Path;
@@ -13,7 +13,7 @@ use super::layout::{
 use super::{CasePath, Database};
 use crate::curve::{Case, CaseId};
 use crate::error::{Error, error};
-use crate::file::write_by_path;
+use crate::file::{not_written, write_by_path};
 use crate::hdf5::{self, AttrValue, Dataset, File, FileAccessProperties, FileLocking, Group};
 
 /// Writes a database over the file at `path` with all objects of other programs in it, which is
@@ -68,34 +68,40 @@ pub(super) fn write_keeping(
 /// searched more often.
 pub(super) const AT_ONCE: usize = 3000;
 
-/// Writes a large database to a file at `path`, so many cases at once.
+/// Writes a large database to a file at `path`, so many cases at once: the first as a whole, the others added to the draft.
 pub(super) fn write_in_parts(
     database: &Database,
     path: &Path,
     at_once: usize,
 ) -> Result<(), Error> {
+    let failed = |source| not_written(path, source);
     let written = write_by_path(path, |draft| {
-        let first = fs::File::create(draft).map_err(|source| Error::io(draft, source))?;
+        let first = fs::File::create(draft).map_err(failed)?;
         layout::encode(database, at_once)?.finish_to(first)?;
-        let mut there = at_once;
+        let (mut there, mut room) = (at_once, at_once);
+        let mut file = open(draft)?;
         for name in database.groups() {
             let cases = database.cases(name);
-            let rest = &cases[cases.len().min(there)..];
+            let mut rest = &cases[cases.len().min(there)..];
             there -= cases.len() - rest.len();
-            for part in rest.chunks(at_once) {
-                let file = open(draft)?;
+            while !rest.is_empty() {
+                let (part, later) = rest.split_at(rest.len().min(room));
                 let group = file.root().group(name)?;
                 for (case, content) in layout::contents(database, part) {
                     add(&group, case, content?)?;
                 }
+                (rest, room) = (later, room - part.len());
                 drop(group);
-                file.close()?;
+                if room == 0 {
+                    file.close()?;
+                    (file, room) = (open(draft)?, at_once);
+                }
             }
         }
-        Ok(())
+        Ok(file.close()?)
     });
     written.map_err(|e| match e {
-        EditError::Hdf5(hdf5::Error::Io(source)) => Error::io(path, source),
+        EditError::Hdf5(hdf5::Error::Io(source)) => failed(source),
         EditError::Hdf5(e) => layout::not_encoded(e),
         EditError::Content(e) => e,
     })

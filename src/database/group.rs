@@ -73,7 +73,8 @@ pub(super) fn stored_stopped_mass(
     let [residual_kg] = of(RESIDUAL)?[..] else { return None };
     let is_of_these = found.get(CASES)?.as_strings()?.iter().eq(cases.iter().map(|c| &c.id.name));
     let is_whole = deflection_m.len() == stopped_kg.len();
-    (is_of_these && is_whole).then_some(StoppedMass { deflection_m, stopped_kg, residual_kg })
+    let stored = StoppedMass { deflection_m, stopped_kg, residual_kg };
+    (is_of_these && is_whole && stored.is_known()).then_some(stored)
 }
 
 /// The first attribute of a stopped mass that does not follow from the cases, with what is wrong; a group

@@ -105,7 +105,9 @@ impl<'a> Content<'a> {
     pub(crate) fn of(case: &'a Case) -> Result<Self, Error> {
         let mut content = Self::recorded(case)?;
         let body_force = (BODY_FORCE.into(), Cow::Owned(body_force_n(case)));
-        content.datasets.insert(4, body_force);
+        // With the other sampled ones, before the original curve's.
+        let original = content.datasets.iter().position(|(path, _)| path.starts_with(ORIGINAL));
+        content.datasets.insert(original.unwrap_or(content.datasets.len()), body_force);
         Ok(content)
     }
 
@@ -800,11 +802,29 @@ mod tests {
         for at_once in [1, 2, 3, 5, 10] {
             super::super::edit::write_in_parts(&database, &parts, at_once).unwrap();
             assert!(decode(&parts).unwrap() == database);
-            let found = |path| open(path).unwrap().groups().unwrap();
-            for (a, b) in found(&whole).iter().zip(found(&parts)) {
-                assert_eq!((&a.name, &a.listed), (&b.name, &b.listed));
+            assert_eq!(content(&parts), content(&whole));
+        }
+    }
+
+    /// All groups and datasets of a file with their attributes and values, as text.
+    fn content(path: &Path) -> BTreeMap<String, String> {
+        fn list(group: &Group, path: &str, found: &mut BTreeMap<String, String>) {
+            let sorted = |all: HashMap<String, AttrValue>| {
+                format!("{:?}", all.into_iter().collect::<BTreeMap<_, _>>())
+            };
+            found.insert(path.to_string(), sorted(group.attrs().unwrap()));
+            for (name, dataset) in group.iter_datasets().unwrap() {
+                let values = dataset.read_f64().unwrap();
+                let text = format!("{values:?} {}", sorted(dataset.attrs().unwrap()));
+                found.insert(format!("{path}/{name}"), text);
+            }
+            for (name, inner) in group.iter_groups().unwrap() {
+                list(&inner, &format!("{path}/{name}"), found);
             }
         }
+        let mut found = BTreeMap::new();
+        list(&open(path).unwrap().file.root(), "", &mut found);
+        found
     }
 
     #[test]

@@ -379,18 +379,23 @@ impl Database {
             .collect()
     }
 
-    /// The mass that the crush zone of a group stops at each deflection: as the file at `path`, of which this is the
-    /// content, stores it, and as it follows from the cases where others have changed them. `None` if it does not follow.
-    pub(crate) fn stopped_mass(
+    /// The masses that the crush zones of groups stop at each deflection, as the file at `path` stores them, of which this is
+    /// the content; as they follow from the cases where these are not those it lists. `db check` compares the stored ones.
+    pub(crate) fn stopped_masses<'g>(
         &self,
         path: &Path,
-        group: &str,
-    ) -> Result<Option<StoppedMass>, Error> {
-        let cases = self.cases(group);
-        let is_as_written = !self.altered.keys().any(|case| case.group == group);
-        let attributes = layout::open(path)?.group_attributes(group)?;
-        let stored = is_as_written.then(|| group::stored_stopped_mass(&attributes, cases));
-        Ok(stored.flatten().or_else(|| group::stopped_mass(group, cases)))
+        groups: impl Iterator<Item = &'g str>,
+    ) -> BTreeMap<String, StoppedMass> {
+        let opened = layout::open(path).ok();
+        let of_group = |group: &'g str| {
+            let cases = self.cases(group);
+            let is_as_written = !self.altered.keys().any(|case| case.group == group);
+            let attributes = opened.as_ref().filter(|_| is_as_written);
+            let attributes = attributes.and_then(|opened| opened.group_attributes(group).ok());
+            let stored = attributes.and_then(|found| group::stored_stopped_mass(&found, cases));
+            Some((group.to_string(), stored.or_else(|| group::stopped_mass(group, cases))?))
+        };
+        groups.filter_map(of_group).collect()
     }
 
     /// All cases, by group, speed and name.

@@ -68,8 +68,8 @@ pub fn write_at<T>(
     write().map_err(|source| not_written(path, source))
 }
 
-/// Writes a file as `write_whole` does, by a function that is given the path of the temporary
-/// file and may do with it what it likes but remove it.
+/// Writes a file as `write_whole` does, by a function that is given the path of a temporary
+/// file, which it creates or empties and does not remove.
 pub(crate) fn write_by_path<E: From<Error>>(
     path: &Path,
     fill: impl FnOnce(&Path) -> Result<(), E>,
@@ -77,7 +77,7 @@ pub(crate) fn write_by_path<E: From<Error>>(
     write_beside(path, LOCKS_EXCLUDE_ALL, fill)
 }
 
-/// The same; `beside` says that the temporary file is not the locked draft, which is written by no other handle.
+/// The same; `beside` has a second file filled, where no other handle can write the locked draft.
 fn write_beside<E: From<Error>>(
     path: &Path,
     beside: bool,
@@ -162,8 +162,10 @@ impl Draft {
         })?;
         let draft = Self { file, path, target };
         draft.file.set_len(0)?;
-        // Of a process that was killed.
-        let _ = fs::remove_file(draft.work());
+        if LOCKS_EXCLUDE_ALL {
+            // Of a process that was killed.
+            let _ = fs::remove_file(draft.work());
+        }
         if let Some(permissions) = existing {
             draft.file.set_permissions(permissions)?;
         }
@@ -340,15 +342,17 @@ mod tests {
             let folder = tempfile::tempdir().unwrap();
             let path = folder.path().join("a.h5");
             fs::write(&path, "old").unwrap();
-            for left in [".crumple-a.h5.part", ".crumple-a.h5.work"] {
+            for left in &[".crumple-a.h5.part", ".crumple-a.h5.work"][..1 + usize::from(beside)] {
                 fs::write(folder.path().join(left), "of a process that was killed").unwrap();
             }
             let failed = write_beside(&path, beside, |work| {
+                assert_eq!(work.extension().unwrap(), if beside { "work" } else { "part" });
                 fs::write(work, "half").unwrap();
                 Err(crate::error::error!(Other, "no"))
             });
             assert_eq!(failed.unwrap_err().to_string(), "no");
             assert_eq!(fs::read(&path).unwrap(), b"old");
+            assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "no temporary file stays");
             let write = |work: &Path| fs::write(work, "new").map_err(|e| Error::io(work, e));
             write_beside(&path, beside, write).unwrap();
             assert_eq!(fs::read(&path).unwrap(), b"new");

@@ -408,7 +408,7 @@ impl Damping {
         }
     }
 
-    /// Its coefficient if that is the same at all speeds.
+    /// Its coefficient if it has one, for all speeds.
     pub(super) fn constant_n_s_per_m(&self) -> Option<f64> {
         <[f64; 1]>::try_from(&*self.coefficient_n_s_per_m).ok().map(|[c]| c)
     }

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::{Chosen, CommandResult, Failure, GlobalOptions, output};
 use crate::cli::train::stopped_mass_line;
-use crate::curve::{Case, Masses, StoppedMass, group as siblings};
+use crate::curve::{Case, Masses, group as siblings};
 use crate::database::Database;
 use crate::dataset::of_one_kind;
 use crate::table::{Table, TableOf};
@@ -51,11 +51,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         }
     }
     let outcome = options.warn_all(warnings.iter().chain(&of_cases));
-    let mut stopped_mass: BTreeMap<String, StoppedMass> = BTreeMap::new();
-    for group in groups.keys() {
-        let of_group = database.stopped_mass(&args.database, group)?;
-        stopped_mass.extend(of_group.map(|stopped| (group.to_string(), stopped)));
-    }
+    let stopped_mass = database.stopped_masses(&args.database, groups.keys().copied());
     let rows = groups.iter().map(|(group, cases)| {
         (*group, cases.iter().map(|case| case_row(case)).collect::<Vec<_>>())
     });

@@ -19,6 +19,7 @@ fn accelerate_by_all<'a>(engine: &mut Engine<'a>, at: StepPoint, lag_s: f64, kic
             *net = each(|j| net[j] - pull[j]);
         }
     }
+    engine.losses.power_of_w.values_mut(n).fill([0.0; LANES]);
     engine.add_rates(&mut net, at, lag_s);
     if engine.fixed.has_plain_dampers {
         engine.add_plain_dampers(&mut net, at, lag_s);
@@ -80,9 +81,11 @@ impl Engine<'_> {
     #[inline(always)]
     fn add_rates(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
         let Fixed { rated, layout, sensitivity, share, .. } = &self.fixed;
+        if rated.is_empty() {
+            return;
+        }
         let n = layout.rows();
         let (sensitivity, share) = (sensitivity.values(n), share.values(n));
-        self.losses.power_of_w.values_mut(n).fill([0.0; LANES]);
         let (v, a) = (self.v.values(n), self.a_start.values(n));
         let forces = self.push.forces_n(at).values(n);
         let mut most = [0.0; LANES];
@@ -91,8 +94,7 @@ impl Engine<'_> {
             most = larger(most, each(|j| share[c][j] * forces[c][j].abs()));
         }
         // Nothing times any factor; what crosses its begin in this step needs the factor all the same.
-        let acts =
-            most.iter().any(|&n| n > 0.0) || !(self.crossings.is_empty() || rated.is_empty());
+        let acts = most.iter().any(|&n| n > 0.0) || !self.crossings.is_empty();
         if !acts {
             return;
         }
@@ -121,11 +123,11 @@ impl Engine<'_> {
         let deflections = self.push.deflections_m(at).values(n);
         let power = self.losses.power_of_w.values_mut(n);
         let peaks = self.peaks_n.values_mut(n);
-        let damping = self.fixed.damping.values(n);
+        let damping = self.fixed.plain_n_s_per_m.values(n);
         let (next_v, next_a) = (Neighbours::ahead(v), Neighbours::ahead(a));
         for (c, net) in net_n.values_mut(n).iter_mut().enumerate() {
             let (all, deflection, from_m) = (&damping[c], &deflections[c], self.push.begins_m(c));
-            // Of a deflection of 0 only where bodies meet at the start.
+            // At 0 only where bodies meet at the start.
             let touching = each(|j| if deflection[j] >= 0.0 { all[j] } else { 0.0 });
             let acting = each(|j| if from_m[j] > f64::NEG_INFINITY { touching[j] } else { 0.0 });
             let (v_ahead, a_ahead) = (next_v.after(c), next_a.after(c));
@@ -185,9 +187,9 @@ impl Engine<'_> {
         }
     }
 
-    /// Adds all other dampers.
+    /// Adds the dampers that are not plain.
     fn add_dampers(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
-        for &k in &self.fixed.damped {
+        for &k in &self.fixed.other_dampers {
             let slot = self.fixed.layout.of(k);
             // At 0 only where bodies meet at the start.
             let touches = |contacts: &Contacts<'_>| {

@@ -191,8 +191,8 @@ impl<'a> Engine<'a> {
         let has_net = couples || chain.has_rates();
         let zone = |(k, interface): (usize, &'a Interface)| {
             let Stopping { body, zone, stopped_kg } = interface.stopping.as_ref()?;
+            let least_kg = bodies[*zone].mass_kg;
             let [slot, body, zone] = [k, *body, *zone].map(|i| layout.of(i).flat());
-            let least_kg = bodies[interface.stopping.as_ref()?.zone].mass_kg;
             Some(Taken {
                 interface: k,
                 slot,
@@ -224,10 +224,10 @@ impl<'a> Engine<'a> {
             let damper = interfaces[k].damping.as_ref().filter(|_| interfaces[k].tension.is_none());
             damper.and_then(Damping::constant_n_s_per_m).filter(|&c| c > 0.0)
         };
-        let damping = Rows::of(&layout, interfaces.len(), |k| plain(k).unwrap_or(0.0));
+        let plain_n_s_per_m = Rows::of(&layout, interfaces.len(), |k| plain(k).unwrap_or(0.0));
         let has_plain_dampers = (0..interfaces.len()).any(|k| plain(k).is_some());
         let has_other = |k: &usize| interfaces[*k].damping.is_some() && plain(*k).is_none();
-        let damped = (0..interfaces.len()).filter(has_other).collect();
+        let other_dampers = (0..interfaces.len()).filter(has_other).collect();
         let mut engine = Self {
             mass_kg: of(&|i| bodies[i].mass_kg),
             per_kg: of(&|i| 1.0 / bodies[i].mass_kg),
@@ -257,8 +257,8 @@ impl<'a> Engine<'a> {
                 rated,
                 sensitivity,
                 share,
-                damped,
-                damping,
+                other_dampers,
+                plain_n_s_per_m,
                 has_plain_dampers,
             },
         };

@@ -27,9 +27,9 @@ pub(super) struct Fixed<'a> {
     pub sensitivity: Rows,
     pub share: Rows,
     /// Interfaces with other dampers than plain ones.
-    pub damped: Vec<usize>,
+    pub other_dampers: Vec<usize>,
     /// Coefficients in N s/m of dampers that only push and have one; 0 where there is none.
-    pub damping: Rows,
+    pub plain_n_s_per_m: Rows,
     pub has_plain_dampers: bool,
 }
 
@@ -79,7 +79,7 @@ pub(super) struct Engine<'a> {
     pub net_n: Option<Rows>,
     /// Of the bodies, where forces depend on them.
     pub speeds: Rows,
-    /// What the speeds multiply the force of each interface by, and the largest forces with it.
+    /// What the speeds multiply the force of each interface by, and the largest forces with it and with plain dampers.
     pub rate_factors: Rows,
     pub peaks_n: Rows,
     /// Of every interface with a crush zone.
