@@ -145,7 +145,8 @@ impl Rows {
     }
 }
 
-/// The neighbours of rows: those of an end of the stretches are put together before a pass, so that it loads whole vectors.
+/// The neighbours of rows: those of an end of the stretches are put together before a pass, so that it loads whole vectors. They
+/// are given by value, because the compiler selects from rows behind references lane by lane.
 pub(super) struct Neighbours<'r> {
     rows: &'r [Row],
     at_end: Row,
@@ -167,14 +168,14 @@ impl<'r> Neighbours<'r> {
 
     /// In front of row `c`.
     #[inline(always)]
-    pub(crate) fn after(&self, c: usize) -> &Row {
-        self.rows.get(c + 1).unwrap_or(&self.at_end)
+    pub(crate) fn after(&self, c: usize) -> Row {
+        *self.rows.get(c + 1).unwrap_or(&self.at_end)
     }
 
     /// Behind row `c`.
     #[inline(always)]
-    pub(crate) fn before(&self, c: usize) -> &Row {
-        if c > 0 { &self.rows[c - 1] } else { &self.at_end }
+    pub(crate) fn before(&self, c: usize) -> Row {
+        if c > 0 { self.rows[c - 1] } else { self.at_end }
     }
 }
 

@@ -12,7 +12,7 @@ use multiversion::multiversion;
 fn accelerate_by_all<'a>(engine: &mut Engine<'a>, at: StepPoint, lag_s: f64, kick_s: f64) {
     let n = engine.fixed.layout.rows();
     let Some(mut net) = engine.net_n.take() else { return };
-    net.clone_from(engine.push.forces_n(at));
+    net.values_mut(n).copy_from_slice(engine.push.forces_n(at).values(n));
     if let Some(pull) = &engine.pull {
         let pulls = pull.forces_n(at).values(n);
         for (net, pull) in net.values_mut(n).iter_mut().zip(pulls) {
@@ -126,7 +126,7 @@ impl Engine<'_> {
         let damping = self.fixed.plain_n_s_per_m.values(n);
         let (next_v, next_a) = (Neighbours::ahead(v), Neighbours::ahead(a));
         for (c, net) in net_n.values_mut(n).iter_mut().enumerate() {
-            let (all, deflection, from_m) = (&damping[c], &deflections[c], self.push.begins_m(c));
+            let (all, deflection, from_m) = (damping[c], deflections[c], self.push.begins_m(c));
             // At 0 only where bodies meet at the start.
             let touching = each(|j| if deflection[j] >= 0.0 { all[j] } else { 0.0 });
             let acting = each(|j| if from_m[j] > f64::NEG_INFINITY { touching[j] } else { 0.0 });
