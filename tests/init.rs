@@ -689,6 +689,47 @@ fn masses_are_never_made_up() {
     says(&text, "kinetic energy of the model at the start over ½v² (momentum gives");
 }
 
+/// A force that is larger than what stops the body makes no mass that is heavier than all that moves.
+#[test]
+fn a_force_counted_twice_is_no_mass() {
+    let history = Crash::default().run();
+    let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
+    let folder = tempfile::tempdir().unwrap();
+    let (run, here) = (folder.path().join("cars/50kmh"), folder.path().join("cars"));
+    layout.nodout(&run, &history, &car_nodes());
+    layout.glstat(&run, &history);
+    let more: Vec<f64> = history.contact_n.iter().map(|f| 1.12 * f).collect();
+    let wall = Force { id: 7, title: "barrier", along_n: &more, across_n: 0.0 };
+    layout.rwforc(&run, &history, &[wall]);
+    let said = warned(&here, "init");
+    says(&said, "mass: in 50kmh momentum gives 1.34 t, the kinetic energy at the start 1.2 t");
+    says(&said, "the force is larger than what stops the body: is it counted twice");
+    assert_eq!(study(&here, "study.toml")["run"][0]["mass"].as_str(), Some("1.2t"));
+}
+
+/// One run with the force of another is left out, and costs the others nothing.
+#[test]
+fn one_run_with_a_foreign_force_is_singled_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let group = |run: &str| fixture("fe/lead-car-wall").join(run);
+    let here = folder.path().join("cars");
+    for run in ["25kmh", "36kmh", "48kmh", "60kmh"] {
+        copy_run(&group(run), &here.join(run), TEXTS);
+    }
+    fs::copy(group("60kmh").join("rwforc"), here.join("36kmh/rwforc")).unwrap();
+    let said = crumple_ok(&here, "init");
+    says(&said, "36kmh: it needs a different recipe from the other runs: impulse of the force and");
+    says(&said, "differ by 12 %, in the others by at most 2.4 %: is its force that of another run");
+    assert!(!said.contains("fill in"), "{said}");
+    let runs = study(&here, "study.toml")["run"].as_array().unwrap().clone();
+    let masses: Vec<&str> = runs.iter().map(|run| run["mass"].as_str().unwrap()).collect();
+    assert_eq!(masses, ["24t"; 3]);
+    // A force that the user names keeps the run.
+    let said = warned(&here, "init --force rwforc:1 -o all.toml");
+    says(&said, "fill in mass of 36kmh");
+    assert_eq!(study(&here, "all.toml")["run"].as_array().unwrap().len(), 4);
+}
+
 /// A section is used for the force only if nothing else is, and gives no mass.
 #[test]
 fn a_section_is_the_last_choice() {

@@ -94,7 +94,9 @@ fn results_in_mdf_are_those_in_csv() {
         crumple_fails(here, 1, "inspect cut.mf4");
     }
     crumple_ok(here, &[&["export"], &CASE[..], &["-q", "-o", "case.mf4"]].concat());
-    let error = crumple_fails(here, 1, &["rate", "case.mf4", "mdf/run.mf4"]);
+    let error = crumple_fails(here, 2, &["rate", "case.mf4", "mdf/run.mf4"]);
+    says(&error, "case.mf4 is not the result of a run, as mdf/run.mf4 is");
+    let error = crumple_fails(here, 1, &["rate", "case.mf4", "case.mf4"]);
     says(&error, "case.mf4: there are several columns: name one of");
 }
 

@@ -688,6 +688,14 @@ fn several_parameters() {
             error,
             "the model has no parameter \"bogus\": its parameters are angle_deg, obstacle"
         );
+        let no_run = |curve: PredictedCurve| {
+            let said =
+                curve.warnings.into_iter().find(|w| w.message.starts_with("no training run"));
+            said.map(|w| w.to_string())
+        };
+        assert_eq!(no_run(predict(&model, &ask(10.0, "pole")).unwrap()), None);
+        let between = no_run(predict(&model, &ask(5.0, "pole")).unwrap()).unwrap();
+        crate::common::says(&between, "no training run has angle_deg = 5, obstacle = pole: only");
         let far = predict(&model, &ask(30.0, "wall")).unwrap();
         let says = "angle_deg = 30 lies outside the training cases' 0 to 10";
         assert!(far.warnings.iter().any(|w| w.message.starts_with(says)));
@@ -1710,6 +1718,14 @@ fn a_crush_gives_its_speed() {
             predicted(&["--speed", &format!("{low}km/h")])["max_deflection_m"].as_f64().unwrap();
         assert!((at_low / crush - 1.0 + of("crush_error").unwrap()).abs() < 1e-6);
     }
+    // The crushes of the slowest and the fastest run as they are printed.
+    for (speed, digits) in [(12.0, 4), (72.0, 4)] {
+        let of_end = predicted(&["--speed", &format!("{speed}km/h")]);
+        let crush = format!("{:.digits$}m", of_end["max_deflection_m"].as_f64().unwrap());
+        let found = predicted(&["--crush", &crush]);
+        let found = found["found_by_crush"]["speed_m_per_s"].as_f64().unwrap() * 3.6;
+        assert!((found - speed).abs() < 0.01, "{crush}: {found} km/h");
+    }
     // Each rule has its own error.
     let model: Value =
         serde_json::from_str(&std::fs::read_to_string(here.join("lead.model")).unwrap()).unwrap();
@@ -1725,7 +1741,7 @@ fn a_crush_gives_its_speed() {
         (
             1,
             "--crush 3m",
-            "no speed between those of the runs gives a crush of 3 m: the model's crush goes from 0.1111 m at 12 km/h",
+            "no speed between those of the runs gives a crush of 3.0000 m: the model's crush goes from 0.1111 m at 12 km/h",
         ),
         (1, "--crush 1mm", "no speed between those of the runs gives a crush"),
         (2, "--crush 0.5", "has no unit"),

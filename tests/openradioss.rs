@@ -333,6 +333,8 @@ fn a_restart_goes_on_where_the_run_ended() {
             let said: Vec<ProblemCode> = joined.problems.iter().map(|p| p.code).collect();
             let expected = if again > 0 { vec![ProblemCode::RepeatedState] } else { Vec::new() };
             assert_eq!(said, expected);
+            let place = format!("runT02, byte {header}: a restart writes again from time ");
+            assert!(joined.problems.iter().all(|p| p.to_string().starts_with(&place)));
         }
     }
     // A state that is cut off the first is missing in the middle.
@@ -382,8 +384,26 @@ fn a_restart_goes_on_where_the_run_ended() {
     assert_eq!(file.time.len(), 5);
     assert_eq!(
         file.problems[0].to_string(),
-        "T02, the continuation, holds other histories: neither it nor what follows is read"
+        "runT02, byte 0: this continuation holds other histories: neither it nor what follows is read"
     );
+    // Nor is another run, by its title or by its begin.
+    let mut titled = bytes.clone();
+    titled[8] ^= 1;
+    for (other, expected) in [
+        (titled, "is of another run: its title is "),
+        (
+            bytes.clone(),
+            "begins at time 0.0, where the run does: it is another run: neither it nor",
+        ),
+    ] {
+        fs::write(at("runT01"), &restarted(&bytes, header, 100, 0)[0]).unwrap();
+        fs::write(at("runT02"), other).unwrap();
+        let file = section(&at("runT01"), "nodout");
+        assert_eq!(file.time.len(), 100);
+        let said = file.problems[0].to_string();
+        let expected = format!("runT02, byte 0: this continuation {expected}");
+        assert!(file.problems.len() == 1 && said.starts_with(&expected), "{said}");
+    }
 }
 
 /// A run of OpenRadioss' own tests that was restarted, and the same in one piece.

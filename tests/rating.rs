@@ -105,6 +105,24 @@ fn runs_are_rated_by_the_acceptance_rule() {
         says(&table, "not final in one of the runs: A1|B1");
         says(&table, "; fails: ");
     }
+    // Rows that are missing are said, here and in a picture.
+    let gap = |k: &usize| !(60..110).contains(k);
+    let lines = whole.lines().enumerate().filter(|(k, _)| gap(k)).map(|(_, line)| line);
+    std::fs::write(folder.join("gap.csv"), lines.collect::<Vec<_>>().join("\n") + "\n").unwrap();
+    for command in ["rate one.csv gap.csv --strict", "plot gap.csv -o gap.svg --overwrite"] {
+        let output = crumple_in(folder, command);
+        let said = String::from_utf8(output.stderr).unwrap();
+        says(&said, "gap.csv: there is no state between time 0.0435");
+        assert_eq!(output.status.code(), Some(if command.contains("strict") { 3 } else { 0 }));
+    }
+    // The file that is not a result is named.
+    std::fs::write(folder.join("other.csv"), "time_s,a,b\n0,1,2\n0.1,1,2\n").unwrap();
+    for line in ["rate one.csv other.csv", "rate other.csv one.csv"] {
+        let error = crumple_fails(folder, 2, line);
+        says(&error, "error: other.csv is not the result of a run, as one.csv is");
+    }
+    let error = crumple_fails(folder, 1, "rate one.csv gone.csv");
+    assert!(error.starts_with("error: gone.csv: "), "{error}");
     // An interface that one of both lacks, and what is for single signals.
     let less: String = std::fs::read_to_string(folder.join("one.csv")).unwrap();
     let header: Vec<&str> = less.lines().next().unwrap().split(',').collect();
@@ -278,6 +296,14 @@ fn units_and_factors_are_those_of_the_arguments() {
         error,
         "error: ms.csv: line 1, column 1 (\"time [ms]\"): expected a time in s: write ms.csv,time=ms\n"
     );
+    // The same in a row of units.
+    write(here, "row.csv", "time,a\nms,m/s2", 200, |t| format!("{:?},{:?}", t * 1e3, pulse(t)));
+    let error = crumple_fails(here, 1, "rate a.csv row.csv");
+    says(&error, "(\"time [ms]\"): expected a time in s: write row.csv,time=ms");
+    write(here, "row_g.csv", "time,a\ns,g", 200, |t| format!("{t:?},{:?}", pulse(t) / 9.80665));
+    let output = crumple_in(here, "rate row.csv,time=ms row_g.csv");
+    let said = String::from_utf8(output.stderr).unwrap();
+    says(&said, "the reference is in m/s² and the prediction in g");
     write(here, "us.csv", "Time [µS],a", 200, |t| format!("{:?},{:?}", t * 1e6, pulse(t)));
     let error = crumple_fails(here, 1, "rate a.csv us.csv");
     says(&error, "expected a time in s: write us.csv,time=us");
@@ -301,6 +327,14 @@ fn units_and_factors_are_those_of_the_arguments() {
     );
     let both = rate(here, &["t.csv,time=ms", "t.csv,time=ms", "--cfc", "60"]);
     assert_eq!(both["to_s"], 0.199);
+    // Samples that are missing are said, not bridged in silence.
+    let text = std::fs::read_to_string(here.join("a.csv")).unwrap();
+    let kept = text.lines().enumerate().filter(|(k, _)| !(80..100).contains(k)).map(|(_, l)| l);
+    std::fs::write(here.join("gap.csv"), kept.collect::<Vec<_>>().join("\n") + "\n").unwrap();
+    let output = crumple_in(here, "rate a.csv gap.csv --strict");
+    assert_eq!(output.status.code(), Some(3));
+    let said = String::from_utf8(output.stderr).unwrap();
+    says(&said, "gap.csv: there is no state between time 0.078 and 0.099");
 }
 
 /// Histories as LS-PrePost and T/HIS write them.

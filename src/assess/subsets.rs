@@ -2,6 +2,7 @@
 //! lacks.
 
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 
 use rayon::prelude::*;
 use schemars::JsonSchema;
@@ -16,13 +17,14 @@ use super::validate::{
 use crate::curve::Case;
 use crate::dataset::{TrainingSet, is_same_speed};
 use crate::error::Error;
+use crate::plural::counted;
 use crate::surrogate::ModelKind;
 use crate::surrogate::leave_one_out::{LeftOut, Means, Scatter};
 
 /// Numbers of speeds that a subset keeps.
 const SIZES: [u32; 2] = [4, 5];
-/// Most speeds of a group whose subsets are tried: of 12 there are 1 287.
-const MOST_SPEEDS: usize = 12;
+/// Speeds of a group whose subsets are tried: of fewer none lacks an inner speed, and of 12 there are 1 287.
+const SPEEDS: RangeInclusive<usize> = 5..=12;
 
 /// A model, or the choice among all, over the subsets of a group.
 #[derive(Clone, Debug, Serialize, JsonSchema)]
@@ -58,8 +60,7 @@ struct Trial {
     inside: Vec<f64>,
 }
 
-/// Each model, and the choice first, over all subsets of 4 and 5 speeds that lack a speed inside their range; empty
-/// without such a subset, or for more than 12 speeds.
+/// Each model, and the choice first, over all subsets of 4 and 5 speeds that lack a speed inside their range; or why there are none.
 ///
 /// # Errors
 /// If the cases are not a training set.
@@ -67,12 +68,16 @@ pub(crate) fn subsets(
     group: &str,
     cases: &[Case],
     candidates: &[ModelKind],
-) -> Result<Vec<OverSubsets>, Error> {
+) -> Result<Result<Vec<OverSubsets>, String>, Error> {
     let set = TrainingSet::new(group, cases)?;
     let mut speeds = set.speeds_m_per_s();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
-    if speeds.len() > MOST_SPEEDS {
-        return Ok(Vec::new());
+    if !SPEEDS.contains(&speeds.len()) {
+        let (least, most) = SPEEDS.into_inner();
+        let found = counted(speeds.len(), "speed");
+        return Ok(Err(format!(
+            "--subsets needs {least} to {most} speeds, and there are {found}: it is left out"
+        )));
     }
     let of_size = |bits: &u32| SIZES.contains(&bits.count_ones());
     let all: Vec<u32> = (0..1_u32 << speeds.len()).filter(of_size).collect();
@@ -83,7 +88,10 @@ pub(crate) fn subsets(
     };
     let trials: Vec<Trial> = all.par_iter().filter_map(of).flatten().collect();
     let names = candidates.iter().map(ModelKind::name);
-    Ok(std::iter::once("auto").chain(names).filter_map(|name| over(name, &trials)).collect())
+    let all: Vec<OverSubsets> =
+        std::iter::once("auto").chain(names).filter_map(|name| over(name, &trials)).collect();
+    let none = "--subsets: no subset of the speeds has a model for each speed that it lacks";
+    Ok(if all.is_empty() { Err(none.into()) } else { Ok(all) })
 }
 
 /// The choice and every model by one subset; `None` if it lacks no speed inside its range, or one of the models cannot predict that.

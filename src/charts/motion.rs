@@ -4,6 +4,7 @@
 use crate::assess::train::TrainComparison;
 use crate::error::{Error, ErrorCode, error};
 use crate::guess::hint;
+use crate::history::{TimeGap, time_gaps};
 use crate::multibody::{Run, STANDARD_GRAVITY_M_PER_S2};
 use crate::plot::{Axis, Band, Chart, Panel, Series, Shown};
 use crate::rating::acceptance::StageRecord;
@@ -86,6 +87,11 @@ fn not_csv(error: csv::Error) -> Error {
 }
 
 impl Motion {
+    /// Intervals without a row, far longer than those around them: nothing is known there.
+    pub(crate) fn gaps(&self) -> Vec<TimeGap> {
+        time_gaps(&self.time_s)
+    }
+
     /// Of the CSV file of a result, as `crumple simulate -o` writes it.
     ///
     /// # Errors

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
+use crate::database::check_name;
 use crate::file::write_whole;
 use crate::init::{self, GivenForce, Proposal, Proposed, UserHints};
 use crate::plural::counted;
@@ -11,7 +12,7 @@ use crate::table::Table;
 use crate::unit::{Shown, UnitSystem, km_per_h};
 
 use super::output::{self, Bar};
-use super::{CommandResult, GlobalOptions, Outcome, arguments, is_stdout};
+use super::{CommandResult, Failure, GlobalOptions, Outcome, arguments, is_stdout, usage};
 
 /// Examine run folders and write a commented study; or write a scenario for models
 #[derive(clap::Args)]
@@ -75,6 +76,28 @@ struct GivenArgs {
     group: Option<String>,
 }
 
+impl GivenArgs {
+    /// Refuses what no study can hold.
+    fn check(&self) -> Result<(), Failure> {
+        let is_wall = self.kind == Some(StudyKind::Wall);
+        match () {
+            () if self.half_model && is_wall => usage(
+                "--half-model: the other body is this one's mirror image, which makes a pair: leave out --kind wall",
+            ),
+            () if self.half_model && self.other_mass.is_some() => usage(
+                "--half-model: the other body is this one's mirror image, and as heavy: leave out --other-mass",
+            ),
+            () if is_wall && self.other_mass.is_some() => {
+                usage("--kind wall: a wall has no mass: leave out --other-mass")
+            }
+            () => match self.group.as_deref().map(|group| (group, check_name(group))) {
+                Some((group, Err(why))) => usage(format!("--group {group:?}: {why}")),
+                _ => Ok(()),
+            },
+        }
+    }
+}
+
 const KINDS: &[(&str, StudyKind, &str)] = &[
     ("wall", StudyKind::Wall, "A body against a rigid wall"),
     ("pair", StudyKind::Pair, "Two bodies"),
@@ -109,6 +132,7 @@ fn scenario(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult
 
 fn study(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
     let known = &args.given;
+    known.check()?;
     let folders =
         if args.inputs.is_empty() { vec![PathBuf::from(".")] } else { args.inputs.clone() };
     let place = if is_stdout(output) { Path::new("study.toml") } else { output };

@@ -361,7 +361,9 @@ fn of_runs(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
         } else {
             let text = file::read(file, MOST_RESULT).map_err(|e| failed_at(file, e))?;
             let table = run_table(text).and_then(|table| Motion::of_csv(&table));
-            table.map_err(|e| failed_at(file, e))?
+            let motion = table.map_err(|e| failed_at(file, e))?;
+            options.warn_of(file, &motion.gaps());
+            motion
         };
         let is_alone = args.files.iter().filter(|other| stem(other) == stem(file)).count() == 1;
         runs.push((if is_alone { stem(file) } else { file.display().to_string() }, motion));

@@ -9,6 +9,7 @@ use super::{
 };
 use crate::charts::Motion;
 use crate::error::Error;
+use crate::history::time_gaps;
 use crate::multibody::STANDARD_GRAVITY_M_PER_S2;
 use crate::rating::acceptance::{ACCEPTANCE, RunAcceptance, STANDARD, StageAcceptance, accept};
 use crate::rating::differences::{Deceleration, MagnitudePhase};
@@ -336,29 +337,38 @@ impl Args {
             || component.is_some()
             || section.is_some()
             || format.is_some();
-        for address in [&self.reference, &self.prediction] {
-            let is_result = address.within.is_none()
-                && !is_named
-                && address.path.exists()
-                && FileKind::of(&address.path)? == FileKind::Result
-                && has_deflections(&address.path);
-            if !is_result {
-                return Ok(false);
-            }
+        let is_result = |address: &Address| -> Result<bool, Failure> {
+            let may_be = address.within.is_none() && !is_named && address.path.exists();
+            let is_result = may_be && FileKind::of(&address.path)? == FileKind::Result;
+            Ok(is_result && has_deflections(&address.path))
+        };
+        let (reference, prediction) = (&self.reference, &self.prediction);
+        let (result, other) = match (is_result(reference)?, is_result(prediction)?) {
+            (true, false) => (reference, prediction),
+            (false, true) => (prediction, reference),
+            (both, _) => return Ok(both),
+        };
+        if is_named || other.within.is_some() {
+            return Ok(false);
         }
-        Ok(true)
+        let path = other.path.display();
+        file::open(&other.path).map_err(|e| failed(format!("{path}: {e}")))?;
+        usage(format!(
+            "{path} is not the result of a run, as {result} is (a table with deflection_m of its interfaces, as crumple simulate writes it): to compare two columns, name each after its file, {result}:COLUMN",
+            result = result.path.display()
+        ))
     }
 }
 
-/// Whether a table has deflections of interfaces, as `crumple simulate -o` writes them.
+/// Whether a table has deflections and forces of interfaces, as `crumple simulate -o` writes them.
 fn has_deflections(path: &Path) -> bool {
     let mut header = Vec::new();
     let read = file::open(path)
         .map(|f| BufReader::new(f).take(MAX_TABLE_BYTES).read_until(b'\n', &mut header));
+    let has = |column: &str| String::from_utf8_lossy(&header).contains(column);
     // The MDF file of a run always has them.
-    read.is_ok()
-        && (header.starts_with(b"MDF ")
-            || String::from_utf8_lossy(&header).contains(",deflection_m["))
+    let has_both = || has(",deflection_m[") && has(",force_N[");
+    read.is_ok() && (header.starts_with(b"MDF ") || has_both())
 }
 
 /// Interfaces that begin within so many s of each other have no order.
@@ -373,6 +383,7 @@ fn rate_runs(reference: &Path, prediction: &Path, options: GlobalOptions) -> Com
             .map_err(|e| failed_at(path, e))
     };
     let (r, p) = (read(reference)?, read(prediction)?);
+    let gaps = options.warn_of(reference, &r.gaps()).max(options.warn_of(prediction, &p.gaps()));
     let Some(found) = accept(&r.stages(), &p.stages(), TIE_S) else {
         return usage(format!(
             "{} and {} have no interface in common that takes energy: to rate one column, name it: {}:COLUMN",
@@ -394,7 +405,7 @@ fn rate_runs(reference: &Path, prediction: &Path, options: GlobalOptions) -> Com
         },
     ));
     options.show(&found, |out| print_runs(out, &found))?;
-    Ok(outcome)
+    Ok(outcome.max(gaps))
 }
 
 fn print_runs(out: &mut dyn Write, found: &RunAcceptance) -> io::Result<()> {
@@ -504,12 +515,12 @@ impl SignalRequest<'_> {
                 .any(|e| extension.eq_ignore_ascii_case(e))
         });
         if is_table && self.both.format.is_none() {
-            return self.read_table();
+            return self.read_table(options);
         }
         match self.read_solver_file(options) {
             // Any other name may hold a table as well.
             Err(error) if error.downcast_ref().is_some_and(|e: &Error| e.is_about("format")) => {
-                match self.read_table() {
+                match self.read_table(options) {
                     Err(_) if self.column().is_none() => Err(failed(format!(
                         "{error}; a CSV file has the extension .csv, or its column after its name: {}:COLUMN",
                         self.path().display()
@@ -521,7 +532,7 @@ impl SignalRequest<'_> {
         }
     }
 
-    fn read_table(&self) -> Result<LoadedSignal, Failure> {
+    fn read_table(&self, options: GlobalOptions) -> Result<LoadedSignal, Failure> {
         let path = self.path().display();
         let text = file::read(self.path(), MAX_TABLE_BYTES);
         let text = text.map_err(|e| failed(format!("{path}: {e}")))?;
@@ -544,9 +555,11 @@ impl SignalRequest<'_> {
             )));
         }
         let signal = self.signal(&read.name, &read.time, &read.values)?;
+        let gaps = time_gaps(&read.time);
+        options.warn_of(self.path(), &gaps);
         let column = format!("{} {}", read.name, read.title);
         let unit = value_unit(&read.name).filter(|_| self.address.scale == 1.0);
-        Ok(LoadedSignal { signal, column, is_table: true, unit, problems: 0 })
+        Ok(LoadedSignal { signal, column, is_table: true, unit, problems: gaps.len() })
     }
 
     fn read_solver_file(&self, options: GlobalOptions) -> Result<LoadedSignal, Failure> {

@@ -125,6 +125,8 @@ fn write_csv(out: &mut dyn Write, columns: &[(String, &[f64])]) -> io::Result<()
     output::csv(out, columns, |out, number| write!(out, "{number:?}"))
 }
 
+/// A crush that is largest that close to the end of the run may still grow.
+const ROUNDING_S: f64 = 1e-9;
 /// Events that are printed without being asked for.
 const SHOWN_EVENTS: usize = 12;
 
@@ -146,7 +148,11 @@ fn print(
         false => interfaces,
     };
     let interfaces = interfaces
-        .column("max crush", |i| format!("{:.3} m", i.history.max_deflection_m))
+        .column("max crush", |i| {
+            let is_last = (i.history.max_deflection_time_s - summary.end_s).abs() < ROUNDING_S;
+            let so_far = if is_last { " so far" } else { "" };
+            format!("{:.3} m{so_far}", i.history.max_deflection_m)
+        })
         .column("at", |i| format!("{:.1} ms", i.history.max_deflection_time_s * 1e3))
         .column("energy", |i| i.energy_j.map_or("-".into(), |j| energy.text(j)))
         .column("share of energy", |i| {

@@ -94,6 +94,8 @@ pub(super) struct MassEstimates {
     /// Share by which other forces than the contact's may have changed it.
     pub unexplained: f64,
     pub by_energy: Option<f64>,
+    /// Whether that is the energy of all that moves: sums over parts lack lumped masses.
+    pub energy_is_whole: bool,
     /// Whether two bodies have that energy.
     pub is_shared: bool,
     /// Interval of the states over the time from contact to the largest crush, of which a mass by momentum may be off by
@@ -108,12 +110,19 @@ impl MassEstimates {
     /// The mass, and whether it is that by energy.
     fn kg(&self) -> Option<(f64, bool)> {
         match (self.by_momentum, self.by_energy) {
-            (Some(momentum), Some(energy)) if self.is_explained(momentum, energy) => {
+            (Some(momentum), Some(energy))
+                if self.is_too_heavy(momentum, energy) || self.is_explained(momentum, energy) =>
+            {
                 Some((energy, true))
             }
             (Some(momentum), _) => Some((momentum, false)),
             (None, energy) => Some((energy?, true)),
         }
+    }
+
+    /// Whether no body can have the mass by momentum.
+    fn is_too_heavy(&self, momentum: f64, energy: f64) -> bool {
+        self.energy_is_whole && momentum > energy
     }
 
     /// Whether both ways give one mass, but for what other forces do to the one by momentum.
@@ -177,8 +186,13 @@ pub(super) fn agree(
         if let (Some(momentum), Some(energy)) = (mass.by_momentum, mass.by_energy)
             && !mass.is_explained(momentum, energy)
         {
+            let why = if mass.is_too_heavy(momentum, energy) {
+                "the force is larger than what stops the body: is it counted twice, that of another run, or in other units? The energy's mass is taken"
+            } else {
+                "the force acts on only part of the moving mass, or more than the bodies is moving"
+            };
             warnings.push(format!(
-                "mass: in {name} momentum gives {}, the kinetic energy at the start {}: the force acts on only part of the moving mass, or more than the bodies is moving",
+                "mass: in {name} momentum gives {}, the kinetic energy at the start {}: {why}",
                 shown_mass(momentum),
                 shown_mass(energy)
             ));

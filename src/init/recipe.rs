@@ -17,6 +17,10 @@ const AS_GOOD: (f64, f64) = (1.5, 0.01);
 const CENTRE_AS_GOOD: f64 = 0.05;
 /// Steps of the roughness below which velocities are equally smooth, for each whole.
 const EVEN: f64 = 10.0;
+/// Of fewer runs none is the odd one.
+const LEAST_TO_COMPARE: usize = 3;
+/// A run that leaves so many times more of the impulse than most has the force of something else.
+const MUCH_MORE: f64 = 4.0;
 const NAMED: usize = 5;
 
 #[derive(Clone, Debug)]
@@ -46,6 +50,8 @@ pub(super) struct ChosenNode {
     pub id: i64,
     pub title: Option<String>,
     pub residual: f64,
+    /// A run in which it leaves as much is left out.
+    pub limit: f64,
     pub others: Vec<Alternative>,
 }
 
@@ -129,7 +135,7 @@ impl CommonRecipe {
             beside,
             residual: nodes.iter().map(|node| node.residual).fold(0.0, f64::max),
             bodies: surveys.iter().map(|survey| survey.bodies.len()).max().unwrap_or(0),
-            members: views.iter().map(|view| view.check_nodes(&nodes, are_given)).collect(),
+            members: views.iter().map(|view| view.check_nodes(&nodes)).collect(),
             nodes,
         })
     }
@@ -269,9 +275,9 @@ impl<'a> RunView<'a> {
     }
 
     /// Whether the run has the recipe's nodes, and they follow the force.
-    fn check_nodes(&self, nodes: &[ChosenNode], are_given: bool) -> Result<(), String> {
+    fn check_nodes(&self, nodes: &[ChosenNode]) -> Result<(), String> {
         self.explained.as_ref().map_err(String::clone)?;
-        for (slot, ChosenNode { id, .. }) in nodes.iter().enumerate() {
+        for (slot, ChosenNode { id, residual: usual, limit, .. }) in nodes.iter().enumerate() {
             let all = self.nodes_of(slot);
             let best = all.iter().min_by(|a, b| a.1.total_cmp(&b.1)).map(|(node, _)| {
                 let title = node.title.as_ref();
@@ -281,8 +287,15 @@ impl<'a> RunView<'a> {
             let best = best.unwrap_or_default();
             match all.iter().find(|(node, _)| node.id == *id) {
                 None => return Err(format!("it has no moving node {id}{best}")),
-                Some((_, residual)) if self.counts && !are_given && *residual >= RELATED => {
+                Some((_, residual)) if self.counts && *residual >= RELATED.max(*limit) => {
                     return Err(format!("node {id} does not follow the force{best}"));
+                }
+                Some((_, residual)) if self.counts && residual >= limit => {
+                    return Err(format!(
+                        "impulse of the force and change of velocity differ by {} %, in the others by at most {} %: is its force that of another run, or in other units? To keep it, name the force with --force",
+                        percent(*residual),
+                        percent(*usual)
+                    ));
                 }
                 Some(_) => {}
             }
@@ -318,11 +331,26 @@ struct NodeTally<'a> {
     is_centre: bool,
     /// In which it can represent the body.
     runs: usize,
-    /// The largest of all runs that are not left out for it.
+    /// Of each run, then the largest of those that are not left out for it.
+    residuals: Vec<f64>,
     residual: f64,
+    limit: f64,
     /// Of all runs together, and how many that are.
     roughness: f64,
     seen: f64,
+}
+
+/// What a run leaves of the impulse if it is left out for it: more than any that follows a force; or, where most runs follow it
+/// closely, much more than these.
+fn left_out_from(residuals: &[f64]) -> f64 {
+    let mut sorted = residuals.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let median = sorted[(sorted.len() - 1) / 2];
+    if sorted.len() >= LEAST_TO_COMPARE && median <= FOLLOWS {
+        (MUCH_MORE * median).clamp(FOLLOWS, RELATED)
+    } else {
+        RELATED
+    }
 }
 
 /// The node that can represent the body in most runs: a centre of gravity first, then the one
@@ -342,16 +370,19 @@ fn choose(
             let limit =
                 if is_centre { best + CENTRE_AS_GOOD } else { AS_GOOD.0 * best + AS_GOOD.1 };
             let (runs, roughness, seen) = (0, 0.0, 0.0);
-            let empty = NodeTally { node, is_centre, runs, residual, roughness, seen };
-            let tally = tallies.entry(node.id).or_insert(empty);
+            let (residuals, left, above) = (Vec::new(), 0.0, f64::INFINITY);
+            let tally = tallies.entry(node.id).or_insert(NodeTally {
+                node,
+                is_centre,
+                runs,
+                residuals,
+                residual: left,
+                limit: above,
+                roughness,
+                seen,
+            });
             tally.runs += usize::from(residual <= limit);
-            // A run in which it does not follow the force is left out, and says nothing of the others.
-            let is_left_out = |residual: f64| !are_given && residual >= RELATED;
-            tally.residual = match (is_left_out(tally.residual), is_left_out(residual)) {
-                (true, false) => residual,
-                (false, true) => tally.residual,
-                _ => tally.residual.max(residual),
-            };
+            tally.residuals.push(residual);
             tally.roughness += node.roughness;
             tally.seen += 1.0;
         }
@@ -359,6 +390,15 @@ fn choose(
     // Of equally smooth ones, such as the nodes of a rigid body, the one that follows best.
     let roughness = |tally: &NodeTally<'_>| (tally.roughness / tally.seen * EVEN).round();
     let mut tallies: Vec<NodeTally<'_>> = tallies.into_values().collect();
+    for tally in &mut tallies {
+        // A run in which it does not follow the force is left out, and says nothing of the others.
+        tally.limit = if are_given { f64::INFINITY } else { left_out_from(&tally.residuals) };
+        let largest = |most: f64| {
+            tally.residuals.iter().copied().filter(|left| *left < most).fold(0.0, f64::max)
+        };
+        let kept = largest(tally.limit);
+        tally.residual = if kept > 0.0 { kept } else { largest(f64::INFINITY) };
+    }
     tallies.sort_by(|a, b| {
         (Some(b.node.id) == given)
             .cmp(&(Some(a.node.id) == given))
@@ -372,7 +412,8 @@ fn choose(
         && tallies.first().is_none_or(|first| first.node.id != id)
     {
         // Each run without it is left out, with the reason.
-        return Some(ChosenNode { id, title: None, residual: 1.0, others: Vec::new() });
+        let (residual, limit) = (1.0, f64::INFINITY);
+        return Some(ChosenNode { id, title: None, residual, limit, others: Vec::new() });
     }
     let (first, others) = tallies.split_first()?;
     let about = |tally: &NodeTally<'_>| {
@@ -390,7 +431,8 @@ fn choose(
         .map(|tally| Alternative { id: tally.node.id.to_string(), about: about(tally) })
         .collect();
     let title = first.node.title.clone();
-    Some(ChosenNode { id: first.node.id, title, residual: first.residual, others })
+    let NodeTally { residual, limit, .. } = *first;
+    Some(ChosenNode { id: first.node.id, title, residual, limit, others })
 }
 
 /// The force that the members share, as the recipe names it, and those that could be meant; `None`

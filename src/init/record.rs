@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::folders::{Reason, speed_in};
 use super::measure::{Impact, MassEstimates, interval};
 use super::recipe::CommonRecipe;
-use super::sources::{Source, Sources, component, impulse, picked, rising, velocity};
+use super::sources::{ENERGIES, Source, Sources, component, impulse, picked, rising, velocity};
 use super::survey::{STOPPED, Survey, bracketed};
 use super::units::Magnitudes;
 use crate::history::{EntityId, History};
@@ -224,6 +224,12 @@ impl Record {
             in_free_flight: in_free_flight.unwrap_or_default(),
             unexplained: self.unexplained(k),
             by_energy: kg(&by_energy, k),
+            energy_is_whole: self
+                .run
+                .sources
+                .energy
+                .as_ref()
+                .is_some_and(|e| e.name == ENERGIES[0]),
             is_shared: self.velocities.len() > 1,
             coarseness: self.coarseness().unwrap_or_default(),
         };

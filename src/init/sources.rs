@@ -18,7 +18,7 @@ pub(super) const MOTION: &str = "nodout";
 /// Forces that a recipe can name, what acts between bodies before what acts within one.
 pub(super) const FORCES: [&str; 5] = ["rwforc", "rcforc", "secforc", "rbdout", "spcforc"];
 /// Of the model, else of its parts.
-const ENERGIES: [&str; 2] = ["glstat", "matsum"];
+pub(super) const ENERGIES: [&str; 2] = ["glstat", "matsum"];
 
 /// A file, or a section of one, with histories that a recipe can name.
 #[derive(Clone, Debug)]

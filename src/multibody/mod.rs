@@ -186,7 +186,7 @@ fn still_loaded(chain: &Chain, run: &Run, end_s: f64) -> Option<String> {
     // Without the rounding of a product.
     let end_s = (end_s * 1e9).round() / 1e9;
     Some(format!(
-        "the run ends at {end_s} s while the contact still loads {}: the mean deceleration covers the time up to then and may still change; lengthen duration",
+        "the run ends at {end_s} s while the contact still loads {}: crush and energy may still grow, and the mean deceleration covers the time up to then; lengthen duration",
         bodies.join(", ")
     ))
 }

@@ -6,7 +6,7 @@
 //!
 //! ```
 //! use crumple::solver::{Selection, read};
-//! use std::path::Path;
+//! use std::path::{Path, PathBuf};
 //!
 //! let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("fixtures/fe/lead-car-wall/36kmh/nodout");
 //! let selection = Selection {
@@ -35,7 +35,7 @@ mod states;
 mod zeros;
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, error};
 use crate::guess;
@@ -130,8 +130,13 @@ fn sections_of(
 ) -> Result<Vec<SolverFile>, Error> {
     let io = |source| Error::io(path, source);
     let is_forced = format.is_some();
-    let (format, parts) = open(path, format, selection)?;
+    let family = family(path)?;
+    let (format, parts) = open(&family, format, selection)?;
     let mut sections = format.read(&parts, selection).map_err(io)?;
+    for problem in sections.iter_mut().flat_map(|section| &mut section.problems) {
+        let continues = family.get(problem.part).filter(|_| problem.part > 0);
+        problem.file = continues.map(|path| runs::name_of(path));
+    }
     if is_forced {
         check_format(path, format, &*parts[0], &sections)?;
     }
@@ -179,12 +184,14 @@ fn unknown_format(path: &Path, looks_like: impl std::fmt::Display) -> Error {
 
 type Parts = Vec<Box<dyn Source>>;
 
-/// Opens a file and what continues it.
+/// Opens a file and what continues it. They are looked for before the first is opened: its size is then fixed, and what a run wrote
+/// into a continuation that began later would be after a hole.
 fn open(
-    path: &Path,
+    family: &[PathBuf],
     format: Option<&str>,
     selection: &Selection,
 ) -> Result<(&'static Format, Parts), Error> {
+    let path = &family[0];
     let io = |source| Error::io(path, source);
     if path.is_dir() {
         return Err(error!(
@@ -194,9 +201,6 @@ fn open(
             files_in(path)
         ));
     }
-    // Before the first is opened: its size is then fixed, and what a run wrote into a
-    // continuation that began later would are after a hole.
-    let family = family(path)?;
     let first = source::open(path, selection.access).map_err(io)?;
     let format = match format {
         Some(name) => named(name)?,
@@ -214,8 +218,8 @@ fn open(
     }
     let mut parts = vec![first];
     if format.is_binary() {
-        for part in family.into_iter().skip(1) {
-            parts.push(source::open(&part, selection.access).map_err(io)?);
+        for part in &family[1..] {
+            parts.push(source::open(part, selection.access).map_err(io)?);
         }
     }
     Ok((format, parts))
@@ -237,7 +241,7 @@ pub fn blocks(
     format: Option<&str>,
     selection: &Selection,
 ) -> Result<Option<Blocks>, Error> {
-    let (format, parts) = open(path, format, selection)?;
+    let (format, parts) = open(&family(path)?, format, selection)?;
     if format.is_binary() && missing_continuation(path)?.is_some() {
         return Ok(None);
     }

@@ -58,6 +58,9 @@ pub enum ProblemCode {
 pub struct Problem {
     /// Its kind.
     pub code: ProblemCode,
+    /// Name of the file that holds the place, where it continues the one that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
     /// Line, counted from 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub line: Option<u64>,
@@ -69,6 +72,9 @@ pub struct Problem {
     pub columns: Option<[usize; 2]>,
     /// What was expected and found, without the place.
     pub message: String,
+    /// Number of `file` among those that are read together, 0 for the first.
+    #[serde(skip)]
+    pub(in crate::solver) part: usize,
 }
 
 impl fmt::Display for Problem {
@@ -80,6 +86,9 @@ impl fmt::Display for Problem {
             }
             write!(f, ": ")?;
         } else if let Some(byte) = self.byte {
+            if let Some(file) = &self.file {
+                write!(f, "{file}, ")?;
+            }
             write!(f, "byte {byte}: ")?;
         }
         f.write_str(&self.message)
@@ -99,7 +108,9 @@ impl Problem {
 
     pub(in crate::solver) fn at(code: ProblemCode, place: Option<Place>, message: String) -> Self {
         let line = place.map(|p| p.line).filter(|&line| line > 0);
-        Self { code, line, byte: place.map(|p| p.byte), columns: None, message }
+        let part = place.map_or(0, |p| p.part);
+        let byte = place.map(|p| p.byte);
+        Self { code, file: None, line, byte, columns: None, message, part }
     }
 }
 
@@ -125,12 +136,14 @@ pub(crate) struct Place {
     /// Counted from 1; 0 in a binary file.
     pub line: u64,
     pub byte: u64,
+    /// Which of the files that are read together, 0 for the first.
+    pub part: usize,
 }
 
 impl Place {
-    /// A place in a binary file, which has no lines.
-    pub(crate) fn at_byte(byte: u64) -> Self {
-        Self { line: 0, byte }
+    /// A place in one of the binary files that are read together, which have no lines.
+    pub(crate) fn in_part(part: usize, byte: u64) -> Self {
+        Self { line: 0, byte, part }
     }
 }
 
@@ -165,10 +178,6 @@ impl Diagnostics {
     }
 
     /// A problem of a binary file, which has no lines.
-    pub(crate) fn add_at_byte(&mut self, code: ProblemCode, byte: u64, message: String) {
-        self.add(code, Some(Place::at_byte(byte)), message);
-    }
-
     pub(crate) fn is_empty(&self) -> bool {
         self.kept.is_empty()
     }

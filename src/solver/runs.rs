@@ -295,7 +295,7 @@ fn unread_behind(mut files: impl Iterator<Item = PathBuf>) -> Result<Option<Stri
     Ok(None)
 }
 
-fn name_of(path: &Path) -> String {
+pub(super) fn name_of(path: &Path) -> String {
     path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default()
 }
 

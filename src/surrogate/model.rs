@@ -16,7 +16,7 @@ use super::response::with_response;
 use super::{CaseCurve, QueryPoint, Surrogate, Warning, WarningCode};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{ForceKind, Masses};
-use crate::dataset::{Feature, MASS, OTHER_MASS, SAME_SPEED, TrainingSet, nearest};
+use crate::dataset::{Feature, MASS, OTHER_MASS, SAME_MASS, SAME_SPEED, TrainingSet, nearest};
 use crate::error::{Error, error};
 use crate::forest::RegressionForest;
 use crate::unit::{SpeedKind, UnitSystem};
@@ -374,9 +374,13 @@ impl Model {
         } else if (nearest / v - 1.0).abs() > FAR_OUTSIDE_SHARE {
             warnings.push(Warning::far_from_training(v, nearest));
         }
+        let known = warnings.len();
         warnings.extend(self.features_outside(at).map(|(feature, asked, low, high)| {
             Warning::parameter_out_of_range(&feature.name(), asked, low, high)
         }));
+        if warnings.len() == known && !self.cases.iter().any(|case| self.is_alike(case, at)) {
+            warnings.push(Warning::parameters_of_no_run(&self.features, at.features));
+        }
         for &(below, above) in &self.mode_switches_m_per_s {
             if below < v && v < above {
                 warnings.push(Warning::mode_switch(below, above));
@@ -385,6 +389,16 @@ impl Model {
         warnings.extend(self.fitted.warnings(&self.curves.declared, at));
         warnings.extend(self.case_warnings());
         warnings
+    }
+
+    /// Whether a run has the parameters of a query.
+    fn is_alike(&self, case: &ModelCase, at: &QueryPoint<'_>) -> bool {
+        let pairs = self.features.iter().zip(case.features.iter().zip(at.features));
+        pairs.into_iter().all(|(feature, (own, asked))| {
+            let is_mass = [MASS, OTHER_MASS].contains(&&*feature.parameter);
+            let share = if is_mass { SAME_MASS } else { NEARLY_INSIDE };
+            (own - asked).abs() <= share * own.abs()
+        })
     }
 
     /// Warnings of the training runs, shortened if there are many.

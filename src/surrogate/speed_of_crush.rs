@@ -26,6 +26,8 @@ pub struct SpeedOfCrush {
 const INTERVALS: usize = 32;
 /// Halvings of an interval.
 const HALVINGS: usize = 40;
+/// What rounding takes from a crush that is printed in m, or in mm with one digit behind the point.
+const ROUNDING_M: f64 = 5.1e-5;
 
 /// Finds the speed, between the slowest and the fastest run of the model, at which the curve of `query` ends at
 /// `crush_m`.
@@ -50,13 +52,14 @@ pub fn speed_of_crush(model: &Model, query: &Query, crush_m: f64) -> Result<Spee
         }
         Ok(Some(0.5 * (from + to)))
     };
-    let speed_m_per_s = find(crush_m)?.ok_or_else(|| {
+    let (least_m, most_m) = (crushes[0], crushes[INTERVALS]);
+    let is_nearly_inside = (least_m - ROUNDING_M..=most_m + ROUNDING_M).contains(&crush_m);
+    let within = if is_nearly_inside { crush_m.max(least_m).min(most_m) } else { crush_m };
+    let speed_m_per_s = find(within)?.ok_or_else(|| {
         error!(
             Prediction,
-            "no speed between those of the runs gives a crush of {crush_m} m: the model's crush goes from {:.4} m at {} to {:.4} m at {}",
-            crushes[0],
+            "no speed between those of the runs gives a crush of {crush_m:.4} m: the model's crush goes from {least_m:.4} m at {} to {most_m:.4} m at {}",
             km_per_h(low),
-            crushes[INTERVALS],
             km_per_h(high)
         )
     })?;

@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::curve::Masses;
-use crate::dataset::SAME_SPEED;
+use crate::dataset::{Feature, SAME_SPEED};
 use crate::plural::counted;
 use crate::unit::{Shown, km_per_h};
 
@@ -43,7 +43,7 @@ pub enum WarningCode {
     NoUnloading,
     /// The mass differs from the training runs'.
     OtherMass,
-    /// The speed lies between training speeds that are far apart.
+    /// The speed lies between training speeds that are far apart, or no run has the parameters.
     FarFromTraining,
     /// The collapse mode changes between the neighbouring training speeds.
     ModeSwitch,
@@ -140,6 +140,24 @@ impl Warning {
             code: WarningCode::OutOfRange,
             message: format!(
                 "{name} = {asked} lies outside the training cases' {low} to {high}: this is extrapolation"
+            ),
+        }
+    }
+
+    /// Of values of the features that each lie inside those of the runs.
+    pub(crate) fn parameters_of_no_run(features: &[Feature], asked: &[f64]) -> Self {
+        let named = features.iter().zip(asked).filter_map(|(feature, asked)| {
+            let value = match &feature.category {
+                Some(category) => (*asked == 1.0).then(|| category.clone())?,
+                None => asked.to_string(),
+            };
+            Some(format!("{} = {value}", feature.parameter))
+        });
+        let named = named.collect::<Vec<_>>().join(", ");
+        Self {
+            code: WarningCode::FarFromTraining,
+            message: format!(
+                "no training run has {named}: only speeds were left out, so any band says nothing of the step to other parameters"
             ),
         }
     }

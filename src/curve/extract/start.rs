@@ -93,7 +93,7 @@ impl Start {
         let by = match onset.interval_s {
             _ if of_body => StartBy::Body,
             Some(interval_s) => StartBy::Crossing { interval_s },
-            None => StartBy::FirstState { missing_m: missing_m(record) },
+            None => StartBy::FirstState { missing_m: missing_m(record, setup) },
         };
         Ok((Self { time_s: onset.time_s, by }, remarks))
     }
@@ -193,11 +193,20 @@ impl Start {
     }
 }
 
+/// A body that is slower by at most this share has the speed of its run.
+const FULL_SPEED: f64 = 1e-3;
+
 /// The crush before a record that begins in contact, at least and at most: its first displacement, or, where that counts from the first
 /// state, what the body travels until then. If the motion was recorded before the force, the bodies have slowed down over part of
-/// it at least; a nose is stopped before the body is.
-fn missing_m(record: &Record) -> (f64, f64) {
+/// it at least; a nose is stopped before the body is. A body that still has the run's speed, in a record that counts its displacement
+/// from there, has crushed nothing: its clock may run from elsewhere.
+fn missing_m(record: &Record, setup: &Setup<'_>) -> (f64, f64) {
+    let bodies = if setup.half_model { 2.0 } else { 1.0 };
+    let is_slowed = setup.manifest_speed_m_per_s.is_none_or(|speed_m_per_s| {
+        bodies * record.rate_m_per_s[0].abs() < (1.0 - FULL_SPEED) * speed_m_per_s
+    });
     let most_m = match record.deflection_m[0].abs() {
+        0.0 if !is_slowed => 0.0,
         0.0 => (record.rate_m_per_s[0] * record.time_s[0]).abs(),
         displacement_m => displacement_m,
     };

@@ -6,7 +6,7 @@ use super::curve::{Metadata, Place, ReadCurve, expected, shown, stated_units, ti
 use super::encoding::{decoded, lines};
 use super::label::{Label, Quantity};
 use super::layout::layout;
-use super::table::{Fit, Purpose, Table, check_last, is_pair};
+use super::table::{Fit, Purpose, Table, check_last, is_pair, unit_of};
 use crate::error::{Error, error};
 use crate::guess;
 
@@ -185,9 +185,15 @@ pub(crate) fn history(bytes: &[u8], wanted: Option<&str>) -> Result<History, Err
         Some(curve) => (curve, 0, 1),
         None => (&table, time, column),
     };
+    // As a name holds a unit where no row below does.
+    let with_unit = |name: &str, field: usize| {
+        let unit = table.units.as_ref().map(|row| unit_of(row.field(field))).unwrap_or_default();
+        if unit.is_empty() { name.to_string() } else { format!("{name} [{unit}]") }
+    };
+    let (line, time_name) = &table.names[time];
     let mut history = History {
-        time_name: table.names[time].clone(),
-        name: names[column].clone(),
+        time_name: (*line, with_unit(time_name, time)),
+        name: with_unit(&names[column], field),
         title: table.titles.first().map_or(String::new(), |(_, title)| title.clone()),
         time: Vec::new(),
         values: Vec::new(),

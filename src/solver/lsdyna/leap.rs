@@ -185,7 +185,7 @@ impl Learnt {
     /// Beginning of the `k`-th state after the one at `place`.
     fn place(&self, place: Place, k: u64) -> Place {
         let (line, byte) = (self.layout.lines(), self.layout.period());
-        Place { line: place.line + k * line, byte: place.byte + k * byte }
+        Place { line: place.line + k * line, byte: place.byte + k * byte, ..place }
     }
 }
 

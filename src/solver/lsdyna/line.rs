@@ -48,7 +48,7 @@ impl Line<'_> {
 
 impl From<&Line<'_>> for Place {
     fn from(line: &Line<'_>) -> Self {
-        Self { line: line.number, byte: line.byte }
+        Self { line: line.number, byte: line.byte, part: 0 }
     }
 }
 
@@ -67,7 +67,7 @@ impl<R: BufRead> Lines<R> {
 
     /// Number of the last line read, counted from 1, and the byte after it.
     pub(crate) fn place(&self) -> Place {
-        Place { line: self.number, byte: self.byte }
+        Place { line: self.number, byte: self.byte, part: 0 }
     }
 
     /// The next line, or `None` at the end of the file.

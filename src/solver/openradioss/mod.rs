@@ -72,15 +72,11 @@ fn read(parts: &[Box<dyn Source>], selection: &Selection) -> io::Result<Vec<Solv
     };
     let mut states = StateReader::new(&header, selection);
     states.read(&header, &mut records)?;
-    for (k, part) in restarts.iter().enumerate() {
+    for part in restarts {
         let mut records = Records::new(Stream::new(&**part));
-        match Header::read(&mut records)? {
-            Some(own) if own.is_like(&header) => states.read(&header, &mut records)?,
-            own => {
-                let what = if own.is_some() { "holds other histories" } else { "is damaged" };
-                states.end_before(k + 2, what);
-                break;
-            }
+        let own = Header::read(&mut records)?;
+        if !states.read_restart(&header, own, &mut records)? {
+            break;
         }
     }
     Ok(states.finish(&header, selection))

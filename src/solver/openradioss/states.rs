@@ -44,8 +44,10 @@ pub(crate) struct StateReader {
     objects: Vec<Object>,
     /// Lengths of a state's records in bytes.
     lengths: Vec<usize>,
-    starts: Vec<u64>,
+    starts: Vec<Place>,
     not_finite: usize,
+    /// Which of the files is read, 0 for the first.
+    part: usize,
     /// Times of the states before the cut ends of files.
     cut_after: Vec<f64>,
     problems: Diagnostics,
@@ -142,16 +144,52 @@ impl StateReader {
             lengths: header.lengths.clone(),
             starts: Vec::new(),
             not_finite: 0,
+            part: 0,
             cut_after: Vec::new(),
             problems: Diagnostics::default(),
         }
     }
 
-    /// Says that the record ends before its `number`-th file, and why.
-    pub(crate) fn end_before(&mut self, number: usize, what: &str) {
-        let message =
-            format!("T{number:02}, the continuation, {what}: neither it nor what follows is read");
-        self.problems.add(ProblemCode::UnreadRows, None, message);
+    /// Reads the states of a restart; false if it is not one of this run, which is said.
+    pub(crate) fn read_restart(
+        &mut self,
+        header: &Header,
+        own: Option<Header>,
+        records: &mut Records<'_>,
+    ) -> io::Result<bool> {
+        self.part += 1;
+        let title = |header: &Header| header.title.clone().unwrap_or_default();
+        let what = match own {
+            None => "is damaged".into(),
+            Some(own) if own.title != header.title => {
+                format!(
+                    "is of another run: its title is {:?}, not {:?}",
+                    title(&own),
+                    title(header)
+                )
+            }
+            Some(own) if !own.is_like(header) => "holds other histories".into(),
+            Some(_) => {
+                let before = self.time.len();
+                self.read(header, records)?;
+                match (self.time.first(), self.time.get(before)) {
+                    (Some(first), Some(own)) if before > 0 && own <= first => {
+                        let message = format!(
+                            "begins at time {own:?}, where the run does: it is another run"
+                        );
+                        self.time.truncate(before);
+                        self.starts.truncate(before);
+                        self.channels.iter_mut().for_each(|c| c.values.truncate(before));
+                        message
+                    }
+                    _ => return Ok(true),
+                }
+            }
+        };
+        let message = format!("this continuation {what}: neither it nor what follows is read");
+        let place = Some(Place::in_part(self.part, 0));
+        self.problems.add(ProblemCode::UnreadRows, place, message);
+        Ok(false)
     }
 
     fn stride(&self) -> u64 {
@@ -209,7 +247,8 @@ impl StateReader {
             1 => format!("state {first} is cut or damaged; it is left out"),
             _ => format!("states {first} to {} are cut or damaged; they are left out", next - 1),
         };
-        self.problems.add_at_byte(ProblemCode::IncompleteState, byte, message);
+        let place = Some(Place::in_part(self.part, byte));
+        self.problems.add(ProblemCode::IncompleteState, place, message);
     }
 
     /// Names the last state above if more values next to each other are zero, though not in the
@@ -244,7 +283,7 @@ impl StateReader {
                     self.name(header, k, first),
                     self.name(header, k, i - 1),
                 );
-                let place = self.starts.last().copied().map(Place::at_byte);
+                let place = self.starts.last().copied();
                 self.problems.add(ProblemCode::SuspectZeros, place, message);
             }
         }
@@ -272,12 +311,13 @@ impl StateReader {
             word.map_or(f64::NAN, |w| f64::from(f32::from_be_bytes(w)))
         };
         let time = real(&state[0], 0);
+        let place = Place::in_part(self.part, start);
         if !time.is_finite() {
             let message = format!("the state is left out: its time is {time:?}");
-            self.problems.add_at_byte(ProblemCode::IncompleteState, start, message);
+            self.problems.add(ProblemCode::IncompleteState, Some(place), message);
             return;
         }
-        self.starts.push(start);
+        self.starts.push(place);
         self.time.push(time);
         for channel in &mut self.channels {
             let value = real(&state[channel.record], channel.offset);
@@ -288,7 +328,7 @@ impl StateReader {
 
     /// Leaves out what a restart wrote again; forces are unknown across it.
     fn resolve_restarts(&mut self) {
-        let place = |i: usize| self.starts.get(i).copied().map(Place::at_byte);
+        let place = |i: usize| self.starts.get(i).copied();
         let (mut kept, found) = resolve(&self.time, |_, _| Some(true), place, "");
         self.problems.append(found);
         // Nor can a state whose time is out of order be differentiated.

@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use crate::solver::lsdyna::lsda::{self, Event, Header, Kind, Payload, change_directory};
-use crate::solver::problem::{Diagnostics, Problem, ProblemCode};
+use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::solver::source::{Source, fill_at};
 
 /// Metadata that names the owners of values.
@@ -69,7 +69,11 @@ impl Tree {
         self.headers.push(header);
         let Some(header) = header else {
             let message = "this is not an LSDA container, or its header is cut";
-            self.problems.add(ProblemCode::CutRecord, None, message.into());
+            self.problems.add(
+                ProblemCode::CutRecord,
+                Some(Place::in_part(part, 0)),
+                message.into(),
+            );
             return Ok(());
         };
         let mut path: Vec<String> = Vec::new();
@@ -98,13 +102,13 @@ impl Tree {
                     None => "what follows is left out".into(),
                 };
                 let message = format!("damaged record: {message}; {rest}");
-                self.damage(here, ProblemCode::BadRecord, at, message);
+                self.damage(here, ProblemCode::BadRecord, Place::in_part(part, at), message);
             }
             Event::Cut { at } => {
                 let message = format!(
                     "the file ends within the record at byte {at}; the records before it are read"
                 );
-                self.damage(here, ProblemCode::CutRecord, at, message);
+                self.damage(here, ProblemCode::CutRecord, Place::in_part(part, at), message);
             }
         })
     }
@@ -113,13 +117,13 @@ impl Tree {
         &mut self,
         here: Option<(usize, Option<usize>)>,
         code: ProblemCode,
-        byte: u64,
+        place: Place,
         message: String,
     ) {
         if let Some((section, Some(state))) = here {
             self.sections[section].damaged.insert(state);
         }
-        self.problems.add_at_byte(code, byte, message);
+        self.problems.add(code, Some(place), message);
     }
 
     /// Notes data in a directory that is not a state. Directories below a state are part of it.

@@ -139,7 +139,7 @@ impl Timed {
         let message =
             format!("the ids change; {lost} states that were written before are left out");
         let problem = section.problem(ProblemCode::UnexpectedEntity, &message);
-        (lost > 0).then(|| problem.at_place(Some(Place::at_byte(change.1))))
+        (lost > 0).then(|| problem.at_place(Some(Place::in_part(change.0, change.1))))
     }
 }
 
@@ -217,5 +217,5 @@ fn repeated_ids(section: &Section, ids: &[Ids]) -> Option<Problem> {
 fn place_of(section: &Section, state: usize) -> Option<Place> {
     let records = || section.components.iter().filter_map(|c| c.records.get(&state));
     let place = section.time_of(state).or_else(|| records().min_by_key(|p| p.order()))?;
-    Some(Place::at_byte(place.payload.at))
+    Some(Place::in_part(place.part, place.payload.at))
 }
