@@ -718,7 +718,7 @@ fn one_run_with_a_foreign_force_is_singled_out() {
     }
     fs::copy(group("60kmh").join("rwforc"), here.join("36kmh/rwforc")).unwrap();
     let said = crumple_ok(&here, "init");
-    says(&said, "36kmh: it needs a different recipe from the other runs: impulse of the force and");
+    says(&said, "36kmh: it does not fit the other runs' recipe: impulse of the force and");
     says(&said, "differ by 12 %, in the others by at most 2.4 %: is its force that of another run");
     assert!(!said.contains("fill in"), "{said}");
     let runs = study(&here, "study.toml")["run"].as_array().unwrap().clone();
@@ -913,13 +913,13 @@ fn runs_of_another_recipe_are_reported_and_not_merged() {
     let said = |folder: &str| &out.iter().find(|(path, _)| path == folder).unwrap().1;
     assert_eq!(
         said("other_node"),
-        "it needs a different recipe from the other runs: it has no moving node 900001; there 5001 \"COG of the rigid trailing mass\" would be taken"
+        "it does not fit the other runs' recipe: it has no moving node 900001; there 5001 \"COG of the rigid trailing mass\" would be taken"
     );
     assert_eq!(
         said("other_wall"),
-        "it needs a different recipe from the other runs: rwforc 1 does not move its bodies, rwforc 2 does"
+        "it does not fit the other runs' recipe: rwforc 1 does not move its bodies, rwforc 2 does"
     );
-    assert!(said("pair").starts_with("it needs a different recipe from the other runs: "));
+    assert!(said("pair").starts_with("it does not fit the other runs' recipe: "));
     assert_eq!(document["runs"].as_array().unwrap().len(), 4);
 }
 
@@ -1529,7 +1529,7 @@ fn walls_that_act_one_after_the_other_are_added() {
     let odd = study(here, "odd.toml");
     assert!(!said.contains("residual"), "{said}");
     let text = fs::read_to_string(here.join("odd.toml")).unwrap();
-    says(&text, "odd/55kmh: it needs a different recipe from the other runs");
+    says(&text, "odd/55kmh: it does not fit the other runs' recipe");
     assert_eq!(odd["recipe"]["force"]["id"].as_integer(), Some(1));
     let runs = odd["run"].as_array().unwrap();
     assert_eq!(runs.len(), 2);

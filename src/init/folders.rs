@@ -265,7 +265,7 @@ pub(crate) enum Reason {
     /// Its histories are those of another run, in other files.
     #[error("its histories are identical to those of {of}")]
     SameHistories { of: PathBuf },
-    #[error("it needs a different recipe from the other runs: {why}")]
+    #[error("it does not fit the other runs' recipe: {why}")]
     OtherRecipe { why: String },
     #[error("it seems to be a different model: {why}")]
     OtherModel { why: String },

@@ -292,7 +292,7 @@ impl<'a> RunView<'a> {
                 }
                 Some((_, residual)) if self.counts && residual >= limit => {
                     return Err(format!(
-                        "impulse of the force and change of velocity differ by {} %, in the others by at most {} %: is its force that of another run, or in other units? To keep it, name the force with --force",
+                        "impulse of the force and change of velocity differ by {} %, in the others by at most {} %: is its force that of another run or in other units, or does another force act as well? To keep it, name the force with --force",
                         percent(*residual),
                         percent(*usual)
                     ));

@@ -20,10 +20,9 @@ fn accelerate_by_all<'a>(engine: &mut Engine<'a>, at: StepPoint, lag_s: f64, kic
         }
     }
     engine.losses.power_of_w.values_mut(n).fill([0.0; LANES]);
+    engine.find_closing(lag_s);
     engine.add_rates(&mut net, at, lag_s);
-    if engine.fixed.has_plain_dampers {
-        engine.add_plain_dampers(&mut net, at, lag_s);
-    }
+    engine.add_plain_dampers(&mut net, at);
     engine.losses.power.damper_w = engine.losses.power_of_w.sum(n);
     engine.add_dampers(&mut net, at, lag_s);
     if engine.by_contacts.is_some() {
@@ -89,8 +88,7 @@ impl Engine<'_> {
         let (v, a) = (self.v.values(n), self.a_start.values(n));
         let forces = self.push.forces_n(at).values(n);
         let mut most = [0.0; LANES];
-        for (c, speed) in self.speeds.values_mut(n).iter_mut().enumerate() {
-            *speed = each(|j| v[c][j] + lag_s * a[c][j]);
+        for &(c, _) in rated {
             most = larger(most, each(|j| share[c][j] * forces[c][j].abs()));
         }
         // Nothing times any factor; what crosses its begin in this step needs the factor all the same.
@@ -98,46 +96,61 @@ impl Engine<'_> {
         if !acts {
             return;
         }
+        for (c, speed) in self.speeds.values_mut(n).iter_mut().enumerate() {
+            *speed = each(|j| v[c][j] + lag_s * a[c][j]);
+        }
         let speeds = self.speeds.flat();
+        let factors = self.rate_factors.values_mut(n);
+        for &(c, sides) in rated {
+            let closing = each(|j| speeds[sides[j][0]] - speeds[sides[j][1]]);
+            factors[c] = each(|j| RateFactor::of(sensitivity[c][j], share[c][j] * closing[j]));
+        }
         let power = self.losses.power_of_w.values_mut(n);
         let peaks = self.peaks_n.values_mut(n);
+        let (net, closing) = (net_n.values_mut(n), self.closing_m_per_s.values(n));
+        for &(c, _) in rated {
+            let (force, factor, closing) = (forces[c], factors[c], closing[c]);
+            let extra = each(|j| (factor[j] - 1.0) * force[j]);
+            power[c] = each(|j| extra[j] * closing[j]);
+            net[c] = each(|j| net[c][j] + extra[j]);
+            peaks[c] = larger(peaks[c], net[c]);
+        }
+    }
+
+    /// Closing speeds of all interfaces. Apart from the passes that need them, so that these load whole rows.
+    #[inline(always)]
+    fn find_closing(&mut self, lag_s: f64) {
+        let n = self.fixed.layout.rows();
+        let (v, a) = (self.v.values(n), self.a_start.values(n));
         let (next_v, next_a) = (Neighbours::ahead(v), Neighbours::ahead(a));
-        for (c, net) in net_n.values_mut(n).iter_mut().enumerate() {
-            let sides = &rated[c];
-            let closing = each(|j| speeds[sides[j][0]] - speeds[sides[j][1]]);
-            let factors = each(|j| RateFactor::of(sensitivity[c][j], share[c][j] * closing[j]));
-            self.rate_factors.values_mut(n)[c] = factors;
-            let extra = each(|j| (factors[j] - 1.0) * forces[c][j]);
+        for (c, closing) in self.closing_m_per_s.values_mut(n).iter_mut().enumerate() {
             let (v_ahead, a_ahead) = (next_v.after(c), next_a.after(c));
-            power[c] = each(|j| extra[j] * (v[c][j] - v_ahead[j] + lag_s * (a[c][j] - a_ahead[j])));
-            *net = each(|j| net[j] + extra[j]);
-            peaks[c] = larger(peaks[c], *net);
+            *closing = each(|j| v[c][j] - v_ahead[j] + lag_s * (a[c][j] - a_ahead[j]));
         }
     }
 
     /// Adds the dampers that only push and have one coefficient, such as those of end plates.
     #[inline(always)]
-    fn add_plain_dampers(&mut self, net_n: &mut Rows, at: StepPoint, lag_s: f64) {
+    fn add_plain_dampers(&mut self, net_n: &mut Rows, at: StepPoint) {
         let n = self.fixed.layout.rows();
-        let (v, a) = (self.v.values(n), self.a_start.values(n));
         let deflections = self.push.deflections_m(at).values(n);
         let power = self.losses.power_of_w.values_mut(n);
         let peaks = self.peaks_n.values_mut(n);
         let damping = self.fixed.plain_n_s_per_m.values(n);
-        let (next_v, next_a) = (Neighbours::ahead(v), Neighbours::ahead(a));
-        for (c, net) in net_n.values_mut(n).iter_mut().enumerate() {
+        let closing = self.closing_m_per_s.values(n);
+        for &c in &self.fixed.plain_rows {
+            let net = &mut net_n.values_mut(n)[c];
             let (all, deflection, from_m) = (damping[c], deflections[c], self.push.begins_m(c));
+            let (closing, spring) = (closing[c], *net);
             // At 0 only where bodies meet at the start.
             let touching = each(|j| if deflection[j] >= 0.0 { all[j] } else { 0.0 });
             let acting = each(|j| if from_m[j] > f64::NEG_INFINITY { touching[j] } else { 0.0 });
-            let (v_ahead, a_ahead) = (next_v.after(c), next_a.after(c));
-            let closing = each(|j| v[c][j] - v_ahead[j] + lag_s * (a[c][j] - a_ahead[j]));
-            let spring = *net;
             // No tension where it opens fast.
             let least = each(|j| if acting[j] > 0.0 { 0.0 } else { f64::NEG_INFINITY });
-            *net = larger(each(|j| spring[j] + acting[j] * closing[j]), least);
-            power[c] = each(|j| power[c][j] + (net[j] - spring[j]) * closing[j]);
-            peaks[c] = larger(peaks[c], each(|j| if acting[j] > 0.0 { net[j] } else { 0.0 }));
+            let force = larger(each(|j| spring[j] + acting[j] * closing[j]), least);
+            *net = force;
+            power[c] = each(|j| power[c][j] + (force[j] - spring[j]) * closing[j]);
+            peaks[c] = larger(peaks[c], each(|j| if acting[j] > 0.0 { force[j] } else { 0.0 }));
         }
     }
 

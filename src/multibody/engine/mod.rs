@@ -206,14 +206,18 @@ impl<'a> Engine<'a> {
         };
         let taken = interfaces.iter().enumerate().filter_map(zone).collect();
         let nothing = [layout.of(bodies.len()).flat(); 2];
-        let mut rated = Vec::new();
+        let mut rated: Vec<(usize, [[usize; 2]; LANES])> = Vec::new();
         for (k, interface) in interfaces.iter().enumerate() {
             let Some(rate) = &interface.rate else { continue };
-            rated.resize(layout.rows(), [nothing; LANES]);
             // The wall is after the last body and never moves.
             let ahead = rate.ahead.unwrap_or(bodies.len());
             let slot = layout.of(k);
-            rated[slot.row()][slot.lane()] = [rate.behind, ahead].map(|i| layout.of(i).flat());
+            let sides = [rate.behind, ahead].map(|i| layout.of(i).flat());
+            let at = rated.iter().position(|(row, _)| *row == slot.row()).unwrap_or_else(|| {
+                rated.push((slot.row(), [nothing; LANES]));
+                rated.len() - 1
+            });
+            rated[at].1[slot.lane()] = sides;
         }
         let of_rate = |value: fn(&RateFactor) -> f64| {
             Rows::of(&layout, interfaces.len(), |k| interfaces[k].rate.as_ref().map_or(0.0, value))
@@ -225,13 +229,17 @@ impl<'a> Engine<'a> {
             damper.and_then(Damping::constant_n_s_per_m).filter(|&c| c > 0.0)
         };
         let plain_n_s_per_m = Rows::of(&layout, interfaces.len(), |k| plain(k).unwrap_or(0.0));
-        let has_plain_dampers = (0..interfaces.len()).any(|k| plain(k).is_some());
+        let of_plain = (0..interfaces.len()).filter(|&k| plain(k).is_some());
+        let mut plain_rows: Vec<usize> = of_plain.map(|k| layout.of(k).row()).collect();
+        plain_rows.sort_unstable();
+        plain_rows.dedup();
         let has_other = |k: &usize| interfaces[*k].damping.is_some() && plain(*k).is_none();
         let other_dampers = (0..interfaces.len()).filter(has_other).collect();
         let mut engine = Self {
             mass_kg: of(&|i| bodies[i].mass_kg),
             per_kg: of(&|i| 1.0 / bodies[i].mass_kg),
             speeds: of(&|_| 0.0),
+            closing_m_per_s: of(&|_| 0.0),
             rate_factors: of(&|_| 1.0),
             peaks_n: of(&|_| 0.0),
             taken,
@@ -259,7 +267,7 @@ impl<'a> Engine<'a> {
                 share,
                 other_dampers,
                 plain_n_s_per_m,
-                has_plain_dampers,
+                plain_rows,
             },
         };
         engine.move_to_first_contact();

@@ -21,8 +21,8 @@ pub(super) struct Fixed<'a> {
     pub layout: Layout,
     pub scheme: Scheme,
     pub step_s: f64,
-    /// Places in [`Rows::flat`] of the two bodies whose closing speed an interface's force follows; empty without such.
-    pub rated: Vec<[[usize; 2]; LANES]>,
+    /// By row that has such: places in [`Rows::flat`] of the two bodies whose closing speed an interface's force follows.
+    pub rated: Vec<(usize, [[usize; 2]; LANES])>,
     /// Of the rate factors; 0 where there is none.
     pub sensitivity: Rows,
     pub share: Rows,
@@ -30,7 +30,8 @@ pub(super) struct Fixed<'a> {
     pub other_dampers: Vec<usize>,
     /// Coefficients in N s/m of dampers that only push and have one; 0 where there is none.
     pub plain_n_s_per_m: Rows,
-    pub has_plain_dampers: bool,
+    /// The rows that have one.
+    pub plain_rows: Vec<usize>,
 }
 
 /// A crush zone that takes mass of its body, at the interface with this index and slot.
@@ -77,8 +78,9 @@ pub(super) struct Engine<'a> {
     pub pull: Option<Contacts<'a>>,
     /// Net forces if more than the pushing ones act; for a while their gradient.
     pub net_n: Option<Rows>,
-    /// Of the bodies, where forces depend on them.
+    /// Of the bodies, where forces depend on them, and of the interfaces.
     pub speeds: Rows,
+    pub closing_m_per_s: Rows,
     /// What the speeds multiply the force of each interface by, and the largest forces with it and with plain dampers.
     pub rate_factors: Rows,
     pub peaks_n: Rows,
