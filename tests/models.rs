@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::common::{
-    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, root, says,
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, fixture, root, says,
 };
 use crumple::assess::{Choice, train, validate};
 use crumple::assess::{Purpose, Selection, gaps};
@@ -2051,4 +2051,75 @@ fn the_rebound_is_that_of_the_crush_at_any_mass() {
     let model = train("made", &one, Choice::Kind(ModelKind::nearest())).unwrap();
     predict(&model, &Query::at(48.0 / 3.6)).unwrap();
     assert!(predict(&model, &Query::at(48.1 / 3.6)).is_err());
+}
+
+/// Two designs at each speed: every case is compared, drawn and reported as itself.
+#[test]
+fn cases_of_one_speed_are_distinguished() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let mut study =
+        "[study]\nname = \"two\"\nunits = \"mm-t-s\"\ngroup = \"two\"\nkind = \"wall\"\n[recipe]\n\
+        deflection = { file = \"nodout\", node = 900001, component = \"x_displacement\" }\n\
+        force = { file = \"rwforc\", id = 1, component = \"normal_force\" }\n\
+        filter = \"none\"\nsampling = { states = 400, interval_ms = 0.75 }\n"
+            .to_string();
+    for (group, wall_mm) in [("lead-car-wall", 9.5), ("lead-car-b-wall", 8.075)] {
+        for speed in [36, 48, 60] {
+            let run = fixture(&format!("fe/{group}")).join(format!("{speed}kmh"));
+            study += &format!(
+                "[[run]]\npath = {run:?}\nname = \"{group}-{speed}\"\nspeed = \"{speed}km/h\"\nmass = \"24t\"\nparameters = {{ wall_mm = {wall_mm} }}\n"
+            );
+        }
+    }
+    std::fs::write(here.join("study.toml"), study).unwrap();
+    crumple_ok(here, "build study.toml -o two.h5 -q");
+    let compared: Value =
+        serde_json::from_str(&crumple_ok(here, "compare two.h5 --nsdm-seeds 0 --json -q")).unwrap();
+    let names = compared["comparisons"].as_array().unwrap().iter().map(|c| c["case"].as_str());
+    let names: Vec<&str> = names.map(Option::unwrap).collect();
+    assert_eq!(names, ["lead-car-b-wall-48", "lead-car-wall-48"]);
+    let said = crumple_ok(here, "compare two.h5 --nsdm-seeds 0 --speed 48km/h");
+    says(&said, "two at 48 km/h (wall), lead-car-wall-48, left out; FE: peak force 4.199 MN");
+    says(&said, "means over 48 km/h (lead-car-b-wall-48), 48 km/h (lead-car-wall-48), each left");
+    says(
+        &crumple_ok(here, "validate two.h5"),
+        "mean errors over 2 cases of 1 inner speed left out",
+    );
+    let drawn = |line: &str| {
+        crumple_ok(here, &format!("plot {line} -o drawn.svg --overwrite -q"));
+        std::fs::read_to_string(here.join("drawn.svg")).unwrap()
+    };
+    for name in ["lead-car-b-wall-48", "lead-car-wall-48"] {
+        says(
+            &drawn(&format!("two.h5 --left-out 48km/h --case {name}")),
+            &format!("FE at 48 km/h ({name})"),
+        );
+    }
+    let output = crumple_in(here, "plot two.h5 --left-out 48km/h -o drawn.svg --overwrite");
+    let warned = String::from_utf8(output.stderr).unwrap();
+    says(&warned, "several cases, of which lead-car-b-wall-48 is drawn: choose by --case among");
+    let error = crumple_fails(here, 2, "plot two.h5 --left-out 48km/h --case other -o drawn.svg");
+    says(&error, "--case other: at 48 km/h there is lead-car-b-wall-48, lead-car-wall-48");
+    // A model's curve stands beside runs of its own design.
+    crumple_ok(here, "train two.h5 --model extra -o two.model -q");
+    let picture = drawn("two.model --speed 40km/h --parameter wall_mm=9.5");
+    says(&picture, ", wall_mm = 9.5");
+    let run = |name: &str| {
+        let path = here.join("run.csv");
+        crumple_ok(here, &format!("export two.h5 --case {name} -o run.csv --overwrite -q"));
+        std::fs::read_to_string(path).unwrap()
+    };
+    assert_ne!(run("lead-car-wall-48"), run("lead-car-b-wall-48"));
+    let other = drawn("two.model --speed 40km/h --parameter wall_mm=8.075");
+    let of_run = |picture: &str| {
+        let begin = picture.find("FE at 48 km/h").unwrap();
+        picture[begin..].split("<path d=\"").nth(1).unwrap().split('"').next().unwrap().to_string()
+    };
+    assert_ne!(of_run(&picture), of_run(&other), "the runs are those of the two designs");
+    // The report names the case and takes the parameters of a run.
+    crumple_ok(here, "report two.h5 -o two.html -q");
+    let report = std::fs::read_to_string(here.join("two.html")).unwrap();
+    says(&report, "Of the inner speeds, 48 km/h (lead-car-");
+    says(&report, "the run nearest in speed.");
 }

@@ -67,7 +67,10 @@ fn texts_of_all_charts_are_free() {
     }
     let cases = database.cases("lead-car-wall");
     let chosen = Choice::Kind(crumple::surrogate::ModelKind::linear());
-    check(&charts::left_out_at("lead-car-wall", cases, 48.0 / 3.6, chosen).unwrap(), "left out");
+    check(
+        &charts::left_out_at("lead-car-wall", cases, (48.0 / 3.6, None), chosen).unwrap(),
+        "left out",
+    );
     let model = Model::read(&folder.join("lead.model")).unwrap();
     for speed in [12.0, 50.0, 71.0, 80.0] {
         let curve =

@@ -187,7 +187,11 @@ fn what_has_no_effect_is_refused() {
     refused(SCENARIO, &by("\"soft\""), "another variable replaces curve \"nose\" in every item");
     let both = by("\"soft\", \"nose\"");
     folder.put("s.toml", &format!("{SCENARIO}[sweep]\nvary = [ {{ {both} }} ]\n"));
-    folder.ok("sweep s.toml -q --dry-run");
+    let said = crumple_in(folder.0.path(), "sweep s.toml --dry-run");
+    says(
+        &String::from_utf8(said.stderr).unwrap(),
+        "the force of curve \"nose\" is varied, but has no effect in rows with soft in its place",
+    );
     assert_eq!(folder.names(), Vec::<String>::new());
 }
 

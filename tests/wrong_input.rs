@@ -327,7 +327,9 @@ fn outputs_replace_no_other_kind_of_file() {
     let folder = demo_folder();
     let here = folder.path();
     let nodout = fixture("fe/lead-car-wall/25kmh/nodout");
-    fs::copy(nodout, here.join("kept")).unwrap();
+    fs::copy(&nodout, here.join("kept")).unwrap();
+    fs::copy(&nodout, here.join("other.csv")).unwrap();
+    fs::copy(here.join("lead.model"), here.join("cases.csv")).unwrap();
     fs::write(here.join("own.csv"), "t_s,a_g\n0,1\n").unwrap();
     let before = |name: &str| fs::read(here.join(name)).unwrap();
     for (line, name, what) in [
@@ -347,6 +349,8 @@ fn outputs_replace_no_other_kind_of_file() {
         ("export lead.model --to table -o curves.h5", "curves.h5", "an HDF5 file"),
         ("export lead50.json --to lsdyna --units mm-t-s -o kept", "kept", "a solver's file"),
         ("report curves.h5 -o lead.model", "lead.model", "a model"),
+        ("histories fe/lead-car-wall/25kmh/rwforc -o other.csv", "other.csv", "a solver's file"),
+        ("db export curves.h5 -o .", "./cases.csv", "a model"),
     ] {
         let old = before(name);
         let words: Vec<&str> = line.split(' ').collect();
@@ -360,6 +364,10 @@ fn outputs_replace_no_other_kind_of_file() {
         }
     }
     // Its own kind is replaced as before.
+    for _ in 0..2 {
+        crumple_ok(here, "db export curves.h5 -o tables -q");
+        crumple_ok(here, "histories fe/lead-car-wall/25kmh/rwforc -o own-histories.csv");
+    }
     let train = ["train", "curves.h5", "--group", "lead-car-wall", "--model", "linear", "-o"];
     crumple_ok(here, &[&train[..], &["lead.model"]].concat());
     // A demo keeps scenarios that were edited.

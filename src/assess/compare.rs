@@ -86,13 +86,16 @@ pub(crate) struct NsdmFit {
     pub law: Nsdm,
 }
 
-/// The speeds of a group that lie between others, for a comparison at each, in m/s, and the names of the cases there that ended while
-/// loading and cannot serve as a reference. The speed of a fixed curve, in m/s, is not one of them.
-pub(crate) fn inner_speeds(
+/// Which cases a comparison leaves out: indices among those of a group's training set; and the names of the inner cases that ended
+/// while loading and cannot serve as a reference.
+pub(crate) type Compared = (Vec<usize>, Vec<String>);
+
+/// The cases of a group whose speeds lie between others. The speed of a fixed curve, in m/s, is not one of them.
+pub(crate) fn inner_cases(
     group: &str,
     cases: &[Case],
     fixed_m_per_s: Option<f64>,
-) -> Result<(Vec<f64>, Vec<String>), Error> {
+) -> Result<Compared, Error> {
     let set = TrainingSet::new(group, cases)?;
     let mut speeds = set.speeds_m_per_s();
     speeds.dedup_by(|a, b| is_same_speed(*a, *b));
@@ -101,28 +104,43 @@ pub(crate) fn inner_speeds(
     }
     let ends = [speeds[0], speeds[speeds.len() - 1]];
     let is_inner = |v: f64| ends.iter().chain(&fixed_m_per_s).all(|s| !is_same_speed(*s, v));
-    let inner = set.cases.iter().filter(|case| is_inner(case.speed_m_per_s));
-    let (cut, whole): (Vec<_>, Vec<_>) = inner.partition(|case| case.truncated);
-    let mut speeds: Vec<f64> = whole.iter().map(|case| case.speed_m_per_s).collect();
-    speeds.dedup_by(|a, b| is_same_speed(*a, *b));
-    let cut: Vec<String> = cut.iter().map(|case| case.name.clone()).collect();
-    if speeds.is_empty() && cut.is_empty() {
+    let inner = (0..set.cases.len()).filter(|&k| is_inner(set.cases[k].speed_m_per_s));
+    let (cut, whole): (Vec<usize>, Vec<usize>) = inner.partition(|&k| set.cases[k].truncated);
+    let cut: Vec<String> = cut.into_iter().map(|k| set.cases[k].name.clone()).collect();
+    if whole.is_empty() && cut.is_empty() {
         return Err(error!(
             Comparison,
             "the fixed curve is that of the only inner speed: choose another one"
         ));
     }
-    if speeds.is_empty() {
+    if whole.is_empty() {
         return Err(error!(
             Comparison,
             "all cases of inner speeds ended while loading ({}): none can serve as the reference",
             cut.join(", ")
         ));
     }
-    Ok((speeds, cut))
+    Ok((whole, cut))
 }
 
-/// Compares the methods at `speed_m_per_s`, with that speed's case left out of training.
+/// The cases of a group at a speed in m/s.
+pub(crate) fn cases_at(group: &str, cases: &[Case], speed_m_per_s: f64) -> Result<Compared, Error> {
+    let set = TrainingSet::new(group, cases)?;
+    let is_there = |&k: &usize| is_same_speed(set.cases[k].speed_m_per_s, speed_m_per_s);
+    let there: Vec<usize> = (0..set.cases.len()).filter(is_there).collect();
+    if there.is_empty() {
+        return Err(no_case(group, speed_m_per_s, &set));
+    }
+    Ok((there, Vec::new()))
+}
+
+/// The case of a name.
+pub(crate) fn case_named(group: &str, cases: &[Case], name: &str) -> Result<Option<usize>, Error> {
+    let set = TrainingSet::new(group, cases)?;
+    Ok(set.cases.iter().position(|case| case.name == name))
+}
+
+/// Compares the methods by the training set's case `index`, with the cases of its speed left out of training.
 ///
 /// The model is one body against a wall, with the effective mass of the case; the
 /// reference is FE's rate of deflection. Accelerations are central differences over the
@@ -130,11 +148,11 @@ pub(crate) fn inner_speeds(
 pub(crate) fn compare(
     group: &str,
     cases: &[Case],
-    speed_m_per_s: f64,
+    index: usize,
     settings: &ComparisonSettings,
 ) -> Result<Comparison, Error> {
     let set = TrainingSet::new(group, cases)?;
-    let left_out = left_out_at(speed_m_per_s, &set)?;
+    let left_out = left_out(index, &set)?;
     let LeftOutCase { case, rest, reference, .. } = &left_out;
     let speed = case.conditions.speed.m_per_s;
     let fixed = fixed_case(group, rest, speed, settings)?;
@@ -162,7 +180,7 @@ pub(crate) fn compare(
         report = Some(nsdm_report(&fitted, fixed_case, reference, settings)?);
     }
     compared.push(rows.row(methods::ddtcm(&left_out, settings.seed)?)?);
-    let is_other = |c: &&Case| !is_same_speed(c.conditions.speed.m_per_s, speed_m_per_s);
+    let is_other = |c: &&Case| !is_same_speed(c.conditions.speed.m_per_s, speed);
     let others: Vec<Case> = cases.iter().filter(is_other).cloned().collect();
     compared.push(rows.row(methods::best(&left_out, group, &others, settings.seed)?)?);
 
@@ -190,13 +208,8 @@ pub(crate) fn mean(comparisons: &[Comparison], method: &str, of: impl Fn(&Row) -
     rows().map(of).sum::<f64>() / rows().count() as f64
 }
 
-/// The case at `speed_m_per_s`, left out of the group; at least two others must remain.
-fn left_out_at<'a>(speed_m_per_s: f64, set: &'a TrainingSet) -> Result<LeftOutCase<'a>, Error> {
-    let index = set
-        .cases
-        .iter()
-        .position(|c| is_same_speed(c.speed_m_per_s, speed_m_per_s))
-        .ok_or_else(|| no_case(&set.group, speed_m_per_s, set))?;
+/// The case `index`, left out of the group; at least two others must remain.
+fn left_out(index: usize, set: &TrainingSet) -> Result<LeftOutCase<'_>, Error> {
     let too_few = || too_few(set.cases.len());
     if set.cases.len() < 3 {
         return Err(too_few());

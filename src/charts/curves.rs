@@ -5,7 +5,7 @@ use crate::assess::left_out::query_of;
 use crate::assess::reference::Reference;
 use crate::assess::validate::{Choice, train};
 use crate::curve::{Case, CurveUnloading, ForceCurve, ForceKind};
-use crate::dataset::{TrainingSet, is_same_speed};
+use crate::dataset::{TrainingCase, TrainingSet, is_same_speed};
 use crate::error::{Error, error};
 use crate::plot::{self, Axis, Chart, Mark, Panel, Series, Shown};
 use crate::surrogate::band::{Band, LeftOutSpeeds};
@@ -97,7 +97,7 @@ pub(crate) fn file_curve(title: &str, name: &str, deflection_m: &[f64], force_n:
 
 /// A predicted curve with its band, over the training curves next to its speed.
 ///
-/// `neighbours` are a model's cases; the nearest below and above are drawn, or the two nearest outside of all.
+/// `neighbours` are cases of its parameters; the nearest below and above are drawn, or the two nearest outside of all.
 pub fn prediction(curve: &PredictedCurve, neighbours: &[ModelCase]) -> Chart {
     let v = curve.speed_m_per_s;
     let mut panel = axes(largest(&curve.force_n));
@@ -216,6 +216,8 @@ fn band_name(curve: &PredictedCurve) -> String {
 pub(crate) struct LeftOutPrediction<'a> {
     /// The run that was left out.
     pub case: &'a Case,
+    /// What distinguishes it from others of its speed, after a blank; empty if nothing does.
+    pub which: &'a str,
     /// What the others predict for its speed.
     pub curve: &'a PredictedCurve,
     /// Times in s and closing speeds in m/s of one mass that the predicted curve stops.
@@ -223,11 +225,12 @@ pub(crate) struct LeftOutPrediction<'a> {
 }
 
 /// A left-out run with its prediction: force over deflection, and the speed over time.
-pub(crate) fn left_out(LeftOutPrediction { case, curve, motion }: LeftOutPrediction) -> Chart {
+pub(crate) fn left_out(of: LeftOutPrediction) -> Chart {
+    let LeftOutPrediction { case, which, curve, motion } = of;
     let kind = curve.provenance.force_kind;
     let mut forces = axes(largest(&curve.force_n).max(case.peak_force_n()));
     forces.title = format!("{} force", kind.name());
-    let fe = format!("FE at {}", speed(case.conditions.speed.m_per_s));
+    let fe = format!("FE at {}{which}", speed(case.conditions.speed.m_per_s));
     if let Some((d, f)) = both_ways(case, kind) {
         forces.series.push(Series::line(&fe, 0, d, f));
     }
@@ -255,7 +258,7 @@ pub(crate) fn left_out(LeftOutPrediction { case, curve, motion }: LeftOutPredict
         panels.push(speeds);
     }
     let title = format!(
-        "{}: {} left out and predicted by {}",
+        "{}: {}{which} left out and predicted by {}",
         case.id.group,
         speed(case.conditions.speed.m_per_s),
         curve.model
@@ -263,22 +266,24 @@ pub(crate) fn left_out(LeftOutPrediction { case, curve, motion }: LeftOutPredict
     Chart::row(&title, panels)
 }
 
-/// Trains the model of `choice` on the runs at other speeds, predicts the curve at `speed_m_per_s`, lets its body force (or its
-/// only force) stop one mass, and draws both with the run.
+/// Trains the model of `choice` on the runs at other speeds, predicts the curve at a speed in m/s, lets its body force (or its
+/// only force) stop one mass, and draws both with the run: that of the name, or the first one at the speed.
 ///
 /// # Errors
 /// If there is no such run, or the others are too few.
 pub fn left_out_at(
     group: &str,
     cases: &[Case],
-    speed_m_per_s: f64,
+    (speed_m_per_s, name): (f64, Option<&str>),
     choice: Choice,
 ) -> Result<Chart, Error> {
     let is_that = |case: &&Case| is_same_speed(case.conditions.speed.m_per_s, speed_m_per_s);
     let set = TrainingSet::new(group, cases)?;
     // Several runs of that speed are one case, their mean.
-    let mut own = set.cases.iter().map(|own| &*own.case);
-    let Some(case) = own.find(is_that) else {
+    let own: Vec<&TrainingCase> =
+        set.cases.iter().map(|own| &**own).filter(|own| is_that(&&*own.case)).collect();
+    let named = own.iter().find(|own| Some(&*own.name) == name).or(own.first());
+    let Some(TrainingCase { case, runs, name, .. }) = named.copied() else {
         let speeds: Vec<String> =
             cases.iter().map(|c| km_per_h(c.conditions.speed.m_per_s)).collect();
         let known = speeds.join(", ");
@@ -293,7 +298,12 @@ pub fn left_out_at(
     let curve = predict(&model, &query_of(case, &model))?;
     let run = Reference::of(case)?.run(&curve.driving(moving_force(&curve))?)?;
     let motion = Some((&run.time_s[..], &run.bodies[0].v_m_per_s[..]));
-    Ok(left_out(LeftOutPrediction { case, curve: &curve, motion }))
+    let which = match (runs.len(), own.len()) {
+        (1, 1) => String::new(),
+        (1, _) => format!(" ({name})"),
+        (runs, _) => format!(" (mean of {runs})"),
+    };
+    Ok(left_out(LeftOutPrediction { case, which: &which, curve: &curve, motion }))
 }
 
 /// The force that moves one mass, or the only one there is.

@@ -51,6 +51,12 @@ pub(crate) fn sweep(
             let found = names.iter().map(|name| {
                 let of =
                     varied.iter().find(|column| column.name == *name || bare(&column.name) == name);
+                if columns.curves.contains(name) {
+                    return Err(error!(
+                        Plot,
+                        "{name} is a choice of curves, and only numbers are an axis: plot the rows of each curve apart"
+                    ));
+                }
                 of.copied().ok_or_else(|| unknown("varied quantity", name, varied.iter().copied()))
             });
             found.collect::<Result<_, _>>()?
@@ -291,7 +297,7 @@ fn add_share(
     });
     let (shares, (low, high)): (Vec<f64>, (Vec<f64>, Vec<f64>)) = shares.unzip();
     panel.y = Axis::new("share of runs over a limit", "%", 1e2).over(0.0, 1.0);
-    let (name, x) = ("95 % confidence interval".into(), middles.clone());
+    let (name, x) = ("95 % confidence interval, of random draws".into(), middles.clone());
     panel.bands.push(Band { name, look: 0, x, low, high, is_stacked: false });
     panel.series.push(Series::line("known to be over a limit", 0, middles, shares));
 }

@@ -9,6 +9,7 @@ use crate::assess::train::{TrainComparison, TrainRow, compare_train};
 use crate::assess::{ComparisonSettings, Row};
 use crate::curve::ForceKind;
 use crate::database::Database;
+use crate::dataset::TrainingSet;
 use crate::nsdm::Start;
 use crate::plural::counted;
 use crate::rating::Rating;
@@ -91,9 +92,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     };
     let database = Database::read(path)?;
     let (group, cases) = database.group_or_only(path, args.group.as_deref())?;
-    let (speeds, cut) = match args.speed {
-        Some(speed) => (vec![speed], Vec::new()),
-        None => compare::inner_speeds(group, cases, args.fixed_speed)?,
+    let (compared, cut) = match args.speed {
+        Some(speed) => compare::cases_at(group, cases, speed)?,
+        None => compare::inner_cases(group, cases, args.fixed_speed)?,
     };
     for case in &cut {
         options.warn(&format!(
@@ -102,9 +103,10 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     }
     let bar = Bar::new(options, "comparing");
     let mut comparisons = Vec::new();
-    for speed in speeds {
-        bar.step(&format!("comparing at {}", km_per_h(speed)));
-        comparisons.push(compare::compare(group, cases, speed, &settings)?);
+    let speeds = TrainingSet::new(group, cases)?.speeds_m_per_s();
+    for index in compared {
+        bar.step(&format!("comparing at {}", km_per_h(speeds[index])));
+        comparisons.push(compare::compare(group, cases, index, &settings)?);
     }
     drop(bar);
     let inner = comparisons.iter().all(|c| c.inner);
@@ -112,7 +114,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         options.warn("the left-out speed is an end of the range: the models extrapolate");
     }
     if let (Some(_), [comparison]) = (args.speed, &comparisons[..]) {
-        options.show(comparison, |out| print(out, comparison))?;
+        options.show(comparison, |out| print(out, comparison, true))?;
     } else {
         several(&comparisons, options)?;
     }
@@ -123,7 +125,9 @@ fn percent(error: f64) -> String {
     format!("{:.2} %", error * 100.0)
 }
 
-fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
+fn print(out: &mut dyn Write, comparison: &Comparison, is_alone: bool) -> io::Result<()> {
+    // Where a speed has several cases, which one it is.
+    let case = if is_alone { String::new() } else { format!(", {}", comparison.case) };
     let mut more = comparison.fe_time_s.map_or(String::new(), |t| format!(", run in {t:.0} s"));
     if comparison.window_is_cut {
         let window_ms = comparison.window_s * 1e3;
@@ -131,7 +135,7 @@ fn print(out: &mut dyn Write, comparison: &Comparison) -> io::Result<()> {
     }
     writeln!(
         out,
-        "{} at {} ({}), left out; FE: peak force {}, max crush {:.4} m{more}",
+        "{} at {} ({}){case}, left out; FE: peak force {}, max crush {:.4} m{more}",
         comparison.group,
         km_per_h(comparison.speed_m_per_s),
         comparison.speed_kind.name(),
@@ -243,11 +247,17 @@ fn several(comparisons: &[Comparison], options: GlobalOptions) -> CommandResult 
     });
     let means: Vec<_> = means.collect();
     options.show(&document! { comparisons: comparisons, means: &means }, |out| {
+        let at = |c: &Comparison| km_per_h(c.speed_m_per_s);
+        let is_alone = |c: &Comparison| comparisons.iter().filter(|o| at(o) == at(c)).count() == 1;
+        let named = |c: &Comparison| match is_alone(c) {
+            true => at(c),
+            false => format!("{} ({})", at(c), c.case),
+        };
         for comparison in comparisons {
-            print(out, comparison)?;
+            print(out, comparison, is_alone(comparison))?;
             writeln!(out)?;
         }
-        let speeds: Vec<String> = comparisons.iter().map(|c| km_per_h(c.speed_m_per_s)).collect();
+        let speeds: Vec<String> = comparisons.iter().map(named).collect();
         let group = comparisons.first().map_or("", |c| &c.group);
         writeln!(out, "{group}: means over {}, each left out in turn", speeds.join(", "))?;
         let table = Table::of(&means)
@@ -266,7 +276,7 @@ fn several(comparisons: &[Comparison], options: GlobalOptions) -> CommandResult 
             let held = comparisons.iter().filter(|c| {
                 c.rows.iter().any(|row| row.method == *m.method && row.held_from_m().is_some())
             });
-            let speeds: Vec<String> = held.map(|c| km_per_h(c.speed_m_per_s)).collect();
+            let speeds: Vec<String> = held.map(named).collect();
             if !speeds.is_empty() {
                 writeln!(
                     out,

@@ -11,7 +11,7 @@ use crate::history_hdf5::{Storage, Trouble, can_stream, convert, encode_in};
 use crate::solver::{self, Access, Blocks, Selection, SolverFile, WantedId, decks};
 use crate::unit::UnitSystem;
 
-use super::arguments::{selection, units};
+use super::arguments::{FileKind, selection, units};
 use super::output::{self, Bar};
 use super::{CommandResult, Failure, GlobalOptions, is_stdout, keep_input, usage};
 
@@ -134,6 +134,11 @@ fn is_hdf5(args: &Args, output: Option<&Path>, options: GlobalOptions) -> Result
                 "{} is an HDF5 file without histories, such as a curve database: name another file, or replace it with --overwrite",
                 output.display()
             ));
+        }
+        let is_hdf5 = output.extension().is_some_and(|e| e != "csv");
+        let own = if is_hdf5 { FileKind::Database } else { FileKind::Result };
+        if !args.force {
+            options.keep_others(output, own)?;
         }
     }
     let extension = output.and_then(Path::extension).and_then(|e| e.to_str());

@@ -9,6 +9,7 @@ use crate::assess::validate::Choice;
 use crate::charts::{self, Motion, Quantity};
 use crate::curve::{ForceKind, Parameter};
 use crate::database::Database;
+use crate::dataset::{TrainingSet, is_same_speed};
 use crate::file::{self, write_all_whole};
 use crate::formats::read::{self, json};
 use crate::formats::{ReadOptions, run_table};
@@ -56,6 +57,9 @@ pub(super) struct Args {
     /// Of a database: leave this speed out, predict it from the others, and compare
     #[arg(long, value_parser = arguments::speed, value_name = "SPEED", conflicts_with = "force")]
     left_out: Option<f64>,
+    /// Of a database: which case is left out, where several have the speed
+    #[arg(long, requires = "left_out")]
+    case: Option<String>,
     /// Of a model: speed of the curve
     #[arg(long, value_parser = arguments::speed)]
     speed: Option<f64>,
@@ -306,7 +310,22 @@ fn of_database(args: &Args, file: &Path, options: GlobalOptions) -> Result<Chart
     };
     let _bar = Bar::new(options, "leaving the speed out");
     let choice = Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None };
-    Ok(charts::left_out_at(group, cases, speed, choice)?)
+    let set = TrainingSet::new(group, cases)?;
+    let there = set.cases.iter().filter(|case| is_same_speed(case.speed_m_per_s, speed));
+    let names: Vec<&str> = there.map(|case| &*case.name).collect();
+    let named = args.case.as_deref();
+    if let Some(name) = named.filter(|name| !names.contains(name)) {
+        let at = km_per_h(speed);
+        return usage(format!("--case {name}: at {at} there is {}", names.join(", ")));
+    }
+    if let (None, [first, _, ..]) = (named, &names[..]) {
+        options.warn(&format!(
+            "at {} there are several cases, of which {first} is drawn: choose by --case among {}",
+            km_per_h(speed),
+            names.join(", ")
+        ));
+    }
+    Ok(charts::left_out_at(group, cases, (speed, named), choice)?)
 }
 
 /// A model's curve over its neighbours.
@@ -314,8 +333,12 @@ fn of_model(args: &Args, file: &Path) -> Result<Chart, Failure> {
     let model = Model::read(file)?;
     let Some(speed) = args.speed else { return Err(speed_of_model(&model)) };
     let parameters = arguments::parameters(&args.parameter)?;
+    let named: Vec<String> =
+        parameters.iter().map(|(name, value)| format!(", {name} = {value}")).collect();
     let query = Query { parameters, ..Query::at(speed) };
-    of_force(args, predict(&model, &query)?, &model.cases)
+    let mut chart = of_force(args, predict(&model, &query)?, &query.runs_of(&model))?;
+    chart.title += &named.concat();
+    Ok(chart)
 }
 
 /// A curve, or its part of one force.

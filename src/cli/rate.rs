@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use super::arguments::{FileKind, one_of};
 use super::{
-    CommandResult, Failure, GlobalOptions, Outcome, failed, failed_at, output, usage, usage_error,
+    CommandResult, Failure, GlobalOptions, Outcome, failed_at, output, usage, usage_error,
 };
 use crate::charts::Motion;
-use crate::error::Error;
+use crate::error::{Error, error};
 use crate::history::time_gaps;
 use crate::multibody::STANDARD_GRAVITY_M_PER_S2;
 use crate::rating::acceptance::{ACCEPTANCE, RunAcceptance, STANDARD, StageAcceptance, accept};
@@ -82,6 +82,11 @@ struct SignalOptions {
     /// Kind of the solver files (nodout, rcforc, …), if not recognised by their content
     #[arg(long)]
     format: Option<String>,
+}
+
+/// A failure to rate with a message of the command's own.
+fn failed(message: String) -> Failure {
+    error!(Rating, "{message}").into()
 }
 
 /// Where one signal stands, as it is written on the command line.

@@ -15,4 +15,4 @@ pub(crate) use croissant::FILE as DESCRIPTION;
 pub(crate) use join::{Joined, JoinedCase, OnConflict, copy, merge};
 pub(crate) use labels::{Labels, label, remove, rename_case, rename_group};
 pub(crate) use selection::{Selection, SpeedRange};
-pub(crate) use tables::{Difference, compare, write_tables};
+pub(crate) use tables::{Difference, TABLES, compare, write_tables};

@@ -16,6 +16,9 @@ use crate::file::{not_written, write_at};
 use crate::signal::l1_ratio;
 use crate::unit::SpeedKind;
 
+/// Names of the tables, the last one on demand.
+pub(crate) const TABLES: [&str; 3] = ["cases.csv", "curves.csv", "originals.csv"];
+
 /// Writes the tables of cases into the folder at `path`, which is created if it does not exist; returns
 /// their paths: `cases.csv` and `curves.csv`, the curves at their common interval, and with `originals`
 /// those at the solver's rate. Numbers have as many digits as they need to be read back the same; what a case
@@ -47,10 +50,10 @@ pub(crate) fn write_tables(
         written.push(path);
         Ok::<(), Error>(())
     };
-    table("cases.csv", &|out| write_cases(out, cases))?;
-    table("curves.csv", &|out| write_sampled(out, cases))?;
+    table(TABLES[0], &|out| write_cases(out, cases))?;
+    table(TABLES[1], &|out| write_sampled(out, cases))?;
     if originals {
-        table("originals.csv", &|out| write_originals(out, cases))?;
+        table(TABLES[2], &|out| write_originals(out, cases))?;
     }
     if let Some(name) = described_as {
         written.push(croissant::describe(name, cases, &written)?);

@@ -180,7 +180,9 @@ impl Findings<'_> {
             if let Some(hashes) = &hashes
                 && hashes.get(path).is_none_or(|hash| *hash != layout::hash_of(&values))
             {
-                let odd = least_like_neighbours(&values);
+                // A value that is not a number is named already.
+                let is_known = values.iter().all(|v| v.is_finite());
+                let odd = least_like_neighbours(&values).filter(|_| is_known);
                 let which = odd.map_or(String::new(), |i| {
                     format!(
                         "; the one that fits its neighbours least is {path}[{i}] = {}",

@@ -126,7 +126,10 @@ pub(crate) fn feature_values(
         };
         let name = &feature.parameter;
         if name == MASS {
-            return error!(Dataset, "the model needs {name}, the mass of the body: give --mass");
+            return error!(
+                Dataset,
+                "the model needs {name}, the mass of the body: give --mass, or --parameter {name}=…"
+            );
         }
         error!(
             Dataset,

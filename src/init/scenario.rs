@@ -156,9 +156,11 @@ fn curve(
 /// The middle one of the training speeds.
 fn speed(model: &Model) -> Proposed<f64> {
     let (low, high) = model.range_m_per_s();
+    let mut speeds: Vec<f64> = model.cases.iter().map(|case| case.speed_m_per_s).collect();
+    speeds.dedup();
     let from = format!(
         "one of the {} training speeds, which go from {} to {} ({} speeds)",
-        model.cases.len(),
+        speeds.len(),
         km_per_h(low),
         km_per_h(high),
         model.speed_kind.name()

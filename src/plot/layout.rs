@@ -22,6 +22,8 @@ const LOW: f64 = 160.0;
 const NUMBER_GAP: f64 = 14.0;
 /// Between markers along a line, in pixels.
 const MARKER_STEP: f64 = 90.0;
+/// Of at most so many points each has a marker.
+const FEW_POINTS: usize = 12;
 /// A number for which there is always room, so that a page can zoom.
 const USUAL: &str = "0.000";
 /// Smallest width of the area between the axes where there is another beside it.
@@ -304,7 +306,11 @@ fn draw_series(
     };
     let parts = thin::clipped_line(&points, place.area);
     let lines: Vec<Vec<(f64, f64)>> = parts.iter().map(|part| thin::thinned(part)).collect();
-    let at = along(&lines, series.look);
+    // Of so few points each could be taken for one that a marker between them is not.
+    let at: Vec<(f64, f64)> = match points.len() {
+        ..=FEW_POINTS => points.into_iter().filter(|p| thin::holds(place.area, *p)).collect(),
+        _ => along(&lines, series.look),
+    };
     shapes.push(path(lines, stroke, shows));
     if series.shown == Shown::Line && !at.is_empty() {
         shapes.push(markers(series.look, &at, shows));

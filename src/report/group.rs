@@ -6,7 +6,8 @@ use super::{
     mass, metres, percent, signed_percent,
 };
 use crate::assess::choose::{Purpose, Selection, next_run};
-use crate::assess::compare::{Comparison, compare, inner_speeds, mean};
+use crate::assess::compare::{Comparison, case_named, compare, inner_cases, mean};
+use crate::assess::left_out::query_of;
 use crate::assess::validate::{Choice, acceptance, train_chosen, validate};
 use crate::assess::{ComparisonSettings, Row};
 use crate::charts;
@@ -212,11 +213,13 @@ impl Validated<'_> {
         let Some(worst) = self.worst() else { return };
         let mut kinds = ModelKind::all(settings.seed).into_iter();
         let Some(kind) = kinds.find(|kind| kind.name() == validation.chosen) else { return };
-        match charts::left_out_at(group, cases, worst.speed_m_per_s, Choice::Kind(kind)) {
+        let (speed, name) = (worst.speed_m_per_s, Some(&*worst.case));
+        match charts::left_out_at(group, cases, (speed, name), Choice::Kind(kind)) {
             Ok(chart) => {
                 parts.push(Part::Text(format!(
-                    "Of the inner speeds, {} has the largest force error, {}. This is its prediction when left out:",
+                    "Of the inner speeds, {} ({}) has the largest force error, {}. This is its prediction when left out:",
                     km_per_h(worst.speed_m_per_s),
+                    worst.case,
                     percent(worst.force_l1)
                 )));
                 parts.push(Part::Figure(Figure::new(self.id("left-out"), chart)));
@@ -260,9 +263,22 @@ impl Validated<'_> {
         };
         let mut predicted = None;
         parts.push(Part::Heading(format!("Predicted curve at {}", km_per_h(speed))));
-        match predict(&model, &Query::at(speed)) {
+        // Of a model that sees more than the speed, with the parameters of the run nearest in speed.
+        let apart = |case: &&Case| (case.conditions.speed.m_per_s - speed).abs();
+        let nearest = cases.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+        let of_run = nearest.filter(|_| !model.features.is_empty());
+        let query = match of_run {
+            Some(run) => {
+                let text =
+                    format!("With the parameters of {}, the run nearest in speed.", run.id.name);
+                parts.push(Part::Text(text));
+                Query { speed_m_per_s: speed, extrapolate: false, ..query_of(run, &model) }
+            }
+            None => Query::at(speed),
+        };
+        match predict(&model, &query) {
             Ok(curve) => {
-                self.add_curve(parts, &model, &curve);
+                self.add_curve(parts, (&model, &query), &curve);
                 for warning in &curve.warnings {
                     let about = format!("{title}, prediction at {}", km_per_h(speed));
                     content.warn(ToDo::AddRuns, &about, warning.to_string());
@@ -283,8 +299,13 @@ impl Validated<'_> {
         Ok(predicted)
     }
 
-    fn add_curve(&self, parts: &mut Vec<Part>, model: &Model, curve: &PredictedCurve) {
-        let chart = charts::prediction(curve, &model.cases);
+    fn add_curve(
+        &self,
+        parts: &mut Vec<Part>,
+        (model, query): (&Model, &Query),
+        curve: &PredictedCurve,
+    ) {
+        let chart = charts::prediction(curve, &query.runs_of(model));
         parts.push(Part::Figure(Figure::new(self.id("prediction"), chart)));
         let mut rows = vec![
             ("model".to_string(), curve.model.clone()),
@@ -317,21 +338,23 @@ impl Validated<'_> {
     /// FE, FDRM, NSDM, DDTCM and the best model at the inner speeds, left out in turn.
     fn add_methods(&self, parts: &mut Vec<Part>, settings: &ReportSettings) -> Result<(), Error> {
         let Self { group, cases, .. } = self;
-        let speeds = match settings.methods {
-            MethodSpeeds::None => Vec::new(),
-            MethodSpeeds::Worst => self.worst().map(|row| row.speed_m_per_s).into_iter().collect(),
-            MethodSpeeds::All => {
-                inner_speeds(group, cases, None).map(|(speeds, _)| speeds).unwrap_or_default()
+        let compared = match (settings.methods, self.worst()) {
+            (MethodSpeeds::Worst, Some(row)) => {
+                case_named(group, cases, &row.case)?.into_iter().collect()
             }
+            (MethodSpeeds::All, _) => {
+                inner_cases(group, cases, None).map(|(inner, _)| inner).unwrap_or_default()
+            }
+            _ => Vec::new(),
         };
         let asked = ComparisonSettings {
             seed: settings.seed,
             nsdm_seeds: settings.nsdm_seeds,
             ..ComparisonSettings::default()
         };
-        let comparisons = speeds
-            .iter()
-            .map(|speed| compare(group, cases, *speed, &asked))
+        let comparisons = compared
+            .into_iter()
+            .map(|index| compare(group, cases, index, &asked))
             .collect::<Result<Vec<Comparison>, _>>()?;
         let Some(first) = comparisons.first() else { return Ok(()) };
         let mean = |row: &Row, of: fn(&Row) -> f64| mean(&comparisons, &row.method, of);
@@ -351,7 +374,7 @@ impl Validated<'_> {
                 format!("{passed} of {}", comparisons.len())
             })
             .chosen(|row| row.method == "best");
-        let left_out = left_out_speeds(&speeds);
+        let left_out = left_out_cases(&comparisons);
         parts.push(Part::Heading("Methods".into()));
         parts.push(Part::table(
             format!("{group}: each method in one multi-body model against FE, {left_out}"),
@@ -362,11 +385,11 @@ impl Validated<'_> {
     }
 }
 
-fn left_out_speeds(speeds: &[f64]) -> String {
-    match speeds {
-        [one] => format!("with {} left out", km_per_h(*one)),
+fn left_out_cases(comparisons: &[Comparison]) -> String {
+    match comparisons {
+        [one] => format!("with {} left out ({})", km_per_h(one.speed_m_per_s), one.case),
         several => {
-            format!("means over {}, each left out in turn", counted(several.len(), "inner speed"))
+            format!("means over {}, each left out in turn", counted(several.len(), "inner case"))
         }
     }
 }

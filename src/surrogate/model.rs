@@ -392,7 +392,7 @@ impl Model {
     }
 
     /// Whether a run has the parameters of a query.
-    fn is_alike(&self, case: &ModelCase, at: &QueryPoint<'_>) -> bool {
+    pub(super) fn is_alike(&self, case: &ModelCase, at: &QueryPoint<'_>) -> bool {
         let pairs = self.features.iter().zip(case.features.iter().zip(at.features));
         pairs.into_iter().all(|(feature, (own, asked))| {
             let is_mass = [MASS, OTHER_MASS].contains(&&*feature.parameter);

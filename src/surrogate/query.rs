@@ -53,6 +53,12 @@ impl Query {
     pub fn with_rule(self, rule: MaxCrushRule) -> Self {
         Self { rule: Some(rule), ..self }
     }
+
+    /// The runs of a model that have the parameters of the query: all, if it sees speeds alone.
+    pub(crate) fn runs_of(&self, model: &Model) -> Vec<ModelCase> {
+        let Ok(asked) = ResolvedQuery::new(model, self) else { return Vec::new() };
+        model.cases.iter().filter(|case| model.is_alike(case, &asked.at())).cloned().collect()
+    }
 }
 
 /// A query with everything that follows from it and the model alone.

@@ -35,7 +35,7 @@ use serde::Serialize;
 use crate::error::{Document, Error, KeyPath, error};
 use crate::file;
 use crate::manifest;
-use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName, Spread, USUAL_RESULTS};
+use crate::plan::{Design, Plan, PlanFile, RESULTS, ResultName, Spread, USUAL_RESULTS, Vary, What};
 use crate::scenario::{self, CheckedScenario, Prepared, Scenario, Sources};
 pub use journal::{WriteOptions, merge, write, write_rows};
 pub(crate) use results::ResultColumn;
@@ -183,6 +183,21 @@ impl Sweep {
             base.warnings.extend((!others.is_empty()).then(|| {
                 format!(
                     "the gap of curve \"{curve}\" is varied, but not at {}: there contact, train or vehicle states one",
+                    others.join(", ")
+                )
+            }));
+        }
+        // Where another curve stands in its place, what a row varies of a curve is idle.
+        for vary in plan.vary.iter().filter(|v| [What::Band, What::Force].contains(&v.what)) {
+            let Some(curve) = &vary.curve else { continue };
+            let replaces = |v: &&Vary| v.what == What::Curve && v.curve.as_ref() == Some(curve);
+            let values = plan.vary.iter().find(replaces).and_then(|v| v.values.as_ref());
+            let others = values.into_iter().flatten().filter(|value| value.0 != *curve);
+            let others: Vec<&str> = others.map(|value| &*value.0).collect();
+            base.warnings.extend((!others.is_empty()).then(|| {
+                format!(
+                    "the {} of curve \"{curve}\" is varied, but has no effect in rows with {} in its place: vary it for these, too, or sweep them apart",
+                    vary.what.name(),
                     others.join(", ")
                 )
             }));

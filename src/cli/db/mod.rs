@@ -10,6 +10,7 @@ mod show;
 
 use std::path::{Path, PathBuf};
 
+use super::arguments::FileKind;
 use super::{CommandResult, Failure, GlobalOptions, Outcome, arguments, output, usage};
 use crate::curate::{self, Selection, SpeedRange};
 use crate::curve::Case;
@@ -236,6 +237,9 @@ fn export(args: &ExportArgs, options: GlobalOptions) -> CommandResult {
     let cases: Vec<&Case> = selection.find(&args.database, &database)?;
     let name = args.database.file_stem().unwrap_or_default().to_string_lossy();
     let described_as = args.croissant.then_some(&*name);
+    for name in curate::TABLES {
+        options.keep_others(&args.output.join(name), FileKind::Result)?;
+    }
     let files = curate::write_tables(&cases, &args.output, args.originals, described_as)?;
     let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     let description = args.output.join(curate::DESCRIPTION);
