@@ -449,7 +449,7 @@ fn histories_that_contradict_each_other_are_said() {
         run.force.time = run.force.time.iter().map(|&t| at(t)).collect();
     }
     #[rustfmt::skip]
-    let damages: [(&str, Damage, &str); 13] = [
+    let damages: [(&str, Damage, &str); 14] = [
         ("a state of the force that is wrong", |run| run.force.values[30] *= 4.0, "force: the peak of "),
         ("force 10 ms early", |run| clock(run, |t| t - 0.010), "times: the force starts at -10 ms"),
         ("force 5 ms early", |run| clock(run, |t| t - 0.005), "times: the force starts at -5 ms"),
@@ -483,6 +483,15 @@ fn histories_that_contradict_each_other_are_said() {
                 }
             },
             "contact: the record starts at 2.254 ms, in contact: the first 30.1 mm of the crush (3.4 %) are missing",
+        ),
+        (
+            "a clock that begins elsewhere",
+            |run| {
+                for history in [&mut run.displacement, &mut run.velocity, &mut run.force] {
+                    history.time = history.time.iter().map(|t| t + 0.02).collect();
+                }
+            },
+            "(up to 23.4 %) are missing; the body still has the run's speed, so none are if the clock does not begin at the impact",
         ),
         (
             "output each 6 ms",

@@ -127,11 +127,14 @@ pub(crate) fn inner_cases(
 pub(crate) fn cases_at(group: &str, cases: &[Case], speed_m_per_s: f64) -> Result<Compared, Error> {
     let set = TrainingSet::new(group, cases)?;
     let is_there = |&k: &usize| is_same_speed(set.cases[k].speed_m_per_s, speed_m_per_s);
-    let there: Vec<usize> = (0..set.cases.len()).filter(is_there).collect();
-    if there.is_empty() {
-        return Err(no_case(group, speed_m_per_s, &set));
+    let there = (0..set.cases.len()).filter(is_there);
+    let (cut, whole): (Vec<usize>, Vec<usize>) = there.partition(|&k| set.cases[k].truncated);
+    match (whole.is_empty(), cut.is_empty()) {
+        (true, true) => Err(no_case(group, speed_m_per_s, &set)),
+        // The comparison says why there is none.
+        (true, false) => Ok((cut, Vec::new())),
+        _ => Ok((whole, cut.into_iter().map(|k| set.cases[k].name.clone()).collect())),
     }
-    Ok((there, Vec::new()))
 }
 
 /// The case of a name.

@@ -301,7 +301,8 @@ pub fn left_out_at(
     let which = match (runs.len(), own.len()) {
         (1, 1) => String::new(),
         (1, _) => format!(" ({name})"),
-        (runs, _) => format!(" (mean of {runs})"),
+        (runs, 1) => format!(" (mean of {runs})"),
+        (runs, _) => format!(" ({name}, mean of {runs})"),
     };
     Ok(left_out(LeftOutPrediction { case, which: &which, curve: &curve, motion }))
 }

@@ -297,7 +297,7 @@ fn add_share(
     });
     let (shares, (low, high)): (Vec<f64>, (Vec<f64>, Vec<f64>)) = shares.unzip();
     panel.y = Axis::new("share of runs over a limit", "%", 1e2).over(0.0, 1.0);
-    let (name, x) = ("95 % confidence interval, of random draws".into(), middles.clone());
+    let (name, x) = ("95 % confidence interval if drawn at random".into(), middles.clone());
     panel.bands.push(Band { name, look: 0, x, low, high, is_stacked: false });
     panel.series.push(Series::line("known to be over a limit", 0, middles, shares));
 }

@@ -314,7 +314,7 @@ fn of_database(args: &Args, file: &Path, options: GlobalOptions) -> Result<Chart
     let there = set.cases.iter().filter(|case| is_same_speed(case.speed_m_per_s, speed));
     let names: Vec<&str> = there.map(|case| &*case.name).collect();
     let named = args.case.as_deref();
-    if let Some(name) = named.filter(|name| !names.contains(name)) {
+    if let Some(name) = named.filter(|name| !names.is_empty() && !names.contains(name)) {
         let at = km_per_h(speed);
         return usage(format!("--case {name}: at {at} there is {}", names.join(", ")));
     }

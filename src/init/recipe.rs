@@ -331,10 +331,9 @@ struct NodeTally<'a> {
     is_centre: bool,
     /// In which it can represent the body.
     runs: usize,
-    /// Of each run, then the largest of those that are not left out for it.
+    /// Of each run, and the largest of those that are not left out for it.
     residuals: Vec<f64>,
     residual: f64,
-    limit: f64,
     /// Of all runs together, and how many that are.
     roughness: f64,
     seen: f64,
@@ -345,7 +344,7 @@ struct NodeTally<'a> {
 fn left_out_from(residuals: &[f64]) -> f64 {
     let mut sorted = residuals.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let median = sorted[(sorted.len() - 1) / 2];
+    let median = sorted[sorted.len() / 2];
     if sorted.len() >= LEAST_TO_COMPARE && median <= FOLLOWS {
         (MUCH_MORE * median).clamp(FOLLOWS, RELATED)
     } else {
@@ -370,14 +369,13 @@ fn choose(
             let limit =
                 if is_centre { best + CENTRE_AS_GOOD } else { AS_GOOD.0 * best + AS_GOOD.1 };
             let (runs, roughness, seen) = (0, 0.0, 0.0);
-            let (residuals, left, above) = (Vec::new(), 0.0, f64::INFINITY);
+            let (residuals, left) = (Vec::new(), 0.0);
             let tally = tallies.entry(node.id).or_insert(NodeTally {
                 node,
                 is_centre,
                 runs,
                 residuals,
                 residual: left,
-                limit: above,
                 roughness,
                 seen,
             });
@@ -390,14 +388,14 @@ fn choose(
     // Of equally smooth ones, such as the nodes of a rigid body, the one that follows best.
     let roughness = |tally: &NodeTally<'_>| (tally.roughness / tally.seen * EVEN).round();
     let mut tallies: Vec<NodeTally<'_>> = tallies.into_values().collect();
+    // A run in which a node does not follow the force is left out, and says nothing of the others.
+    let largest = |tally: &NodeTally<'_>, limit: f64| {
+        let all = || tally.residuals.iter().copied();
+        let kept = all().filter(|left| *left < limit).reduce(f64::max);
+        kept.unwrap_or_else(|| all().fold(0.0, f64::max))
+    };
     for tally in &mut tallies {
-        // A run in which it does not follow the force is left out, and says nothing of the others.
-        tally.limit = if are_given { f64::INFINITY } else { left_out_from(&tally.residuals) };
-        let largest = |most: f64| {
-            tally.residuals.iter().copied().filter(|left| *left < most).fold(0.0, f64::max)
-        };
-        let kept = largest(tally.limit);
-        tally.residual = if kept > 0.0 { kept } else { largest(f64::INFINITY) };
+        tally.residual = largest(tally, if are_given { f64::INFINITY } else { RELATED });
     }
     tallies.sort_by(|a, b| {
         (Some(b.node.id) == given)
@@ -431,7 +429,8 @@ fn choose(
         .map(|tally| Alternative { id: tally.node.id.to_string(), about: about(tally) })
         .collect();
     let title = first.node.title.clone();
-    let NodeTally { residual, limit, .. } = *first;
+    let limit = if are_given { f64::INFINITY } else { left_out_from(&first.residuals) };
+    let residual = largest(first, limit);
     Some(ChosenNode { id: first.node.id, title, residual, limit, others })
 }
 

@@ -157,7 +157,7 @@ fn curve(
 fn speed(model: &Model) -> Proposed<f64> {
     let (low, high) = model.range_m_per_s();
     let mut speeds: Vec<f64> = model.cases.iter().map(|case| case.speed_m_per_s).collect();
-    speeds.dedup();
+    speeds.dedup_by_key(|speed| km_per_h(*speed));
     let from = format!(
         "one of the {} training speeds, which go from {} to {} ({} speeds)",
         speeds.len(),

@@ -177,7 +177,6 @@ impl Diagnostics {
         }
     }
 
-    /// A problem of a binary file, which has no lines.
     pub(crate) fn is_empty(&self) -> bool {
         self.kept.is_empty()
     }

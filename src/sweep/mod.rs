@@ -190,10 +190,16 @@ impl Sweep {
         // Where another curve stands in its place, what a row varies of a curve is idle.
         for vary in plan.vary.iter().filter(|v| [What::Band, What::Force].contains(&v.what)) {
             let Some(curve) = &vary.curve else { continue };
-            let replaces = |v: &&Vary| v.what == What::Curve && v.curve.as_ref() == Some(curve);
-            let values = plan.vary.iter().find(replaces).and_then(|v| v.values.as_ref());
-            let others = values.into_iter().flatten().filter(|value| value.0 != *curve);
-            let others: Vec<&str> = others.map(|value| &*value.0).collect();
+            let is_own = |other: &str| {
+                let same = |v: &Vary| v.what == vary.what && v.curve.as_deref() == Some(other);
+                plan.vary.iter().any(same)
+            };
+            let choices = plan.vary.iter().filter(|v| v.what == What::Curve).filter_map(|v| {
+                let values: Vec<&str> = v.values.iter().flatten().map(|value| &*value.0).collect();
+                (v.curve.as_ref() == Some(curve) || values.contains(&&**curve)).then_some(values)
+            });
+            let others = choices.flatten().filter(|other| *other != curve && !is_own(other));
+            let others: Vec<&str> = others.collect();
             base.warnings.extend((!others.is_empty()).then(|| {
                 format!(
                     "the {} of curve \"{curve}\" is varied, but has no effect in rows with {} in its place: vary it for these, too, or sweep them apart",

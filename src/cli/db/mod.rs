@@ -237,7 +237,7 @@ fn export(args: &ExportArgs, options: GlobalOptions) -> CommandResult {
     let cases: Vec<&Case> = selection.find(&args.database, &database)?;
     let name = args.database.file_stem().unwrap_or_default().to_string_lossy();
     let described_as = args.croissant.then_some(&*name);
-    for name in curate::TABLES {
+    for name in &curate::TABLES[..if args.originals { 3 } else { 2 }] {
         options.keep_others(&args.output.join(name), FileKind::Result)?;
     }
     let files = curate::write_tables(&cases, &args.output, args.originals, described_as)?;

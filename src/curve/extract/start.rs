@@ -140,6 +140,10 @@ impl Start {
                 let (least_m, most_m) = missing_m;
                 let share = |m: f64| 100.0 * m / (crush_m + m);
                 let (shares, offset) = match least_m < most_m {
+                    true if least_m == 0.0 => (
+                        format!("up to {:.1} %", share(most_m)),
+                        "the body still has the run's speed, so none are if the clock does not begin at the impact; else set offset in the run to what is missing".into(),
+                    ),
                     true => (
                         format!("{:.1} to {:.1} %", share(least_m), share(most_m)),
                         "the bodies slow down over the first distance before the force is recorded, and move by the second; set offset in the run to what is missing".into(),
@@ -199,18 +203,19 @@ const FULL_SPEED: f64 = 1e-3;
 /// The crush before a record that begins in contact, at least and at most: its first displacement, or, where that counts from the first
 /// state, what the body travels until then. If the motion was recorded before the force, the bodies have slowed down over part of
 /// it at least; a nose is stopped before the body is. A body that still has the run's speed, in a record that counts its displacement
-/// from there, has crushed nothing: its clock may run from elsewhere.
+/// from there, may have crushed nothing: its clock may not begin at the impact.
 fn missing_m(record: &Record, setup: &Setup<'_>) -> (f64, f64) {
     let bodies = if setup.half_model { 2.0 } else { 1.0 };
     let is_slowed = setup.manifest_speed_m_per_s.is_none_or(|speed_m_per_s| {
         bodies * record.rate_m_per_s[0].abs() < (1.0 - FULL_SPEED) * speed_m_per_s
     });
     let most_m = match record.deflection_m[0].abs() {
-        0.0 if !is_slowed => 0.0,
         0.0 => (record.rate_m_per_s[0] * record.time_s[0]).abs(),
         displacement_m => displacement_m,
     };
-    (record.slowed_over_m.map_or(most_m, |slowed_m| slowed_m.min(most_m)), most_m)
+    let least_m = record.slowed_over_m.map_or(most_m, |slowed_m| slowed_m.min(most_m));
+    let is_open = !is_slowed && record.deflection_m[0] == 0.0;
+    (if is_open { 0.0 } else { least_m }, most_m)
 }
 
 fn shown_missing((least_m, most_m): (f64, f64)) -> String {

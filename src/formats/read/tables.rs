@@ -188,7 +188,10 @@ pub(crate) fn history(bytes: &[u8], wanted: Option<&str>) -> Result<History, Err
     // As a name holds a unit where no row below does.
     let with_unit = |name: &str, field: usize| {
         let unit = table.units.as_ref().map(|row| unit_of(row.field(field))).unwrap_or_default();
-        if unit.is_empty() { name.to_string() } else { format!("{name} [{unit}]") }
+        match unit.is_empty() || name.ends_with([']', ')']) {
+            true => name.to_string(),
+            false => format!("{name} [{unit}]"),
+        }
     };
     let (line, time_name) = &table.names[time];
     let mut history = History {

@@ -20,7 +20,9 @@ fn accelerate_by_all<'a>(engine: &mut Engine<'a>, at: StepPoint, lag_s: f64, kic
         }
     }
     engine.losses.power_of_w.values_mut(n).fill([0.0; LANES]);
-    engine.find_closing(lag_s);
+    if !(engine.fixed.rated.is_empty() && engine.fixed.plain_rows.is_empty()) {
+        engine.find_closing(lag_s);
+    }
     engine.add_rates(&mut net, at, lag_s);
     engine.add_plain_dampers(&mut net, at);
     engine.losses.power.damper_w = engine.losses.power_of_w.sum(n);

@@ -12,6 +12,13 @@ use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::solver::states::finish::{resolve, take};
 use crate::solver::{Entity, Selection, SolverFile};
 
+/// A value of a record; NaN beyond its end.
+fn real(record: &[u8], offset: usize) -> f64 {
+    let at = 4 * offset;
+    let word = record.get(at..at + 4).and_then(|w| <[u8; 4]>::try_from(w).ok());
+    word.map_or(f64::NAN, |w| f64::from(f32::from_be_bytes(w)))
+}
+
 /// One value per state.
 struct Channel {
     record: usize,
@@ -161,7 +168,9 @@ impl StateReader {
         let title = |header: &Header| header.title.clone().unwrap_or_default();
         let what = match own {
             None => "is damaged".into(),
-            Some(own) if own.title != header.title => {
+            Some(own)
+                if own.title.is_some() && header.title.is_some() && own.title != header.title =>
+            {
                 format!(
                     "is of another run: its title is {:?}, not {:?}",
                     title(&own),
@@ -170,19 +179,17 @@ impl StateReader {
             }
             Some(own) if !own.is_like(header) => "holds other histories".into(),
             Some(_) => {
-                let before = self.time.len();
-                self.read(header, records)?;
-                match (self.time.first(), self.time.get(before)) {
-                    (Some(first), Some(own)) if before > 0 && own <= first => {
-                        let message = format!(
-                            "begins at time {own:?}, where the run does: it is another run"
-                        );
-                        self.time.truncate(before);
-                        self.starts.truncate(before);
-                        self.channels.iter_mut().for_each(|c| c.values.truncate(before));
-                        message
+                let start = records.position();
+                let first = records.next()?.map(|record| real(&record, 0));
+                records.go_to(start)?;
+                match (self.time.first(), first) {
+                    (Some(first), Some(own)) if own <= *first => {
+                        format!("begins at time {own:?}, where the run does: it is another run")
                     }
-                    _ => return Ok(true),
+                    _ => {
+                        self.read(header, records)?;
+                        return Ok(true);
+                    }
                 }
             }
         };
@@ -305,11 +312,6 @@ impl StateReader {
     }
 
     fn store(&mut self, state: &[Vec<u8>], start: u64) {
-        let real = |record: &[u8], offset: usize| {
-            let at = 4 * offset;
-            let word = record.get(at..at + 4).and_then(|w| <[u8; 4]>::try_from(w).ok());
-            word.map_or(f64::NAN, |w| f64::from(f32::from_be_bytes(w)))
-        };
         let time = real(&state[0], 0);
         let place = Place::in_part(self.part, start);
         if !time.is_finite() {
