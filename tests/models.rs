@@ -1741,7 +1741,7 @@ fn a_crush_gives_its_speed() {
         (
             1,
             "--crush 3m",
-            "no speed between those of the runs gives a crush of 3.0000 m: the model's crush goes from 0.1111 m at 12 km/h",
+            "no speed between those of the runs gives a crush of 3 m: the model's crush goes from 0.1111 m at 12 km/h",
         ),
         (1, "--crush 1mm", "no speed between those of the runs gives a crush"),
         (2, "--crush 0.5", "has no unit"),

@@ -58,7 +58,8 @@ pub fn speed_of_crush(model: &Model, query: &Query, crush_m: f64) -> Result<Spee
     let speed_m_per_s = find(within)?.ok_or_else(|| {
         error!(
             Prediction,
-            "no speed between those of the runs gives a crush of {crush_m:.4} m: the model's crush goes from {least_m:.4} m at {} to {most_m:.4} m at {}",
+            "no speed between those of the runs gives a crush of {} m: the model's crush goes from {least_m:.4} m at {} to {most_m:.4} m at {}",
+            (crush_m * 1e4).round() / 1e4,
             km_per_h(low),
             km_per_h(high)
         )
