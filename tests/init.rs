@@ -691,7 +691,7 @@ fn masses_are_never_made_up() {
 
 /// A force that is larger than what stops the body makes no mass that is heavier than all that moves.
 #[test]
-fn a_force_counted_twice_is_no_mass() {
+fn a_force_counted_twice_gives_no_mass() {
     let history = Crash::default().run();
     let layout = Layout { units: MM_T_S, axis: 0, sign: 1.0 };
     let folder = tempfile::tempdir().unwrap();

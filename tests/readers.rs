@@ -66,7 +66,7 @@ fn touching_fields_and_rotations() {
 }
 
 #[test]
-fn header_only_is_no_error() {
+fn header_only_is_not_an_error() {
     for format in formats().filter(|f| !["binout", "t01"].contains(f)) {
         let file = read(format, "");
         assert_eq!((file.time.len(), file.problems.len()), (0, 0), "{format}");

@@ -85,7 +85,7 @@ struct SignalOptions {
 }
 
 /// A failure to rate with a message of the command's own.
-fn failed(message: String) -> Failure {
+fn not_rated(message: String) -> Failure {
     error!(Rating, "{message}").into()
 }
 
@@ -357,7 +357,7 @@ impl Args {
             return Ok(false);
         }
         let path = other.path.display();
-        file::open(&other.path).map_err(|e| failed(format!("{path}: {e}")))?;
+        file::open(&other.path).map_err(|e| not_rated(format!("{path}: {e}")))?;
         usage(format!(
             "{path} is not the result of a run, as {result} is (a table with deflection_m of its interfaces, as crumple simulate writes it): to compare two columns, name each after its file, {result}:COLUMN",
             result = result.path.display()
@@ -495,7 +495,7 @@ fn same_unit_of_time(
     if ratio < LENGTHS || (a.address.unit.is_some() && b.address.unit.is_some()) {
         return Ok(());
     }
-    Err(failed(format!(
+    Err(not_rated(format!(
         "{} lasts {long_a} s and {} {long_b} s, if both count time in s: write the unit of each after its name, such as {},time=s and {},time=ms",
         a.path().display(),
         b.path().display(),
@@ -526,7 +526,7 @@ impl SignalRequest<'_> {
             // Any other name may hold a table as well.
             Err(error) if error.downcast_ref().is_some_and(|e: &Error| e.is_about("format")) => {
                 match self.read_table(options) {
-                    Err(_) if self.column().is_none() => Err(failed(format!(
+                    Err(_) if self.column().is_none() => Err(not_rated(format!(
                         "{error}; a CSV file has the extension .csv, or its column after its name: {}:COLUMN",
                         self.path().display()
                     ))),
@@ -540,21 +540,21 @@ impl SignalRequest<'_> {
     fn read_table(&self, options: GlobalOptions) -> Result<LoadedSignal, Failure> {
         let path = self.path().display();
         let text = file::read(self.path(), MAX_TABLE_BYTES);
-        let text = text.map_err(|e| failed(format!("{path}: {e}")))?;
+        let text = text.map_err(|e| not_rated(format!("{path}: {e}")))?;
         let read = formats::history(&text, self.column()).map_err(|error| {
             let how = if error.is_about("column") {
                 format!(" after the file's name: {path}:COLUMN")
             } else {
                 String::new()
             };
-            failed(format!("{path}: {error}{how}"))
+            not_rated(format!("{path}: {error}{how}"))
         })?;
         let (line, time_name) = &read.time_name;
         let said = unit_at_the_end_of(time_name);
         if self.address.unit.is_none()
             && let Some(unit) = said.filter(|(_, seconds)| *seconds != 1.0)
         {
-            return Err(failed(format!(
+            return Err(not_rated(format!(
                 "{path}: line {line}, column 1 (\"{time_name}\"): expected a time in s: write {path},time={}",
                 unit.0
             )));
@@ -586,9 +586,9 @@ impl SignalRequest<'_> {
         let path = self.path().display();
         let history = match &file.histories[..] {
             [history] => history,
-            [] => return Err(failed(format!("{path}: it holds no history"))),
+            [] => return Err(not_rated(format!("{path}: it holds no history"))),
             [first, .., last] => {
-                return Err(failed(format!(
+                return Err(not_rated(format!(
                     "{path}: {} histories match, from {} to {}: choose one as {path}:ID:COMPONENT (crumple inspect lists them)",
                     file.histories.len(),
                     first.label(),
@@ -598,7 +598,7 @@ impl SignalRequest<'_> {
         };
         let label = history.label();
         if let Some(state) = history.values.iter().position(|v| v.is_nan()) {
-            return Err(failed(format!(
+            return Err(not_rated(format!(
                 "{path}: {label}: state {} at time {}: expected a number, but the file holds none there: choose an interval without it with --from and --to, after writing the rest with crumple histories",
                 state + 1,
                 history.time[state]
@@ -615,7 +615,7 @@ impl SignalRequest<'_> {
         let name = format!("{}: {column}", self.path().display());
         let scaled = |values: &[f64], by: f64| values.iter().map(|v| v * by).collect();
         Signal::new(&name, scaled(time, seconds), scaled(values, self.address.scale))
-            .map_err(|error| failed(format!("{name}: {error}")))
+            .map_err(|error| not_rated(format!("{name}: {error}")))
     }
 }
 

@@ -228,7 +228,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_what_is_no_function() {
+    fn refuses_what_is_not_a_function() {
         let order = Envelope::new(vec![0.0, 1.0, 1.0], vec![0.0; 3]).unwrap_err();
         assert_eq!(
             order.to_string(),

@@ -339,8 +339,8 @@ struct NodeTally<'a> {
     seen: f64,
 }
 
-/// What a run leaves of the impulse if it is left out for it: more than any that follows a force; or, where most runs follow it
-/// closely, much more than these.
+/// The residual from which on a run is left out: that of a node that does not follow the force at all; or, where most runs follow it
+/// closely, many times theirs.
 fn left_out_from(residuals: &[f64]) -> f64 {
     let mut sorted = residuals.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -369,13 +369,12 @@ fn choose(
             let limit =
                 if is_centre { best + CENTRE_AS_GOOD } else { AS_GOOD.0 * best + AS_GOOD.1 };
             let (runs, roughness, seen) = (0, 0.0, 0.0);
-            let (residuals, left) = (Vec::new(), 0.0);
             let tally = tallies.entry(node.id).or_insert(NodeTally {
                 node,
                 is_centre,
                 runs,
-                residuals,
-                residual: left,
+                residuals: Vec::new(),
+                residual: 0.0,
                 roughness,
                 seen,
             });

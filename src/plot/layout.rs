@@ -306,7 +306,7 @@ fn draw_series(
     };
     let parts = thin::clipped_line(&points, place.area);
     let lines: Vec<Vec<(f64, f64)>> = parts.iter().map(|part| thin::thinned(part)).collect();
-    // Of so few points each could be taken for one that a marker between them is not.
+    // Between so few points a marker would look like another point.
     let at: Vec<(f64, f64)> = match points.len() {
         ..=FEW_POINTS => points.into_iter().filter(|p| thin::holds(place.area, *p)).collect(),
         _ => along(&lines, series.look),

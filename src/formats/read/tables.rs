@@ -185,7 +185,7 @@ pub(crate) fn history(bytes: &[u8], wanted: Option<&str>) -> Result<History, Err
         Some(curve) => (curve, 0, 1),
         None => (&table, time, column),
     };
-    // As a name holds a unit where no row below does.
+    // A unit from the row below the header joins the name, as in headers that hold units.
     let with_unit = |name: &str, field: usize| {
         let unit = table.units.as_ref().map(|row| unit_of(row.field(field))).unwrap_or_default();
         match unit.is_empty() || name.ends_with([']', ')']) {
