@@ -1726,6 +1726,7 @@ fn a_crush_gives_its_speed() {
         let found = found["found_by_crush"]["speed_m_per_s"].as_f64().unwrap() * 3.6;
         assert!((found - speed).abs() < 0.01, "{crush}: {found} km/h");
     }
+    says(&crumple_ok(here, "predict lead.model --crush 111.1mm"), "crush of 0.1111 m: 12 km/h");
     // Each rule has its own error.
     let model: Value =
         serde_json::from_str(&std::fs::read_to_string(here.join("lead.model")).unwrap()).unwrap();

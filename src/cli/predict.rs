@@ -120,7 +120,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
 
 /// The speed of a crush, and how far it may be off.
 fn print_found(out: &mut dyn Write, found: &SpeedOfCrush) -> io::Result<()> {
-    write!(out, "crush of {} m: {}", found.crush_m, km_per_h(found.speed_m_per_s))?;
+    // As the message of a crush that no speed gives.
+    let crush_m = (found.crush_m * 1e4).round() / 1e4;
+    write!(out, "crush of {crush_m} m: {}", km_per_h(found.speed_m_per_s))?;
     if let Some(error) = found.crush_error {
         let end = |speed: Option<f64>| speed.map_or("beyond the runs".into(), km_per_h);
         let (low, high) = (end(found.low_m_per_s), end(found.high_m_per_s));
