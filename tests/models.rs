@@ -2080,6 +2080,27 @@ fn cases_of_one_speed_are_distinguished() {
     let names = compared["comparisons"].as_array().unwrap().iter().map(|c| c["case"].as_str());
     let names: Vec<&str> = names.map(Option::unwrap).collect();
     assert_eq!(names, ["lead-car-b-wall-48", "lead-car-wall-48"]);
+    // The fixed curve is of the same design, asked for by its speed or not.
+    for line in ["compare two.h5 --json -q", "compare two.h5 --fixed-speed 60km/h --json -q"] {
+        let compared: Value =
+            serde_json::from_str(&crumple_ok(here, &format!("{line} --nsdm-seeds 1"))).unwrap();
+        for comparison in compared["comparisons"].as_array().unwrap() {
+            let speed = if line.contains("60") { 60 } else { 36 };
+            let other = comparison["case"].as_str().unwrap().replace("48", &speed.to_string());
+            let rows = comparison["rows"].as_array().unwrap();
+            let from = |method: &str| {
+                rows.iter().find(|row| row["method"] == method).unwrap()["curve"].clone()
+            };
+            assert_eq!(from("fdrm"), format!("FE at {speed} km/h ({other})"), "{line}");
+            assert_eq!(from("nsdm"), format!("fit to FE at {speed} km/h ({other})"), "{line}");
+        }
+    }
+    says(
+        &crumple_ok(here, "validate two.h5 --next"),
+        "when left out; run it with the wall_mm whose curve is needed",
+    );
+    let shown = crumple_ok(here, "db show two.h5 --compare --speed 48km/h");
+    assert!(shown.lines().any(|l| l.split_whitespace().eq(["wall_mm", "8.075", "9.5"])), "{shown}");
     let said = crumple_ok(here, "compare two.h5 --nsdm-seeds 0 --speed 48km/h");
     says(&said, "two at 48 km/h (wall), lead-car-wall-48, left out; FE: peak force 4.199 MN");
     says(&said, "means over 48 km/h (lead-car-b-wall-48), 48 km/h (lead-car-wall-48), each left");

@@ -252,6 +252,13 @@ pub(crate) fn next_run(set: &TrainingSet, validation: &Validation) -> Option<Nex
             km_per_h(high)
         ),
     };
+    let mut also: Vec<&str> = set.features.iter().map(|f| &*f.parameter).collect();
+    also.dedup();
+    let reason = match also.is_empty() {
+        true => reason,
+        // Errors at a speed are means over its cases.
+        false => format!("{reason}; run it with the {} whose curve is needed", also.join(", ")),
+    };
     Some(NextRun {
         speed_m_per_s: 0.5 * (low + high),
         between_m_per_s: (low, high),

@@ -9,7 +9,7 @@ use super::methods::{self, ComparisonSettings};
 use super::reference::Reference;
 use super::row::{Row, RowBuilder};
 use crate::curve::Case;
-use crate::dataset::{TrainingCase, TrainingSet, is_same_speed, nearest};
+use crate::dataset::{TrainingCase, TrainingSet, is_same_speed, nearest_case};
 use crate::error::{Error, ErrorCode, error};
 use crate::nsdm::{self, Identifiability, Nsdm, Start};
 use crate::plural::counted;
@@ -158,7 +158,7 @@ pub(crate) fn compare(
     let left_out = left_out(index, &set)?;
     let LeftOutCase { case, rest, reference, .. } = &left_out;
     let speed = case.conditions.speed.m_per_s;
-    let fixed = fixed_case(group, rest, speed, settings)?;
+    let fixed = fixed_case(group, &left_out, settings)?;
     let fixed_case: &Case = &fixed.case;
     let times = rest.cases.iter().map(|case| case.solver_time_s());
     let training_time_s: Option<f64> =
@@ -246,31 +246,35 @@ fn no_case(group: &str, asked_m_per_s: f64, set: &TrainingSet) -> Error {
     )
 }
 
-/// The one case that FDRM and NSDM use: of the speed that was requested, else the nearest to
-/// `left_out_m_per_s`.
+/// The one case that FDRM and NSDM use: of the speed that was requested, else the nearest; of several, that whose parameters are nearest
+/// to those of the case that is left out.
 fn fixed_case<'a>(
     group: &str,
-    rest: &'a TrainingSet,
-    left_out_m_per_s: f64,
+    left_out: &'a LeftOutCase<'_>,
     settings: &ComparisonSettings,
 ) -> Result<&'a TrainingCase, Error> {
-    let Some(asked) = settings.fixed_speed_m_per_s else {
+    let (own, rest) = (left_out.own, &left_out.rest);
+    let may_serve = |c: &&TrainingCase| match settings.fixed_speed_m_per_s {
+        Some(asked) => is_same_speed(c.speed_m_per_s, asked),
         // A run that ended while loading does not show a whole impact.
-        let whole: Vec<&TrainingCase> =
-            rest.cases.iter().map(|c| &**c).filter(|c| !c.truncated).collect();
-        let all = if whole.is_empty() { rest.cases.iter().map(|c| &**c).collect() } else { whole };
-        return Ok(all[nearest(all.iter().map(|c| c.speed_m_per_s), left_out_m_per_s)]);
+        None => !c.truncated,
     };
-    if is_same_speed(asked, left_out_m_per_s) {
-        return Err(error!(
-            Comparison,
-            "the fixed curve is that of {asked}, the speed that is left out: choose another one",
-            asked = km_per_h(asked)
-        ));
+    let all = || rest.cases.iter().map(|c| &**c);
+    let mut from: Vec<&TrainingCase> = all().filter(may_serve).collect();
+    match settings.fixed_speed_m_per_s {
+        Some(asked) if is_same_speed(asked, own.speed_m_per_s) => {
+            return Err(error!(
+                Comparison,
+                "the fixed curve is that of {asked}, the speed that is left out: choose another one",
+                asked = km_per_h(asked)
+            ));
+        }
+        Some(asked) if from.is_empty() => return Err(no_case(group, asked, rest)),
+        None if from.is_empty() => from = all().collect(),
+        _ => {}
     }
-    let mut all = rest.cases.iter().map(|c| &**c);
-    let found = all.find(|c| is_same_speed(c.speed_m_per_s, asked));
-    found.ok_or_else(|| no_case(group, asked, rest))
+    let points = from.iter().map(|c| (c.speed_m_per_s, &c.features[..]));
+    Ok(from[nearest_case(points, (own.speed_m_per_s, &own.features))])
 }
 
 /// Errors of every seed's fit, at the speed it was fitted at and here.

@@ -43,8 +43,13 @@ impl Default for Times {
     }
 }
 
-fn fe_at(speed_m_per_s: f64) -> String {
-    format!("FE at {}", km_per_h(speed_m_per_s))
+/// By its name too where more than speed may tell it from others.
+fn fe_at(case: &Case) -> String {
+    let speed = km_per_h(case.conditions.speed.m_per_s);
+    match case.conditions.parameters.is_empty() {
+        true => format!("FE at {speed}"),
+        false => format!("FE at {speed} ({})", case.id.name),
+    }
 }
 
 /// FE's own curves: of the recipe's force, and of the body's motion where that is another.
@@ -52,7 +57,7 @@ pub(super) fn of_fe(left_out: &LeftOutCase<'_>) -> Vec<Method> {
     let LeftOutCase { own, case, .. } = left_out;
     let method = |name, curve, truth: &Envelope| Method {
         name,
-        made_from: fe_at(case.conditions.speed.m_per_s),
+        made_from: fe_at(case),
         curve,
         forces: (truth.clone(), truth.clone()),
         times: Times { training: false, ..Times::default() },
@@ -75,7 +80,7 @@ fn of_recipe(case: &TrainingCase, force: ForceKind) -> ForceCurve {
 pub(super) fn fdrm(left_out: &LeftOutCase<'_>, fixed: &TrainingCase, of: &Case) -> Method {
     Method {
         name: "fdrm",
-        made_from: fe_at(fixed.speed_m_per_s),
+        made_from: fe_at(of),
         curve: of_recipe(fixed, of.curves.force_kind),
         forces: (left_out.own.envelope.clone(), fixed.envelope.clone()),
         times: Times { training_s: fixed.solver_time_s(), ..Times::default() },
@@ -112,7 +117,7 @@ pub(super) fn fit_nsdm(fixed: &Case, settings: &ComparisonSettings) -> Result<Fi
         let fit = nsdm::fit(&target, &choices, seed)?;
         fits.push((fit, start.elapsed().as_secs_f64()));
     }
-    let made_from = format!("fit to {}", fe_at(fixed.conditions.speed.m_per_s));
+    let made_from = format!("fit to {}", fe_at(fixed));
     Ok(FittedNsdm { made_from, reference, fits, training_s: fixed.provenance.solver_wall_time_s })
 }
 

@@ -1,6 +1,6 @@
 //! Cases side by side (what differs from the first of them), and as CSV tables: one of the cases, and long tables of the samples of their curves.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -186,6 +186,8 @@ pub(crate) struct Difference {
     pub speed_kind: SpeedKind,
     pub force_kind: ForceKind,
     pub mass_kg: f64,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub parameters: BTreeMap<String, Parameter>,
     pub max_deflection_m: f64,
     /// ∫F dd up to it, in J.
     #[serde(rename = "work_J")]
@@ -230,6 +232,7 @@ fn difference(first: &Case, reference: &Envelope, case: &Case, envelope: Envelop
         speed_m_per_s: case.conditions.speed.m_per_s,
         speed_kind: case.conditions.speed.kind,
         force_kind: case.curves.force_kind,
+        parameters: case.conditions.parameters.clone(),
         mass_kg: case.conditions.masses.body_kg,
         max_deflection_m: case.max_deflection_m(),
         work_j: case.quality.audit.work_j,

@@ -321,6 +321,30 @@ pub(crate) fn nearest(speeds_m_per_s: impl Iterator<Item = f64>, v: f64) -> usiz
     least(speeds_m_per_s.map(|s| (s - v).abs()))
 }
 
+/// Index of the case nearest to `at` in speed and features, each relative to its range over the cases; of equally near ones the
+/// first.
+pub(crate) fn nearest_case<'a>(
+    cases: impl Iterator<Item = (f64, &'a [f64])> + Clone,
+    at: (f64, &[f64]),
+) -> usize {
+    let share = |value: &dyn Fn((f64, &'a [f64])) -> f64, asked: f64| -> Vec<f64> {
+        let values = || cases.clone().map(value);
+        let range =
+            values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min);
+        values().map(|v| (v - asked) / if range > 0.0 { range } else { 1.0 }).collect()
+    };
+    // One feature: the plain distance, so that midpoints are where they are expected.
+    if at.1.is_empty() {
+        return nearest(cases.map(|(speed, _)| speed), at.0);
+    }
+    let mut squares: Vec<f64> = share(&|(speed, _)| speed, at.0).iter().map(|s| s * s).collect();
+    for (k, &asked) in at.1.iter().enumerate() {
+        let shares = share(&|(_, features)| features[k], asked);
+        squares.iter_mut().zip(shares).for_each(|(sum, s)| *sum += s * s);
+    }
+    least(squares.into_iter())
+}
+
 /// Index of the smallest distance; of those that only rounding tells apart the first.
 pub(crate) fn least(distances: impl Iterator<Item = f64>) -> usize {
     let closer = |best: (usize, f64), (i, distance): (usize, f64)| {

@@ -1,6 +1,6 @@
 //! `crumple db show`: cases with their curves, or side by side.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -129,9 +129,16 @@ fn compare(cases: &[&Case], options: GlobalOptions) -> CommandResult {
         if is_one_group { case.case.clone() } else { format!("{}/{}", case.group, case.case) }
     };
     let corner = if is_one_group { &cases[0].id.group } else { "" };
-    let quantities = Table::of(QUANTITIES).column(corner, |(name, _)| *name);
-    let table = comparison.cases.iter().enumerate().fold(quantities, |table, (k, case)| {
-        table.column(name(case), |(_, cell)| cell(case, k == 0))
+    let parameters: BTreeSet<&str> =
+        comparison.cases.iter().flat_map(|case| case.parameters.keys()).map(|k| &**k).collect();
+    let rows = QUANTITIES.map(Ok).into_iter().chain(parameters.into_iter().map(Err));
+    let names =
+        Table::of(rows).column(corner, |row| row.map_or_else(|name| name, |(name, _)| name));
+    let table = comparison.cases.iter().enumerate().fold(names, |table, (k, case)| {
+        table.column(name(case), |row| match row {
+            Ok((_, cell)) => cell(case, k == 0),
+            Err(name) => case.parameters.get(*name).map_or("-".into(), ToString::to_string),
+        })
     });
     options.show(&comparison, |out| output::table(out, table))
 }
