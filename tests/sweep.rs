@@ -192,6 +192,13 @@ fn what_has_no_effect_is_refused() {
         &String::from_utf8(said.stderr).unwrap(),
         "the force of curve \"nose\" is varied, but has no effect in rows with soft in its place",
     );
+    let both = both.replace(force, "what = \"gap\", curve = \"nose\", values = [\"1mm\", \"9mm\"]");
+    folder.put("s.toml", &format!("{SCENARIO}[sweep]\nvary = [ {{ {both} }} ]\n"));
+    let said = crumple_in(folder.0.path(), "sweep s.toml --dry-run");
+    says(
+        &String::from_utf8(said.stderr).unwrap(),
+        "the gap of curve \"nose\" is varied, but has no effect in rows with soft in its place",
+    );
     assert_eq!(folder.names(), Vec::<String>::new());
 }
 

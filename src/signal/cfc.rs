@@ -9,7 +9,7 @@ use super::interpolate;
 pub(crate) enum CfcError {
     /// The samples are too far apart for the class.
     #[error(
-        "the interval of {:.3} ms is too long for CFC{class}: at most {:.3} ms; use a lower class, filter = \"none\", or a shorter output interval", interval_s * 1e3, longest_s * 1e3
+        "the interval of {:.3} ms is too long for CFC{class}: at most {:.3} ms; use a lower class, no filter, or a shorter output interval", interval_s * 1e3, longest_s * 1e3
     )]
     TooCoarse { class: u32, interval_s: f64, longest_s: f64 },
     /// The samples are not evenly spaced.

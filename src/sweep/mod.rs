@@ -188,7 +188,9 @@ impl Sweep {
             }));
         }
         // Where another curve stands in its place, what a row varies of a curve is idle.
-        for vary in plan.vary.iter().filter(|v| [What::Band, What::Force].contains(&v.what)) {
+        for vary in
+            plan.vary.iter().filter(|v| [What::Band, What::Force, What::Gap].contains(&v.what))
+        {
             let Some(curve) = &vary.curve else { continue };
             let is_own = |other: &str| {
                 let same = |v: &Vary| v.what == vary.what && v.curve.as_deref() == Some(other);
