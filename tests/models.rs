@@ -2123,6 +2123,10 @@ fn cases_of_one_speed_are_distinguished() {
     says(&warned, "several cases, of which lead-car-b-wall-48 is drawn: choose by --case among");
     let error = crumple_fails(here, 2, "plot two.h5 --left-out 48km/h --case other -o drawn.svg");
     says(&error, "--case other: at 48 km/h there is lead-car-b-wall-48, lead-car-wall-48");
+    // Characters that the font lacks.
+    let output = crumple_in(here, "plot two.h5 --title 车α--48 -o drawn.png");
+    let warned = String::from_utf8(output.stderr).unwrap();
+    says(&warned, "the pictures' font lacks \"车\": boxes stand for these characters;");
     // A model's curve stands beside runs of its own design.
     crumple_ok(here, "train two.h5 --model extra -o two.model -q");
     let picture = drawn("two.model --speed 40km/h --parameter wall_mm=9.5");

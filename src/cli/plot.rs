@@ -168,6 +168,12 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     chart.width = args.width.unwrap_or(chart.width);
     chart.height = args.height.unwrap_or(chart.height);
     let drawing = chart.drawing();
+    let boxes: String = drawing.boxes().into_iter().take(20).collect();
+    if !boxes.is_empty() {
+        options.warn(&format!(
+            "the pictures' font lacks {boxes:?}: boxes stand for these characters; give another --title or other names, or use crumple report, whose texts are in the browser's fonts"
+        ));
+    }
     let mut files = Vec::new();
     for (path, is_png) in args.output.iter().zip(is_png) {
         let bytes = if is_png { drawing.png(args.scale)? } else { drawing.svg().into_bytes() };

@@ -1,6 +1,8 @@
 //! What a chart shows: panels with axes, series, bands and marks. Values are SI; an axis says in which unit they are shown.
 //! Round numbers along an axis, and how they are written. Laid out it is a drawing: lines, areas and texts in pixels, y downwards; the input of the writers.
 
+use std::collections::BTreeSet;
+
 use super::{font, thin};
 
 /// Panels side by side with one title and one legend.
@@ -338,6 +340,12 @@ impl Drawing {
             Shape::Path { .. } => None,
         });
         texts.collect()
+    }
+
+    /// The characters of its texts that the font lacks: a box stands in the place of each.
+    pub(crate) fn boxes(&self) -> BTreeSet<char> {
+        let texts = self.text_boxes().into_iter();
+        texts.flat_map(|(text, _)| text.chars()).filter(|c| !font::has(*c)).collect()
     }
 }
 

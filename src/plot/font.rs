@@ -49,6 +49,10 @@ pub(super) fn place(text: &str) -> (Vec<Placed>, i64) {
     (placed.collect(), x)
 }
 
+pub(super) fn has(c: char) -> bool {
+    FACE.glyph_index(c).is_some()
+}
+
 /// Width of a text in pixels.
 pub(super) fn width(text: &str, size: f64) -> f64 {
     place(text).1 as f64 / units_per_em() * size
