@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use serde_json::Value;
 
 use crate::common::{
-    build_fixture, crumple_fails, crumple_in, crumple_ok, entries, read_json, says,
+    build_fixture, crumple_fails, crumple_in, crumple_ok, entries, json, read_json, says,
 };
 
 /// The curve of all these files: a rise, a fall, a plateau; in m and N.
@@ -696,6 +696,57 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
 
 /// Predicted curves of a model, written as JSON and CSV and added again, make a group on which
 /// models train; a build into the same database keeps it.
+/// A specimen a hundredth as long is hit in a hundredth of the time: at the same speed it is crushed a hundredth as far.
+#[test]
+fn a_short_crush_is_sampled_as_finely_as_a_long_one() {
+    /// The crush at a training speed and between two, and what is said on the way.
+    fn crushes_m(scale: f64) -> (f64, f64, String) {
+        let folder = here();
+        let step_s = 1e-5 * scale;
+        let speeds = [5.0, 8.0, 11.0, 15.0];
+        for v0 in speeds {
+            let (mut d, mut v, mut most_m, mut top) = (0.0, v0, 0.0_f64, 0.0);
+            let mut text = "time [s],displacement [m],force [N]\n".to_string();
+            for i in 0..20_000 {
+                let x: f64 = d / scale;
+                let standing = (x / 0.02).clamp(0.0, 1.0) * (1.0 + 0.25 * (40.0 * x).sin());
+                // Per unit of mass: loading with rate, and a straight way back.
+                let per_mass = if d >= most_m {
+                    (most_m, top) = (d, 80.0 / scale * standing * (1.0 + 0.04 * v));
+                    top
+                } else {
+                    (top - 4e3 / scale.powi(2) * (most_m - d)).max(0.0)
+                };
+                if i % 10 == 0 {
+                    let t = f64::from(i) * step_s;
+                    text += &format!("{t:.9e},{d:.9e},{:.9e}\n", 24e3 * per_mass);
+                }
+                v -= per_mass * step_s;
+                d += v * step_s;
+            }
+            fs::write(folder.path().join(format!("{v0}.csv")), text).unwrap();
+        }
+        let files = speeds.map(|v| format!("{v}.csv")).join(" ");
+        let stated = speeds.map(|v| format!("{v}m/s")).join(",");
+        let said = crumple_ok(
+            folder.path(),
+            &format!("db add c.h5 {files} --group g --kind wall --mass 24t --speed {stated}"),
+        );
+        crumple_ok(folder.path(), "train c.h5 --model rate -o c.model -q");
+        let crush_m = |speed: &str| {
+            let line = format!("predict c.model --speed {speed} --json -q");
+            json(&crumple_ok(folder.path(), &line))["max_deflection_m"].as_f64().unwrap()
+        };
+        (crush_m("11m/s"), crush_m("13m/s"), said)
+    }
+    let (long, between, _) = crushes_m(1.0);
+    let (short, short_between, said) = crushes_m(0.01);
+    let off = |short: f64, long: f64| (100.0 * short / long - 1.0).abs();
+    assert!(off(short, long) < 0.01, "{short} {long}");
+    assert!(off(short_between, between) < 0.02, "{short_between} {between}");
+    says(&said, "sampling: one state every 0.01 ms, as the crush is short");
+}
+
 #[test]
 fn predicted_curves_come_back_as_a_group_that_trains() {
     let folder = tempfile::tempdir().unwrap();

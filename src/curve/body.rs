@@ -78,8 +78,15 @@ pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
             break;
         }
     }
-    let unfiltered = || from_rest(raw.clone());
-    match best.or_else(unfiltered) {
+    // A crush too short for every class.
+    if best.as_ref().is_none_or(|best| changes(best) > MADE_UP) {
+        let unfiltered = from_rest(raw.clone());
+        best = match (best, unfiltered) {
+            (Some(best), Some(unfiltered)) if changes(&best) <= changes(&unfiltered) => Some(best),
+            (best, unfiltered) => unfiltered.or(best),
+        };
+    }
+    match best {
         Some((mut force_n, share)) => {
             // Further off, mass, speeds and deflection contradict each other, which no factor mends.
             if (share - 1.0).abs() <= MADE_UP {

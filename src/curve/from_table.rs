@@ -85,8 +85,14 @@ const MOST_STATES: usize = 20_000;
 
 /// The motion that the table implies.
 fn retraced(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quality), Error> {
-    let interval_s = Sampling::default().interval_s;
-    let motion = retrace(table, impact, interval_s)?;
+    let mut interval_s = Sampling::default().interval_s;
+    let mut motion = retrace(table, impact, interval_s)?;
+    let end = motion.deflection_m.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
+    let finer_s = Sampling::interval_for(end.map_or(0.0, |(k, _)| motion.time_s[k]));
+    if finer_s < interval_s {
+        interval_s = finer_s;
+        motion = retrace(table, impact, interval_s)?;
+    }
     let (mut notes, mut warnings) = (motion.notes, motion.warnings);
     let original = Curve::new(motion.time_s, motion.deflection_m, motion.force_n)?;
     let claim = energy::StatedConditions {
@@ -156,14 +162,15 @@ fn recorded(
         notes.push("contact: the record starts at contact".into());
         StatedContact::Time { s: time_s[0] }
     });
-    let common = Sampling::default();
-    let states = ((time_s[time_s.len() - 1] - time_s[0]) / common.interval_s) as usize;
+    let length_s = time_s[time_s.len() - 1] - time_s[0];
+    let sampling = |interval_s: f64| {
+        let states = (length_s / interval_s) as usize;
+        let least = Sampling::default().states;
+        Sampling { states: states.saturating_add(1).clamp(least, MOST_STATES), interval_s }
+    };
     let setup = Setup {
         filter: Filter::None,
-        sampling: Sampling {
-            states: states.saturating_add(1).clamp(common.states, MOST_STATES),
-            ..common
-        },
+        sampling: sampling(Sampling::default().interval_s),
         kind: impact.speed.kind,
         half_model: false,
         masses: impact.masses,
@@ -185,13 +192,27 @@ fn recorded(
         );
         impossible_for(found, OTHER_SPEED)
     };
-    let Extracted { curves, quality, .. } =
-        extract::curve_of(record, remarks, &setup).map_err(|error| match error {
+    let extracted = |setup: &Setup<'_>| {
+        extract::curve_of(record.clone(), remarks.clone(), setup).map_err(|error| match error {
             ExtractError::ImpossibleRun(_) if !SPEEDS.contains(&(fastest / stated)) => {
                 other_speed()
             }
             error => of_table(error),
-        })?;
+        })
+    };
+    let mut found = extracted(&setup)?;
+    // A short crush needs more states than the usual interval gives, as far as the record has them.
+    let crush_s = found.curves.original.time_s()[loading::loading_end(&found.curves.original)];
+    let interval_s =
+        Sampling::interval_for(crush_s).max(length_s / (time_s.len().saturating_sub(1)) as f64);
+    if interval_s < setup.sampling.interval_s {
+        found = extracted(&Setup { sampling: sampling(interval_s), ..setup })?;
+        notes.push(format!(
+            "sampling: one state every {} ms, as the crush is short",
+            interval_s * 1e3
+        ));
+    }
+    let Extracted { curves, quality, .. } = found;
     let curves = RecordedCurves { force_kind: impact.force_kind, ..curves };
     let (of_unloading, mut warnings) = remarks_on(&curves, impact)?;
     warnings.splice(0..0, quality.warnings);

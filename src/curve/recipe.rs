@@ -383,6 +383,23 @@ impl From<Sampling> for SamplingTable {
     }
 }
 
+/// A motion that is sampled less often up to its maximum deflection loses energy in its accelerations.
+pub(crate) const LEAST_STATES: f64 = 40.0;
+
+impl Sampling {
+    /// The default's interval in s, or for a shorter crush the round one (1, 2 or 5 of a decade) of which it has at least
+    /// [`LEAST_STATES`].
+    pub(crate) fn interval_for(crush_s: f64) -> f64 {
+        let (usual_s, most_s) = (Self::default().interval_s, crush_s / LEAST_STATES);
+        if !(most_s > 0.0 && most_s < usual_s) {
+            return usual_s;
+        }
+        let decade = 10_f64.powf(most_s.log10().floor());
+        let round = [5.0, 2.0, 1.0].into_iter().map(|of| of * decade);
+        round.into_iter().find(|&s| s <= most_s).unwrap_or(most_s)
+    }
+}
+
 impl Default for Sampling {
     /// The reference data's: 400 states, one every 0.75 ms.
     fn default() -> Self {

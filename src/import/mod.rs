@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use crate::clock;
 use crate::curve::from_table::{IMPORTED, from_table};
-use crate::curve::recipe::{Filter, Sampling};
+use crate::curve::recipe::Filter;
 use crate::curve::{
     Case, CaseId, Conditions, ForceKind, Impact, Masses, Parameter, Provenance, Quality,
     SourceFile, Table,
@@ -164,7 +164,8 @@ pub(crate) fn case_of(
     let stated = curve.facts.force.or(settings.read.force);
     let is_contact_alone = moves && stated == Some(ForceKind::Contact);
     let alone = is_contact_alone.then(|| CONTACT_ALONE.to_string());
-    let recipe = recipe(item, settings, &curve, format, &impact, is_contact_alone);
+    let interval_s = curves.sampled.time_s().get(1).copied().unwrap_or_default();
+    let recipe = recipe(item, settings, &curve, format, &impact, is_contact_alone, interval_s);
     let mut hash = blake3::Hasher::new();
     hash.update(recipe.as_bytes());
     for file in &curve.files {
@@ -214,6 +215,7 @@ fn recipe(
     format: &str,
     impact: &Impact,
     is_contact_alone: bool,
+    interval_s: f64,
 ) -> String {
     let Impact { speed, masses, force_kind, .. } = *impact;
     let recipe = document! {
@@ -238,7 +240,7 @@ fn recipe(
             parameters: &settings.parameters,
             accept_energy: settings.accept_energy,
             filter: Filter::None,
-            sampling_interval_ms: Sampling::default().interval_s * 1e3,
+            sampling_interval_ms: 1e3 * interval_s,
         },
     };
     // A structure of texts and finite numbers is always JSON.

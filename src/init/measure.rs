@@ -22,6 +22,8 @@ pub(super) struct Impact {
     pub state: (usize, f64),
     pub crush_m: f64,
     pub contact_s: f64,
+    /// From contact to it.
+    pub crush_time_s: f64,
     pub last_s: f64,
     /// Usual interval of the states.
     pub interval_s: f64,
@@ -67,6 +69,7 @@ impl Impact {
             state: (state, time_s[state]),
             crush_m: bodies * crush * units.length_m,
             contact_s,
+            crush_time_s: time_s[end] - contact_s,
             last_s: time_s[time_s.len() - 1],
             interval_s: interval(if force_n.is_empty() { &time_s } else { &force_time_s }),
             states: record.states,
@@ -269,7 +272,7 @@ pub(super) fn differ(masses: &[Proposed<f64>]) -> Option<String> {
 
 /// Classes that are proposed: that of domain practice for forces of crash structures, and those for shorter impacts.
 pub(super) const CLASSES: [u32; 4] = [60, 180, 600, 1000];
-/// Finer records are sampled at this interval: CFC 60 leaves nothing that needs more.
+/// Finer records are sampled at this interval, but for a short crush: CFC 60 leaves nothing that needs more.
 const FINEST_S: f64 = 1e-4;
 const MOST_STATES: f64 = 20_000.0;
 
@@ -315,7 +318,9 @@ pub(super) fn sampling(runs: &[&Impact]) -> Option<Proposed<Sampling>> {
     if !(coarsest > 0.0 && longest > 0.0) {
         return None;
     }
-    let least = coarsest.max(FINEST_S).max(longest / MOST_STATES);
+    let shortest = runs.iter().map(|run| run.crush_time_s).filter(|s| *s > 0.0);
+    let finest = FINEST_S.min(Sampling::interval_for(shortest.fold(f64::INFINITY, f64::min)));
+    let least = coarsest.max(finest).max(longest / MOST_STATES);
     let interval_s = rounded_interval(least, longest);
     let states = (longest / interval_s * (1.0 + 1e-6)).floor() as usize + 1;
     let alike = runs.iter().all(|run| is_near(run.interval_s, coarsest, 0.01));
@@ -435,6 +440,9 @@ mod tests {
         let found = proposed(&[record(1e-3, 0.0, 0.1), record(0.5e-3, 0.0, 0.2)]);
         assert_eq!((found.states, found.interval_s), (201, 1e-3));
         assert!(sampling(&[]).is_none());
+        // A short crush of a fine record.
+        let short = Impact { crush_time_s: 1.3e-3, ..record(1e-6, 0.001, 0.005) };
+        assert_eq!(proposed(&[short]).interval_s, 2e-5);
     }
 
     #[test]

@@ -24,6 +24,7 @@ const SAME_RATE: f64 = 0.002;
 const NO_FORCE: f64 = 0.01;
 
 /// Motion and force at the same times, the force positive in compression: of a run, or of a file with times.
+#[derive(Clone)]
 pub(crate) struct Record {
     pub time_s: Vec<f64>,
     pub deflection_m: Vec<f64>,
@@ -214,6 +215,7 @@ fn sign_of_impulse(time_s: &[f64], force_n: &[f64]) -> f64 {
 }
 
 /// A history in SI with strictly increasing times.
+#[derive(Clone)]
 pub(crate) struct Signal {
     pub time_s: Vec<f64>,
     pub values: Vec<f64>,
