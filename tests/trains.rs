@@ -630,6 +630,28 @@ fn limits_on_occupants_are_judged() {
     }
 }
 
+/// What no contact has reached by the end of a run is not within a limit: a contact may come yet.
+#[test]
+fn a_vehicle_that_is_still_to_be_hit_is_not_judged() {
+    let laws = ["nose", "hard"].map(|name| {
+        let from = if name == "nose" { "6MN" } else { "8MN" };
+        format!("{name} = {{ stages = [ {{ stroke = \"1m\", from = \"{from}\" }} ], unloading = \"80MN/m\" }}\n")
+    });
+    let train = "inner = \"hard\"\ngap = \"3m\"\nvehicles = [ { name = \"A1\", mass = \"50t\" }, { name = \"A2\", mass = \"10t\" } ]\n[wall]";
+    let limits = "[limits]\nstandard = \"X\"\nedition = \"1\"\nmean_deceleration_g = 13.0\n";
+    let text = scenario(&laws.concat(), train, limits);
+    // It runs on at 10 m/s towards A1, which comes back at 1.1 m/s after 91 ms: 3 m are closed after 284 ms.
+    for (duration, over, unknown) in [("250ms", "", "A2"), ("284ms", "", "A2"), ("400ms", "A2", "")]
+    {
+        let result = run(&text.replace("300ms", duration));
+        let of = |what: &str| -> String {
+            let names = result["summary"]["limits"][what].as_array().unwrap().iter();
+            names.map(|name| name.as_str().unwrap()).collect::<Vec<_>>().join(",")
+        };
+        assert_eq!((&*of("over"), &*of("unknown")), (over, unknown), "{duration}");
+    }
+}
+
 /// A limit is held against the contact that changes the speed most, too, whatever small one comes first.
 #[test]
 fn a_first_small_pulse_hides_no_other() {

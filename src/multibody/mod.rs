@@ -134,9 +134,7 @@ fn beyond_ends(chain: &Chain, run: &Run) -> Vec<String> {
 /// Of interfaces whose gap never closes.
 fn untouched(chain: &Chain, run: &Run) -> Vec<String> {
     let both = chain.interfaces().iter().zip(&run.interfaces);
-    let never = both.filter(|(interface, history)| {
-        interface.gap_m > 0.0 && history.max_deflection_m <= 0.0 && history.peak_force_n <= 0.0
-    });
+    let never = both.filter(|(interface, history)| interface.gap_m > 0.0 && !history.has_touched());
     let said = |(interface, _): (&Interface, _)| {
         format!(
             "interface {} never touches: its gap of {} m stays open up to the end of the run; is the gap in another unit, or duration too short?",

@@ -199,6 +199,10 @@ impl InterfaceHistory {
         is_beyond(self.max_deflection_m, self.data_end_m)
     }
 
+    pub(crate) fn has_touched(&self) -> bool {
+        self.max_deflection_m > 0.0 || self.peak_force_n > 0.0
+    }
+
     /// All energy that it has taken by the end, in J, what it stores among it; `None` if a part is not known.
     pub fn energy_at_end_j(&self) -> Option<f64> {
         Some(self.stored_at_end_j + self.dissipated_at_end_j + self.damped_j?)

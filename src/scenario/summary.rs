@@ -129,8 +129,8 @@ pub(crate) struct Limits<'a> {
     pub(crate) trains: &'a Option<Vec<String>>,
     /// Bodies whose mean deceleration is over it.
     pub(crate) over: Vec<&'a str>,
-    /// Bodies that are still loaded at the end, so that their mean may yet rise or fall; all if an interface went beyond its
-    /// data.
+    /// Bodies that are still loaded at the end, so that their mean may yet rise or fall, or that a contact may still reach;
+    /// all if an interface went beyond its data.
     pub(crate) unknown: Vec<&'a str>,
     /// Limits on what occupants meet.
     pub(crate) occupants: Vec<OccupantLimit<'a>>,
@@ -240,6 +240,18 @@ impl Prepared {
             let all = self.order.iter().zip(&bodies).filter(|(i, _)| self.limited.contains(i));
             all.map(|(_, body)| body)
         };
+        // A body that is still without contact may yet have one.
+        let final_v = |k: usize| run.bodies.get(k).map_or(0.0, |body| body.final_v_m_per_s);
+        let still_closes = run
+            .interfaces
+            .iter()
+            .enumerate()
+            .any(|(k, of)| !of.has_touched() && final_v(k) > final_v(k + 1));
+        let goes_on = still_closes || bodies.iter().any(|body| body.still_loaded_at_end);
+        let is_open = |body: &BodySummary<'_>| {
+            let has_no_contact = body.mean_deceleration_span_s.is_none();
+            body.still_loaded_at_end || has_no_contact && goes_on
+        };
         let beyond_data: Vec<&str> = run.beyond_data().map(|k| &*interfaces[k].name).collect();
         // Beyond its data the force is an assumption, and with it all that follows.
         let is_known = beyond_data.is_empty();
@@ -276,7 +288,7 @@ impl Prepared {
             trains: &limits.trains,
             over: judged().filter(|body| is_known && is_over(body)).map(|body| body.name).collect(),
             unknown: judged()
-                .filter(|body| !is_known || body.still_loaded_at_end && !is_over(body))
+                .filter(|body| !is_known || is_open(body) && !is_over(body))
                 .map(|body| body.name)
                 .collect(),
             occupants: occupants(limits),
