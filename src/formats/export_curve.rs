@@ -266,6 +266,20 @@ impl ExportCurve {
         self.restitution_of(law.energies_j(stop_m, stop_m).0)
     }
 
+    /// The same in words; a recorded case runs on its own unloading branch, which no export has.
+    pub(crate) fn own_restitution_text(&self, wording: &str) -> String {
+        let (own, of) = (self.own_restitution(), &self.predicted);
+        let recorded = of.rebound.filter(|_| of.model == RECORDED);
+        match recorded.map(|rebound| rebound.speed_m_per_s / of.speed_m_per_s) {
+            Some(case) if (case - own).abs() >= 0.0005 => {
+                format!(
+                    "{own:.3} {wording} crumple's own runs of this curve, {case:.3} in those of the case"
+                )
+            }
+            _ => format!("{own:.3} {wording} crumple's own runs"),
+        }
+    }
+
     /// Where a curve has taken up the energy of its own impact, in m: at its maximum crush at the latest.
     fn stop_m(&self, curve: &Envelope) -> f64 {
         let kinetic_j = self.predicted.provenance.kinetic_energy_j;
@@ -281,16 +295,13 @@ impl ExportCurve {
 
     /// The target's restitution compared with ours, in one line.
     pub(crate) fn restitution_note(&self, target: &str, unloading: TargetUnloading) -> String {
-        let ours = self.own_restitution();
+        let ours = self.own_restitution_text("in");
         let theirs = self.restitution(unloading);
         let how = match unloading {
             TargetUnloading::Elastic => "it has no memory: all energy comes back".into(),
             TargetUnloading::Line(k) => format!("it unloads with {}", Shown::one_stiffness(k)),
         };
-        format!(
-            "{}: restitution {theirs:.3} in {target} ({how}), {ours:.3} in crumple's own runs",
-            self.headline()
-        )
+        format!("{}: restitution {theirs:.3} in {target} ({how}), {ours}", self.headline())
     }
 
     /// Notes for a target that unloads with the steepest rise if that is more than the

@@ -41,9 +41,9 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
             ));
         }
         exported.notes.push(format!(
-            "{}: restitution {:.3} as in crumple's own runs",
+            "{}: restitution {}",
             curve.headline(),
-            curve.own_restitution()
+            curve.own_restitution_text("as in")
         ));
         let curve = curve.clone().through(loading, end);
         let name = match (&options.stem, curves) {

@@ -152,8 +152,8 @@ pub(crate) fn write(curve: &ExportCurve, version: FmiVersion) -> Result<Exported
     let bytes = archive(&spring, version)?;
     let there: Vec<&str> = binaries().collect();
     notes.push(format!(
-        "{description}: the FMU holds the whole law, so it rebounds as crumple's own runs do (restitution {:.3}); ready binaries for {}",
-        curve.own_restitution(),
+        "{description}: the FMU holds the whole law: restitution {}; ready binaries for {}",
+        curve.own_restitution_text("as in"),
         there.join(" and ")
     ));
     Ok(Exported {

@@ -15,6 +15,8 @@ const crumple_table_t crumple_table = {
     0.0,
     0.0,
     0.0,
+    0.0,
+    0.0,
     {0.0},
     {0.0},
     {0.0},
