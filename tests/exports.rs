@@ -387,6 +387,25 @@ fn packages_have_the_names_of_their_files() {
     }
     export(here, "lead.model", "several", &["--to", "modelica", "--speed", "36km/h,50km/h"]);
     assert_eq!(package("several/lead_car_wall_50kmh.mo"), "lead_car_wall_50kmh");
+    // Names that differ only in what a name of a file or package cannot hold.
+    let add =
+        "db add alike.h5 lead50.json --group g --speed 50km/h --mass 24t --kind wall -q --case";
+    for case in ["v 10", "v-10", "V_10"] {
+        let line: Vec<&str> = add.split(' ').chain([case]).collect();
+        crumple_ok(here, &line);
+    }
+    for (format, names) in [
+        ("modelica", &["g_V_10.mo", "g_v_10_2.mo", "g_v_10_3.mo"][..]),
+        ("csv", &["g-V_10.csv", "g-v-10-3.csv", "g-v_10-2.csv"]),
+        ("mdf", &["V_10", "v-10", "v_10-2"]),
+        ("iso-mme", &["V_10", "v-10", "v_10-2"]),
+    ] {
+        crumple_ok(here, &format!("export alike.h5 --group g --to {format} -o as-{format} -q"));
+        assert_eq!(entries(&here.join(format!("as-{format}"))), names, "{format}");
+    }
+    for name in ["g_V_10", "g_v_10_2", "g_v_10_3"] {
+        assert_eq!(package(&format!("as-modelica/{name}.mo")), name);
+    }
 }
 
 /// LS-DYNA resamples evenly: that it cannot keep an uneven curve is reported.

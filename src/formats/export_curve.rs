@@ -498,8 +498,10 @@ impl Options {
         let mut curves: Vec<ExportCurve> = Vec::new();
         for input in inputs {
             let mut curve = ExportCurve::new(input, self.force, tail, self.soften)?;
-            let name = file_stem(&curve.predicted);
-            let same = curves.iter().filter(|c| file_stem(&c.predicted) == name);
+            // As file systems without upper and lower case and languages with identifiers distinguish them.
+            let name = |of: &PredictedCurve| identifier(&file_stem(of)).to_lowercase();
+            let own = name(&curve.predicted);
+            let same = curves.iter().filter(|c| name(&c.predicted) == own);
             curve.ordinal = 1 + same.count();
             curves.push(curve);
         }

@@ -22,6 +22,8 @@ mod table;
 mod text;
 mod thin;
 
+use std::collections::BTreeSet;
+use std::iter;
 use std::path::Path;
 
 use crate::curve::{Case, ForceKind, Tail};
@@ -331,9 +333,15 @@ impl Format {
         self.check(options)?;
         let mut all = cases.iter().map(write).collect::<Result<Vec<_>, _>>()?;
         if let [_, _, ..] = &all[..] {
-            // Each test has a folder of its own.
+            // Each test has a folder of its own, also where names differ in what a file's name cannot hold.
+            let mut taken = BTreeSet::new();
             for (exported, case) in all.iter_mut().zip(cases) {
-                let folder: String = case.id.name.chars().map(export_curve::plain).collect();
+                let plain: String = case.id.name.chars().map(export_curve::plain).collect();
+                let first = exported.files.first().map_or("", |file| &file.0).to_lowercase();
+                let numbered = (2..).map(|k| format!("{plain}-{k}"));
+                let mut folders = iter::once(plain.clone()).chain(numbered);
+                let free = |folder: &String| taken.insert((folder.to_lowercase(), first.clone()));
+                let folder = folders.find(free).unwrap_or(plain);
                 exported.files.iter_mut().for_each(|f| f.0 = format!("{folder}/{}", f.0));
             }
         }
