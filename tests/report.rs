@@ -239,6 +239,8 @@ fn designs_and_trains_stand_side_by_side() {
     ] {
         assert!(page.contains(text), "{text}");
     }
+    says(&page, "(wall)</td><td data-name=\"mass\">24.00 t</td>");
+    assert!(!page.contains("for the same impact: they"));
     // Both at one speed, though each has its widest interval elsewhere.
     let at: Vec<&str> = page.split("Predicted curve at ").skip(1).map(|text| &text[..7]).collect();
     assert!(at.len() == 2 && at[0] == at[1], "{at:?}");
@@ -251,6 +253,9 @@ fn designs_and_trains_stand_side_by_side() {
         .next()
         .unwrap();
     assert!(side_by_side.contains("slower.toml") && !side_by_side.contains(">scenario.toml<"));
+    // Impacts of two kinds are not designs under one.
+    crumple_ok(folder, "report curves.h5 other.h5 --methods none -o kinds.html");
+    says(&fs::read_to_string(folder.join("kinds.html")).unwrap(), "they differ in kind of speed.");
     // Files of the same name are distinguished.
     fs::create_dir(folder.join("b")).unwrap();
     let same = fs::read_to_string(folder.join("scenario.toml")).unwrap();

@@ -1,11 +1,15 @@
 //! Designs beside one another: groups of several databases, and several scenarios.
 
+use std::iter;
+
 use super::figure::Figure;
 use super::group::Design;
 use super::train::Ran;
-use super::{Content, Part, Section, energy, force, metres, percent};
+use super::{Content, Part, Section, energy, force, mass, metres, percent};
 use crate::charts::{self, Motion, Quantity};
+use crate::dataset::SAME_MASS;
 use crate::error::Error;
+use crate::surrogate::PredictedCurve;
 use crate::table::Table;
 use crate::unit::{Shown, km_per_h};
 
@@ -23,18 +27,48 @@ pub(super) fn add_designs(content: &mut Content, designs: &[Design]) {
         .column("model", |of| &of.curve.model)
         .column("left-out force error", |of| error(of, |means| means.force_l1))
         .column("velocity", |of| error(of, |means| means.velocity_l1))
-        .column("at", |of| km_per_h(of.curve.speed_m_per_s))
+        .column("at", |of| {
+            let (speed, kind) = (km_per_h(of.curve.speed_m_per_s), of.curve.speed_kind.name());
+            format!("{speed} ({kind})")
+        })
+        .column("mass", |of| {
+            let masses = iter::once(of.curve.mass_kg).chain(of.curve.other_mass_kg());
+            masses.map(mass).collect::<Vec<_>>().join(" against ")
+        })
         .column("peak force", |of| force(of.curve.peak_force_n()))
         .column("maximum crush", |of| metres(of.curve.max_deflection_m))
         .column("energy", |of| energy(of.curve.energy_j));
+    let differ = differences(&designs.iter().map(|of| &of.curve).collect::<Vec<_>>());
     let curves = designs.iter().map(|of| (&*of.title, &of.curve));
     let chart = charts::predictions("Predicted curves of all designs", curves);
-    let parts = vec![
+    let mut parts = vec![
         Part::table("Predicted curves of all designs", table),
         Part::Figure(Figure::new("designs".into(), chart)),
     ];
+    if !differ.is_empty() {
+        let differ = differ.join(" and ");
+        let text = format!(
+            "Not all of these curves are for the same impact: they differ in {differ}."
+        );
+        parts.insert(0, Part::Text(text));
+    }
     let (id, title) = ("designs".into(), "Designs side by side".into());
     content.sections.insert(0, Section { id, title, parts });
+}
+
+/// What the impacts of the curves differ in.
+fn differences(curves: &[&PredictedCurve]) -> Vec<&'static str> {
+    let of_one = |value: fn(&PredictedCurve) -> f64| {
+        curves.iter().all(|curve| (value(curve) / value(curves[0]) - 1.0).abs() <= SAME_MASS)
+    };
+    if curves.iter().any(|curve| curve.speed_kind != curves[0].speed_kind) {
+        return vec!["kind of speed"];
+    }
+    let is_one_speed = of_one(|curve| curve.speed_m_per_s);
+    let both = |curve: &PredictedCurve| curve.other_mass_kg().unwrap_or(1.0);
+    let is_one_mass = of_one(|curve| curve.mass_kg) && of_one(both);
+    let all = [("speed", is_one_speed), ("mass", is_one_mass)];
+    all.iter().filter(|(_, is_one)| !is_one).map(|(what, _)| *what).collect()
 }
 
 /// Adds a section at the front, if there are runs of much the same vehicles to compare.
