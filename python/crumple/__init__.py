@@ -437,7 +437,8 @@ class Model:
     """A trained model: curves at speeds that were never run."""
 
     def __init__(self, path):
-        self.path = Path(path)
+        # A copy is read later, perhaps from another folder.
+        self.path = Path(path).resolve()
         self._model = _crumple.TrainedModel(os.fspath(path))
         self.group, self.name, self.range = self._model.facts()
 
@@ -474,7 +475,7 @@ class Model:
         return curve
 
     def __reduce__(self):
-        return (type(self), (self.path.resolve(),))
+        return (type(self), (self.path,))
 
     def __repr__(self):
         low, high = (3.6 * speed for speed in self.range)
@@ -524,11 +525,20 @@ class Curve:
 
     def __setattr__(self, name, value):
         if name in self.__dict__.get("_of_document", ()):
+            keys = {"force": "force_N", "body_force": "body_force_N", "deflection": "deflection_m"}
+            key = keys.get(name)
+            how = f"crumple.Curve({{**curve.document, '{key}': list(...)}})" if key else "from a changed document"
+            is_other = name == "force" and self.force_kind == "contact"
+            of_force = "; export writes the body force, with force='contact' this one" if is_other else ""
             raise AttributeError(
-                f"{name} is that of the document, which is what is exported: "
-                "give a changed one, crumple.Curve({**curve.document, 'force_N': list(...)})"
+                f"{name} is that of the document, which is what is exported: give a changed one, {how}{of_force}"
             )
         super().__setattr__(name, value)
+
+    def __reduce__(self):
+        # The arrays of a copy cannot be written to, either.
+        own = self._of_document | {"_of_document"}
+        return (type(self), (self.document,), {name: v for name, v in self.__dict__.items() if name not in own})
 
     def to_pandas(self):
         """A DataFrame over deflection: force, body_force and their bands (force_low, ...), where they are known."""

@@ -1,5 +1,6 @@
 """The package as it was installed, on the demo's folder (CRUMPLE_DEMO): values, errors, commands, clients, pickles."""
 
+import copy
 import json
 import math
 import os
@@ -166,12 +167,25 @@ def test_what_is_exported_cannot_be_changed_by_its_arrays():
     for values in (curve.force, curve.deflection, curve.body_force, *curve.band):
         with pytest.raises(ValueError, match="read-only"):
             values[:] = 1.0
-    with pytest.raises(AttributeError, match="^force is that of the document"):
+    with pytest.raises(AttributeError, match="^force is that of the document.*'force_N'.*with force='contact' this one"):
         curve.force = 1.2 * curve.force
+    with pytest.raises(AttributeError, match="^body_force is that of the document.*'body_force_N'"):
+        curve.body_force = 1.2 * curve.body_force
     curve.label = "worst"
     curve.label = "best"
+    for copied in (pickle.loads(pickle.dumps(curve)), copy.deepcopy(curve)):
+        assert copied.label == "best"
+        with pytest.raises(ValueError, match="read-only"):
+            copied.body_force[:] *= 2.0
     worse = crumple.Curve({**curve.document, "force_N": list(1.2 * curve.force)})
     assert np.array_equal(pickle.loads(pickle.dumps(worse)).force, 1.2 * curve.force)
+
+
+def test_a_model_is_copied_from_another_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(DEMO)
+    model = crumple.Model("lead.model")
+    monkeypatch.chdir(tmp_path)
+    assert np.array_equal(copy.copy(model).predict(10.0).force, model.predict(10.0).force)
 
 
 @pytest.mark.parametrize("speed", [np.array([10.0, 12.0]), [10.0], True, np.True_])
