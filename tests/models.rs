@@ -1352,7 +1352,7 @@ fn validate_prints_and_tells_what_to_run_next() {
     assert_eq!(lines.iter().filter(|line| line.starts_with("band of the ")).count(), 4, "{text}");
     assert!(
         lines.len() == 18
-            && lines[10].starts_with("5 of 5 left-out speeds pass")
+            && lines[10].starts_with("5 of 5 predictions at left-out speeds pass")
             && lines[16].starts_with("next run: "),
         "{text}"
     );

@@ -75,7 +75,9 @@ pub(crate) fn choose(
         Purpose::Vehicle => "",
         Purpose::Train => ", ends of the range included,",
     };
-    let speeds = format!("{} left out{ends}", counted(default.1.len(), "speed"));
+    // Where cases differ in more than speed, no model is physical, and a speed may have several of them.
+    let what = if physical.is_some() { "speed" } else { "case" };
+    let speeds = format!("{} left out{ends}", counted(default.1.len(), what));
     let share = |other: &[f64]| 100.0 * (mean(other) / mean(&default.1) - 1.0);
     if let Some((name, errors)) = better {
         let less = -share(errors);
@@ -100,7 +102,7 @@ pub(crate) fn choose(
                 more.abs()
             )
         }
-        Some(_) => format!("it has the smallest errors at {speeds}"),
+        Some(_) => format!("it has the smallest errors with {speeds}"),
         None => "no other model fits these runs".into(),
     };
     Some((default.0.into(), reason))

@@ -414,7 +414,7 @@ fn print_acceptance(out: &mut dyn Write, validation: &Validation, prefix: &str) 
     let worst = all.iter().map(Acceptance::worst).fold(0.0, f64::max);
     writeln!(
         out,
-        "{prefix}{passed} of {} left-out speeds pass the acceptance rule (largest error {}): {ACCEPTANCE} ({STANDARD})",
+        "{prefix}{passed} of {} predictions at left-out speeds pass the acceptance rule (largest error {}): {ACCEPTANCE} ({STANDARD})",
         all.len(),
         percent(worst)
     )

@@ -194,7 +194,7 @@ impl Validated<'_> {
             let passed = accepted.iter().filter(|of| of.passes).count();
             let worst = accepted.iter().map(Acceptance::worst).fold(0.0, f64::max);
             parts.push(Part::Text(format!(
-                "Predictions against FE by the acceptance rule for numerical crash models ({STANDARD}): {ACCEPTANCE}, the whole crush as one stage. {passed} of {} left-out speeds pass; the largest of these errors is {}.",
+                "Predictions against FE by the acceptance rule for numerical crash models ({STANDARD}): {ACCEPTANCE}, the whole crush as one stage. {passed} of {} predictions at left-out speeds pass; the largest of these errors is {}.",
                 accepted.len(),
                 percent(worst)
             )));

@@ -47,9 +47,8 @@ pub(super) fn add_designs(content: &mut Content, designs: &[Design]) {
     ];
     if !differ.is_empty() {
         let differ = differ.join(" and ");
-        let text = format!(
-            "Not all of these curves are for the same impact: they differ in {differ}."
-        );
+        let text =
+            format!("Not all of these curves are for the same impact: they differ in {differ}.");
         parts.insert(0, Part::Text(text));
     }
     let (id, title) = ("designs".into(), "Designs side by side".into());

@@ -142,9 +142,14 @@ impl Model {
         let (model, entry) = (kind.name(), kind.entry());
         let (found, least) = (set.cases.len(), entry.least_curves);
         if found < least {
+            let runs: usize = set.cases.iter().map(|case| case.runs.len()).sum();
+            let of_runs = match runs > found {
+                true => format!(" (the mean of {runs} runs of one impact)"),
+                false => String::new(),
+            };
             return Err(error!(
                 Model,
-                "model {model} needs at least {least} curves, the group has {found}: only --model nearest can use a single curve, as it is"
+                "model {model} needs at least {least} curves, the group has {found}{of_runs}: only --model nearest can use a single curve, as it is"
             ));
         }
         if !set.features.is_empty() && !entry.sees_features {
