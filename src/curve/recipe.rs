@@ -394,9 +394,8 @@ impl Sampling {
         if !(most_s > 0.0 && most_s < usual_s) {
             return usual_s;
         }
-        let decade = 10_f64.powf(most_s.log10().floor());
-        let round = [5.0, 2.0, 1.0].into_iter().map(|of| of * decade);
-        round.into_iter().find(|&s| s <= most_s).unwrap_or(most_s)
+        let decimals = (4..20).flat_map(|k| [5, 2, 1].map(|of| format!("{of}e-{k}").parse().ok()));
+        decimals.flatten().find(|s| *s <= most_s).unwrap_or(most_s)
     }
 }
 
