@@ -209,7 +209,7 @@ fn recorded(
         found = extracted(&Setup { sampling: sampling(interval_s), ..setup })?;
         notes.push(format!(
             "sampling: one state every {} ms, as the crush is short",
-            interval_s * 1e3
+            (interval_s * 1e9).round() / 1e6
         ));
     }
     let Extracted { curves, quality, .. } = found;
