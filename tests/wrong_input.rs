@@ -351,6 +351,9 @@ fn outputs_replace_no_other_kind_of_file() {
         ("report curves.h5 -o lead.model", "lead.model", "a model"),
         ("histories fe/lead-car-wall/25kmh/rwforc -o other.csv", "other.csv", "a solver's file"),
         ("db export curves.h5 -o .", "./cases.csv", "a model"),
+        ("sweep scenario.toml --restart -o curves.h5", "curves.h5", "an HDF5 file"),
+        ("sweep scenario.toml -o other.csv", "other.csv", "a solver's file"),
+        ("sweep merge own.csv -o cases.csv", "cases.csv", "a model"),
     ] {
         let old = before(name);
         let words: Vec<&str> = line.split(' ').collect();
@@ -363,6 +366,9 @@ fn outputs_replace_no_other_kind_of_file() {
             fs::write(here.join(name), old).unwrap();
         }
     }
+    crumple_ok(here, "sweep scenario.toml -o other.csv -q --overwrite");
+    assert!(before("other.csv").starts_with(b"# crumple sweep"));
+    fs::copy(&nodout, here.join("other.csv")).unwrap();
     // Its own kind is replaced as before.
     for _ in 0..2 {
         crumple_ok(here, "db export curves.h5 -o tables -q");

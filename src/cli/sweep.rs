@@ -13,6 +13,7 @@ use crate::plan::OVER_LIMITS;
 use crate::sweep::{self, Precision, Report, Shard, Sweep, WriteOptions, share_interval};
 use crate::table::Table;
 
+use super::arguments::FileKind;
 use super::output::{self, Bar};
 use super::{
     CommandResult, Failure, GlobalOptions, Outcome, failed, is_stdout, keep_input, keep_inputs,
@@ -118,6 +119,7 @@ pub(super) fn run(args: &Args, global: GlobalOptions) -> CommandResult {
             keep_input(plan, output)?;
         }
         check_output(output)?;
+        global.keep_others(output, FileKind::Sweep)?;
         if args.shard.is_some_and(|shard| shard != Shard::WHOLE) && is_hdf5(output) {
             return usage(format!(
                 "-o {}: a shard is written as .csv, which merge joins and writes as .csv, .h5 or .hdf5",
@@ -134,7 +136,10 @@ pub(super) fn run(args: &Args, global: GlobalOptions) -> CommandResult {
         Some(output) if !args.dry_run => output,
         _ => return dry_run(&sweep, shard, global),
     };
-    let options = WriteOptions { shard, restart: args.restart, ..WriteOptions::default() };
+    // What is of another kind is not resumed.
+    let replaces = global.overwrite && output.is_file() && FileKind::of(output)? != FileKind::Sweep;
+    let restart = args.restart || replaces;
+    let options = WriteOptions { shard, restart, ..WriteOptions::default() };
     let (report, reached) = match &args.until {
         Some(precision) => until(&mut sweep, output, precision, &options, global)?,
         None => (write(&sweep, output, &options, global)?, None),
@@ -219,6 +224,7 @@ fn stop_flag() -> Arc<AtomicBool> {
 
 fn merge(shards: &[PathBuf], output: &Path, global: GlobalOptions) -> CommandResult {
     check_output(output)?;
+    global.keep_others(output, FileKind::Sweep)?;
     for input in shards {
         keep_input(input, output)?;
     }
