@@ -503,6 +503,21 @@ fn a_manifest_that_moved_takes_its_cases_along_and_a_copy_does_not() {
     let said = String::from_utf8(output.stderr).unwrap();
     says(&said, "both studies have one name and group; with another name in [study]");
     says(&said, &first.display().to_string());
+    // So does another run under a name that is there.
+    let whole = text.clone();
+    let text = fs::read_to_string(&third).unwrap();
+    assert!(text.contains("filter     = \"none\""), "{text}");
+    fs::write(
+        &first,
+        text.replace("filter     = \"none\"", "filter     = \"none\"\ncontact_threshold = 0.02"),
+    )
+    .unwrap();
+    let output = crumple_in(&here, &format!("build {} -o curves.h5 --strict", first.display()));
+    assert_eq!(output.status.code(), Some(3));
+    let said = String::from_utf8(output.stderr).unwrap();
+    says(&said, "replaced ");
+    says(&said, &format!(" and kept tags and notes, built from {}: both studies", third.display()));
+    fs::write(&first, whole).unwrap();
     fs::remove_file(here.join("curves.h5")).unwrap();
     // In its place: one.
     studied.study = first.clone();

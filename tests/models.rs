@@ -2121,6 +2121,7 @@ fn cases_of_one_speed_are_distinguished() {
     let output = crumple_in(here, "plot two.h5 --left-out 48km/h -o drawn.svg --overwrite");
     let warned = String::from_utf8(output.stderr).unwrap();
     says(&warned, "several cases, of which lead-car-b-wall-48 is drawn: choose by --case among");
+    crumple_fails(here, 3, "plot two.h5 --left-out 48km/h -o drawn.svg --overwrite --strict");
     let error = crumple_fails(here, 2, "plot two.h5 --left-out 48km/h --case other -o drawn.svg");
     says(&error, "--case other: at 48 km/h there is lead-car-b-wall-48, lead-car-wall-48");
     // Characters that the font lacks.

@@ -75,6 +75,8 @@ pub struct BuildReport {
     pub(crate) removed: Vec<CasePath>,
     /// The manifest that some of these were built from, if it is another one that is still there.
     pub(crate) removed_of: Option<String>,
+    /// Runs whose case was built from another manifest that is still there, and that one.
+    pub(crate) replaced: BTreeMap<String, String>,
     /// Cases of runs that have another name or group than before: from where to where.
     pub(crate) moved: Vec<(CasePath, CasePath)>,
     /// Groups that were built from the manifest when it had another study or group and other runs
@@ -166,6 +168,10 @@ pub(crate) fn build_runs(
     }
     let moved = move_along(&mut database, &study, &previous)?;
     let runs = put(&mut database, &study, &previous, results)?;
+    let mut replaced = previous.of_others;
+    replaced.retain(|name, _| {
+        runs.iter().any(|run| run.name == *name && matches!(run.outcome, RunOutcome::Built))
+    });
     let changed = !previous.left.is_empty()
         || !moved.is_empty()
         || runs.iter().any(|run| matches!(run.outcome, RunOutcome::Built));
@@ -179,6 +185,7 @@ pub(crate) fn build_runs(
         runs,
         removed: previous.left,
         removed_of: previous.left_of,
+        replaced,
         moved,
         earlier: previous.earlier.into_iter().collect(),
         database,
@@ -269,6 +276,8 @@ struct Previous {
     pub left: Vec<CasePath>,
     /// Another manifest that is still there and that some of these were built from.
     pub left_of: Option<String>,
+    /// The same of the runs' cases, by the runs' names.
+    pub of_others: BTreeMap<String, String>,
     /// If the database has no case of the study: groups with cases that were built from the manifest
     /// when it belonged to another study or group; no run of this one has them.
     pub earlier: BTreeSet<String>,
@@ -329,8 +338,14 @@ impl Previous {
             let path = Path::new(then);
             **then != now && path.exists() && !file::is_same(path, Path::new(&now))
         };
-        let origins = left.iter().filter_map(|case| case.provenance.origin.as_ref());
-        previous.left_of = origins.map(|origin| &origin.manifest).filter(is_other).min().cloned();
+        previous.left_of =
+            left.iter().filter_map(|case| manifest_of(case)).filter(is_other).min().cloned();
+        let places: HashMap<CasePath, &Case> =
+            built.iter().map(|case| (CasePath::of(case), *case)).collect();
+        for (run, (path, _)) in &previous.of_run {
+            let then = places.get(path).and_then(|case| manifest_of(case)).filter(is_other);
+            previous.of_others.extend(then.map(|then| (run.clone(), then.clone())));
+        }
         previous.left = left.into_iter().map(CasePath::of).collect();
         previous.left.sort();
         previous
@@ -376,6 +391,10 @@ fn place(study: &Study, case: &Case, run: &str) -> CasePath {
 /// The group that the manifest had for a case.
 fn group_of(case: &Case) -> &str {
     case.provenance.origin.as_ref().map_or(&case.id.group, |origin| &origin.group)
+}
+
+fn manifest_of(case: &Case) -> Option<&String> {
+    case.provenance.origin.as_ref().map(|origin| &origin.manifest)
 }
 
 /// The run that a case was built from.

@@ -101,13 +101,20 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let of_group = siblings::remarks(report.database.cases(&report.group));
     let of_group: Vec<String> =
         of_group.into_iter().map(|(case, _, words)| format!("{case}: {words}")).collect();
-    let replaced = report.removed_of.as_ref().map(|other| {
+    let of_others = |what: String, other: &String| {
         format!(
-            "removed {}, built from {other}: both studies have one name and group; with another name in [study] of one of them a database keeps both",
-            removed(&report).join(", ")
+            "{what}, built from {other}: both studies have one name and group; with another name in [study] of one of them a database keeps both"
         )
+    };
+    let gone = report.removed_of.as_ref();
+    let gone =
+        gone.map(|other| of_others(format!("removed {}", removed(&report).join(", ")), other));
+    let replaced = report.replaced.values().next().map(|other| {
+        let names: Vec<&str> = report.replaced.keys().map(|name| &**name).collect();
+        of_others(format!("replaced {} and kept tags and notes", names.join(", ")), other)
     });
-    outcome = outcome.max(options.warn_all(warnings.iter().chain(&of_group).chain(&replaced)));
+    let of_others = gone.iter().chain(&replaced);
+    outcome = outcome.max(options.warn_all(warnings.iter().chain(&of_group).chain(of_others)));
     let database = output.display().to_string();
     let runs = report.runs.iter().map(|run| {
         let (word, error) = outcome_of(run);

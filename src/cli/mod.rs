@@ -24,6 +24,7 @@ mod sweep;
 mod train;
 mod validate;
 
+use std::cell::Cell;
 use std::error::Error;
 use std::ffi::OsString;
 use std::fmt::Display;
@@ -236,6 +237,7 @@ impl GlobalOptions {
 
     /// A warning on standard error.
     pub(crate) fn warn(self, text: &str) {
+        WARNED.set(true);
         if !self.quiet {
             output::eprint_line(&format!("warning: {text}"));
         }
@@ -262,6 +264,11 @@ impl GlobalOptions {
             notes.iter().for_each(|note| output::eprint_line(&format!("note: {note}")));
         }
     }
+}
+
+thread_local! {
+    /// Whether the command has warned.
+    static WARNED: Cell<bool> = const { Cell::new(false) };
 }
 
 /// The command line that was given, for what repeats it.
@@ -349,10 +356,10 @@ pub fn run_program(arguments: Vec<OsString>) -> u8 {
     };
     let options = cli.options;
     file::accept_changed(options.accept_changed);
-    match run(cli.command, options) {
-        Ok(Outcome::Clean) => DONE,
+    WARNED.set(false);
+    match run(cli.command, options).map(|outcome| outcome.max(Outcome::warned_if(WARNED.get()))) {
         Ok(Outcome::Warned) if options.strict => DONE_WITH_WARNINGS,
-        Ok(Outcome::Warned) => DONE,
+        Ok(Outcome::Clean | Outcome::Warned) => DONE,
         Ok(Outcome::Partly) => FAILED,
         Err(error) if output::is_closed_pipe(&*error) => DONE,
         Err(error) => {

@@ -71,10 +71,10 @@ fn show(cases: &[&Case], options: GlobalOptions) -> CommandResult {
             groups.entry(&case.id.group).or_default().push(full_case(case)?);
         }
         output::print_json(&document! { groups: groups })?;
-        return Ok(Outcome::Clean);
+    } else {
+        options.print(|out| cases.iter().try_for_each(|case| print_case(out, case)))?;
     }
-    options.print(|out| cases.iter().try_for_each(|case| print_case(out, case)))?;
-    Ok(Outcome::Clean)
+    Ok(Outcome::warned_if(cases.iter().any(|case| !case.quality.warnings.is_empty())))
 }
 
 fn print_case(out: &mut dyn Write, case: &Case) -> io::Result<()> {
