@@ -710,6 +710,46 @@ fn a_first_small_pulse_hides_no_other() {
     }
 }
 
+/// An interface that is crushed on, slowly, when the vehicles' main contacts are over.
+#[test]
+fn a_crush_that_goes_on_after_the_end_is_warned_of() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    // A draft gear, a tube and what shears off.
+    let write = |name: &str, rows: &str| {
+        let rows = rows.replace(' ', "\n");
+        std::fs::write(here.join(name), format!("# force_kind: body\nd_m,force_MN\n{rows}\n"))
+            .unwrap();
+    };
+    write("nose.csv", "0,0 0.02,3.0 0.05,1.6 0.30,1.7 0.60,1.9 0.65,3.2 0.80,2.6 1.60,3.4");
+    write("inner.csv", "0,0 0.05,0.6 0.06,1.2 0.40,1.2 0.41,0.3 0.50,0.3 0.55,4.0 0.90,5.0");
+    let laws = "nose = { file = \"nose.csv\", unloading = \"200MN/m\" }\ninner = { file = \"inner.csv\", unloading = \"120MN/m\", gap = \"13.6mm\", scale = 0.9 }";
+    let of = |train: &str| -> String {
+        let vehicle = |k: usize| {
+            let mass = if k == 1 { "29.42t" } else { "24.52t" };
+            format!("{{ name = \"{train}{k}\", mass = \"{mass}\" }}")
+        };
+        format!("inner = \"inner\"\nvehicles = [ {} ]\n", [1, 2, 3].map(vehicle).join(", "))
+    };
+    let other = format!("[[train]]\nname = \"B\"\nspeed = \"0km/h\"\n{}", of("B"));
+    let at = |duration: &str| {
+        let text = scenario(laws, &of("A"), &other).replace("300ms", duration);
+        std::fs::write(here.join("s.toml"), text).unwrap();
+        parsed(&crumple_ok(here, "simulate s.toml --json -q"))
+    };
+    let (short, long) = (at("199.5ms"), at("900ms"));
+    let crush = |of: &Value| {
+        let all = of["summary"]["interfaces"].as_array().unwrap().iter();
+        let one = all.clone().find(|i| i["name"] == "A1|A2").unwrap();
+        one["max_deflection_m"].as_f64().unwrap()
+    };
+    assert!(crush(&long) > 1.2 * crush(&short));
+    let said =
+        "these are still being crushed, so crush and energy are not final: A1|A2, B1|B2; lengthen";
+    assert!(short["warnings"].to_string().contains(said), "{}", short["warnings"]);
+    assert_eq!(long["warnings"], json!([]));
+}
+
 /// A run that is too short for its mean deceleration says so, by every method.
 #[test]
 fn a_run_that_ends_while_loading_is_said() {

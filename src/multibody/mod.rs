@@ -74,7 +74,9 @@ pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, Error> {
         let is_of_impact = |ratio: &f64| *ratio <= MOST_RESTITUTION && !is_of_plate;
         history.restitution = history.restitution.filter(is_of_impact);
     }
-    run.warnings.extend(still_loaded(chain, &run, grid.output_s(grid.outputs)));
+    let end_s = grid.output_s(grid.outputs);
+    run.warnings.extend(still_loaded(chain, &run, end_s));
+    run.warnings.extend(still_crushed(chain, &run, end_s));
     Ok(run)
 }
 
@@ -172,9 +174,50 @@ fn free_travel(chain: &Chain, run: &Run) -> Vec<String> {
     warnings
 }
 
+/// Growth of a crush after the end of the run, as a share of it, that deserves a warning.
+const GROWTH: f64 = 0.01;
+
+/// Of interfaces that are crushed further after the end of the run, between bodies whose main contact is over.
+fn still_crushed(chain: &Chain, run: &Run, end_s: f64) -> Option<String> {
+    let (bodies, last_s) = (chain.bodies(), end_s - 1.5 * run.step_s);
+    let is_loaded = |k: usize| run.bodies.get(k).is_some_and(is_cut);
+    let speed = |k: usize| run.bodies.get(k).map_or(0.0, |body| body.final_v_m_per_s);
+    let grows = |k: usize, interface: &Interface| {
+        let (history, closing) = (&run.interfaces[k], speed(k) - speed(k + 1));
+        // A wall weighs more than anything.
+        let ahead = bodies.get(k + 1).map_or(0.0, |body| 1.0 / body.mass_kg);
+        let energy_j = 0.5 * closing * closing / (1.0 / bodies[k].mass_kg + ahead);
+        let crush_m = history.max_deflection_m;
+        let force_n = interface.law.force_n(crush_m, crush_m);
+        closing > 0.0
+            && history.max_deflection_time_s >= last_s
+            && energy_j > GROWTH * crush_m * force_n
+            && crush_m > 0.0
+            && !is_loaded(k)
+            && !is_loaded(k + 1)
+    };
+    let names: Vec<&str> = chain
+        .interfaces()
+        .iter()
+        .enumerate()
+        .filter(|(k, interface)| grows(*k, interface))
+        .map(|(_, interface)| interface.name.as_str())
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "the run ends at {} s while these are still being crushed, so crush and energy are not final: {}; lengthen duration",
+            (end_s * 1e9).round() / 1e9,
+            names.join(", ")
+        )
+    })
+}
+
+fn is_cut(body: &BodyHistory) -> bool {
+    body.main_contact.map_or(body.is_loaded_at_end, |(.., is_cut)| is_cut)
+}
+
 /// Of bodies that a contact still loads at the end of the run.
 fn still_loaded(chain: &Chain, run: &Run, end_s: f64) -> Option<String> {
-    let is_cut = |b: &BodyHistory| b.main_contact.map_or(b.is_loaded_at_end, |(.., is_cut)| is_cut);
     let loaded = chain.bodies().iter().zip(&run.bodies).filter(|(_, b)| is_cut(b));
     let bodies: Vec<&str> = loaded.map(|(body, _)| body.name.as_str()).collect();
     if bodies.is_empty() {
