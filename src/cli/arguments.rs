@@ -2,11 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::io::Read;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 
-use super::{Failure, usage};
+use super::{Failure, is_stdout, usage};
 use crate::curve::{ForceKind, Parameter};
 use crate::error::error;
 use crate::file;
@@ -17,6 +17,14 @@ use crate::solver::{Selection, WantedId};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::sweep;
 use crate::unit::{LENGTH, MASS, SPEED, STIFFNESS, SpeedKind, UnitSystem};
+
+/// A file or folder that cannot be standard output.
+pub(super) fn named() -> impl TypedValueParser<Value = PathBuf> {
+    PathBufValueParser::new().try_map(|path| match is_stdout(&path) {
+        true => Err("this cannot be written to standard output: name it (./- for the name -)"),
+        false => Ok(path),
+    })
+}
 
 /// A speed with its unit, in m/s.
 pub(super) fn speed(text: &str) -> Result<f64, String> {

@@ -12,6 +12,7 @@ use crate::error::error;
 use crate::plural::counted;
 use crate::table::Table;
 
+use super::arguments::named;
 use super::db::{case_columns, case_row};
 use super::output::{self, Bar};
 use super::{CommandResult, Failure, GlobalOptions, Outcome, usage};
@@ -29,7 +30,7 @@ pub(super) struct Args {
     /// Study manifest (TOML), or a folder with a study.toml; study.toml if absent
     study: Option<PathBuf>,
     /// Database to write or to update; curves.h5 next to the study if absent
-    #[arg(short, long)]
+    #[arg(short, long, value_parser = named())]
     output: Option<PathBuf>,
     /// Build this run only, as a part of the work; may be repeated [default: all]
     #[arg(long)]

@@ -21,6 +21,7 @@ use crate::unit::{M_PER_S_PER_KM_PER_H, Shown, km_per_h};
 use crate::{formats, scenario};
 use include_dir::{Dir, include_dir};
 
+use super::arguments::named;
 use super::output::{self, Bar};
 use super::validate::print_validation;
 use super::{CommandResult, Failure, GlobalOptions, usage};
@@ -32,7 +33,7 @@ use super::{CommandResult, Failure, GlobalOptions, usage};
   crumple demo -o somewhere")]
 pub(super) struct Args {
     /// Folder to write to
-    #[arg(short, long, default_value = "crumple-demo")]
+    #[arg(short, long, default_value = "crumple-demo", value_parser = named())]
     output: PathBuf,
 }
 

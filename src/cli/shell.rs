@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::file::write_whole;
 use clap::{Command, CommandFactory};
 
+use super::arguments::named;
 use super::{Cli, CommandResult, GLOBAL, GlobalOptions, Outcome, output};
 
 /// Print a completion script for a shell
@@ -25,7 +26,7 @@ pub(super) struct Completions {
 pub(super) struct Man {
     /// Folder for crumple.1 and a page of every command, such as crumple-build.1; created if it does
     /// not exist
-    #[arg(short, long, value_name = "DIR")]
+    #[arg(short, long, value_name = "DIR", value_parser = named())]
     output: Option<PathBuf>,
 }
 

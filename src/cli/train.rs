@@ -14,7 +14,7 @@ use crate::surrogate::{MODELS, ModelKind, WarningCode};
 use crate::unit::{Shown, SpeedKind, km_per_h};
 use clap::builder::{PossibleValue, PossibleValuesParser};
 
-use super::arguments::{FileKind, one_of};
+use super::arguments::{FileKind, named, one_of};
 use super::output::Bar;
 use super::validate::print_validation;
 use super::{CommandResult, Failure, GlobalOptions, keep_input, usage};
@@ -65,7 +65,7 @@ pub(super) struct Args {
     #[arg(long, conflicts_with_all = ["model", "purpose", "trees", "min_samples_leaf", "thresholds", "stop", "stop_threshold"])]
     paper: bool,
     /// Model file to write
-    #[arg(short, long)]
+    #[arg(short, long, value_parser = named())]
     output: PathBuf,
 }
 

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use crate::curate::{self, Joined, JoinedCase, OnConflict};
 use crate::plural::counted;
 
+use super::super::arguments::named;
 use super::{Chosen, CommandResult, GlobalOptions, usage};
 
 /// What happens to a case whose name another curve has, and whether anything is written.
@@ -40,7 +41,7 @@ pub(super) struct MergeArgs {
     #[arg(required = true, num_args = 2..)]
     databases: Vec<PathBuf>,
     /// Database to write: a new file, or one of those that are joined
-    #[arg(short, long)]
+    #[arg(short, long, value_parser = named())]
     output: PathBuf,
     #[command(flatten)]
     how: JoinOptions,
@@ -60,7 +61,7 @@ pub(super) struct CopyArgs {
     #[command(flatten)]
     chosen: Chosen,
     /// Database to copy to; created if it does not exist [default: the same]
-    #[arg(long, value_name = "DATABASE")]
+    #[arg(long, value_name = "DATABASE", value_parser = named())]
     to: Option<PathBuf>,
     /// Group to copy to [default: the case's own]
     #[arg(long, value_name = "GROUP")]

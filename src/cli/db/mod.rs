@@ -10,7 +10,7 @@ mod show;
 
 use std::path::{Path, PathBuf};
 
-use super::arguments::FileKind;
+use super::arguments::{FileKind, named};
 use super::{CommandResult, Failure, GlobalOptions, Outcome, arguments, output, usage};
 use crate::curate::{self, Selection, SpeedRange};
 use crate::curve::Case;
@@ -221,7 +221,7 @@ struct ExportArgs {
     #[command(flatten)]
     chosen: Chosen,
     /// Folder to write to; created if it does not exist
-    #[arg(short, long)]
+    #[arg(short, long, value_parser = named())]
     output: PathBuf,
     /// Also write originals.csv, the curves at the solver's rate
     #[arg(long)]
