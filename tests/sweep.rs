@@ -152,6 +152,12 @@ fn what_has_no_effect_is_refused() {
         folder.put("s.toml", &format!("{scenario}[sweep]\nvary = [ {{ {vary} }} ]\n"));
         says(&folder.fails(1, "sweep s.toml -q -o out.csv"), expected);
     };
+    // Readers take "#" in a column's name for a comment.
+    refused(
+        &SCENARIO.replace("\"A2\"", "\"#2\""),
+        "what = \"speed\", train = \"A\", values = [\"9m/s\"]",
+        "the name \"#2\" appears in the result and may not be empty or contain , | [ ] # or quotes",
+    );
     let gap = "what = \"gap\", curve = \"inner\", values = [\"1mm\", \"9mm\"]";
     let own = SCENARIO.replace("inner = \"inner\"", "gap = \"30mm\"\ninner = \"inner\"");
     assert_ne!(own, SCENARIO);
@@ -1131,6 +1137,8 @@ fn only_all_shards_of_one_sweep_are_merged() {
         fails("p1.* cut.* p3.*", "cut.csv");
         fs::write(folder.path().join("cut.csv"), &whole[..8]).unwrap();
         fails("p1.* cut.* p3.*", "cut.csv");
+        folder.put("crlf.csv", &folder.text("p2.csv").replace('\n', "\r\n"));
+        fails("p1.* crlf.* p3.*", "crlf.csv: another program has saved this result with");
         folder.put("s.csv", "d_m,force_N\n0,0\n1,1\n");
         fails("s.csv", "s.csv is not a result of crumple sweep");
         folder.put("empty.csv", "");

@@ -278,6 +278,17 @@ impl ShardFile {
     pub(crate) fn read_head(path: &Path) -> Result<Option<Self>, Error> {
         let io = |source| Error::io(path, source);
         let mut reader = BufReader::new(file::open(path).map_err(io)?);
+        let first = reader.fill_buf().map_err(io)?;
+        let text = first.strip_prefix(b"\xef\xbb\xbf").unwrap_or(first);
+        let line = text.split(|b| *b == b'\n').next().unwrap_or_default();
+        if text.starts_with(format!("# {FORMAT}").as_bytes())
+            && (text.len() < first.len() || line.ends_with(b"\r"))
+        {
+            return Err(damaged(
+                path,
+                "another program has saved this result with a byte order mark or the line ends of Windows: restore the file, or save it in UTF-8 without a mark, with \\n at the end of lines",
+            ));
+        }
         let head = ShardHeader::read(&mut reader).map_err(io)?;
         Ok(head.map(|(head, _)| Self { path: path.into(), head }))
     }

@@ -69,6 +69,9 @@ pub(crate) fn bind(plan: &Plan, scenario: &Scenario) -> Result<(Vec<Variable>, D
     if plan.vary.is_empty() {
         return Err(error!(Sweep, "[sweep] varies nothing: add [[sweep.vary]]"));
     }
+    for vehicle in scenario.train.iter().flat_map(|train| &train.vehicles) {
+        check_name("", &vehicle.name)?;
+    }
     let (mut variables, mut spreads) = (Vec::new(), Vec::new());
     for (k, vary) in plan.vary.iter().enumerate() {
         let named = |fault: Error| {
