@@ -80,7 +80,10 @@ pub fn group_curves(group: &str, cases: &[Case], force: ForceKind) -> Chart {
     }
     let panel = Panel { series, ..axes(top) };
     let kind = cases.first().map_or("speed", |case| case.conditions.speed.kind.name());
-    let title = format!("{group}: {} force by {kind} speed", force.name());
+    // From the motion it is drawn as a run on it has it; models and the database have it filtered.
+    let of_motion = |case: &Case| force == ForceKind::Body && case.curves.force_kind != force;
+    let unfiltered = if cases.iter().any(of_motion) { " (not filtered)" } else { "" };
+    let title = format!("{group}: {} force{unfiltered} by {kind} speed", force.name());
     let mut chart = Chart::of(&title, panel);
     if !missing.is_empty() {
         chart.notes.push(format!("Without a {} force: {}.", force.name(), missing.join(", ")));

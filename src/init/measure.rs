@@ -63,7 +63,12 @@ impl Impact {
         let is_kept = is_near(record.closing(0), record.closing(before), SAME_SPEED);
         let state = if is_kept { 0 } else { before };
         let end = record.loading_end().unwrap_or(time_s.len() - 1);
-        let crush = (record.travel[end] - record.travel[before.min(end)]).abs();
+        let begin = before.min(end);
+        let after = (begin + 1).min(end);
+        let step_s = time_s[after] - time_s[begin];
+        let share = if step_s > 0.0 { (contact_s - time_s[begin]) / step_s } else { 0.0 };
+        let to_contact = share.clamp(0.0, 1.0) * (record.travel[after] - record.travel[begin]);
+        let crush = (record.travel[end] - record.travel[begin] - to_contact).abs();
         Self {
             speed_m_per_s: bodies * record.closing(state) * units.speed(),
             state: (state, time_s[state]),
