@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use serde_json::Value;
 
 use crate::common::{
-    build_fixture, crumple_fails, crumple_in, crumple_ok, entries, json, read_json, says,
+    build_fixture, crumple_fails, crumple_in, crumple_ok, entries, fixture, json, read_json, says,
 };
 
 /// The curve of all these files: a rise, a fall, a plateau; in m and N.
@@ -696,6 +696,49 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
 
 /// Predicted curves of a model, written as JSON and CSV and added again, make a group on which
 /// models train; a build into the same database keeps it.
+/// Exports of a case over time say when contact begins: a body force, which rises late, and an offset come back as they are.
+#[test]
+fn the_contact_of_an_exported_case_comes_back() {
+    let folder = here();
+    let here = folder.path();
+    let run = fixture("fe/lead-car-wall/36kmh");
+    for (name, force, offset) in [
+        (
+            "body",
+            "{ file = \"nodout\", node = 900001, component = \"x_velocity\", times = \"mass\" }",
+            "",
+        ),
+        (
+            "offset",
+            "{ file = \"rwforc\", id = 1, component = \"normal_force\" }",
+            "offset = \"20mm\"\n",
+        ),
+    ] {
+        let study = format!(
+            "[study]\nname = \"{name}\"\nunits = \"mm-t-s\"\ngroup = \"{name}\"\nkind = \"wall\"\n[recipe]\n\
+             deflection = {{ file = \"nodout\", node = 900001, component = \"x_displacement\" }}\nforce = {force}\n\
+             filter = \"none\"\nsampling = {{ states = 400, interval_ms = 0.75 }}\n\
+             [[run]]\npath = {run:?}\nname = \"36kmh\"\nspeed = \"36km/h\"\nmass = \"24t\"\ncontact_time = \"0ms\"\n{offset}"
+        );
+        fs::write(here.join("study.toml"), study).unwrap();
+        crumple_ok(here, &format!("build study.toml -o {name}.h5 -q"));
+        let curve = |database: &str| -> (f64, Value) {
+            let shown = json(&crumple_ok(here, &format!("db show {database} --json -q")));
+            let group = shown["groups"].as_object().unwrap().values().next().unwrap()[0].clone();
+            let crush = group["max_deflection_m"].as_f64().unwrap();
+            (crush, group["force_kind"].clone())
+        };
+        let (crush_m, kind) = curve(&format!("{name}.h5"));
+        for ending in ["mf4", "mme"] {
+            crumple_ok(here, &format!("export {name}.h5 --case 36kmh -o {name}.{ending} -q"));
+            crumple_ok(here, &format!("db add {name}-{ending}.h5 {name}.{ending} --group g -q"));
+            let (found_m, found_kind) = curve(&format!("{name}-{ending}.h5"));
+            assert!((found_m - crush_m).abs() < 1e-6, "{name}, {ending}: {found_m}, not {crush_m}");
+            assert_eq!(found_kind, kind, "{name}, {ending}");
+        }
+    }
+}
+
 /// A specimen a hundredth as long is hit in a hundredth of the time: at the same speed it is crushed a hundredth as far.
 #[test]
 fn a_short_crush_is_sampled_as_finely_as_a_long_one() {
@@ -1000,6 +1043,7 @@ proptest! {
             masses: crumple::curve::Masses { body_kg: 24e3, other_kg: None },
             unloading_stiffness_n_per_m: unloading,
             body_unloading_stiffness_n_per_m: None,
+            contact_time_s: None,
             units: UnitSystem::parse("SI").unwrap(),
             accept_energy: true,
         };

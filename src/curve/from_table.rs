@@ -158,10 +158,17 @@ fn recorded(
     impact: &Impact,
 ) -> Result<(RecordedCurves, Quality), Error> {
     let mut notes = vec!["motion: from the file's times, not filtered".to_string()];
-    let contact = begins_in_contact(time_s, table.force_n).then(|| {
-        notes.push("contact: the record starts at contact".into());
-        StatedContact::Time { s: time_s[0] }
+    let contact = impact.contact_time_s.or_else(|| {
+        begins_in_contact(time_s, table.force_n).then(|| {
+            notes.push("contact: the record starts at contact".into());
+            time_s[0]
+        })
     });
+    // What a file has at the contact that it states belongs to the deflection.
+    let offset_m = impact
+        .contact_time_s
+        .and_then(|s| interpolate(time_s, table.deflection_m, &[s]).ok())
+        .map_or(0.0, |at| at[0]);
     let length_s = time_s[time_s.len() - 1] - time_s[0];
     let sampling = |interval_s: f64| {
         let states = (length_s / interval_s) as usize;
@@ -178,7 +185,12 @@ fn recorded(
         deck_speed: None,
         contact_threshold: contact::THRESHOLD,
         of_impulse: false,
-        stated: Stated { contact, accept_energy: impact.accept_energy, ..Stated::default() },
+        stated: Stated {
+            contact: contact.map(|s| StatedContact::Time { s }),
+            offset_m,
+            accept_energy: impact.accept_energy,
+            ..Stated::default()
+        },
         others: &Vec::new,
     };
     let (record, remarks) =
@@ -311,6 +323,7 @@ mod tests {
             masses: Masses { body_kg: m, other_kg: None },
             unloading_stiffness_n_per_m: None,
             body_unloading_stiffness_n_per_m: None,
+            contact_time_s: None,
             units: UnitSystem::SI,
             accept_energy: false,
         }

@@ -35,6 +35,8 @@ pub struct Impact {
     pub unloading_stiffness_n_per_m: Option<f64>,
     /// The same for the force that moves the body, where that is another.
     pub body_unloading_stiffness_n_per_m: Option<f64>,
+    /// Time of the first contact in s, if it is stated; of a table with times.
+    pub contact_time_s: Option<f64>,
     /// Units in which the table's values were read, to find the cause of errors.
     pub units: UnitSystem,
     /// Accept the table whatever its energy.

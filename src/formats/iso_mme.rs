@@ -90,6 +90,9 @@ pub(super) fn write_case(case: &Case) -> Result<Exported, Error> {
         interval_s: interval_s(times)?,
         remarks: vec![
             "deflection and force positive in compression; time 0 is the first contact".into(),
+            format!("force_kind: {}", case.curves.force_kind.name()),
+            format!("speed_kind: {}", case.conditions.speed.kind.name()),
+            "contact_time_s: 0".into(),
             format!("recipe {}", case.provenance.recipe),
         ],
     };

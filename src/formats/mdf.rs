@@ -43,6 +43,7 @@ pub(super) fn write_case(case: &Case) -> Result<Exported, Error> {
         format!("mass_kg: {}", case.conditions.masses.body_kg),
     ];
     facts.extend(case.conditions.masses.other_kg.map(|kg| format!("other_mass_kg: {kg}")));
+    facts.push("contact_time_s: 0".into());
     facts.push("sign: deflection and force positive in compression, time 0 is the first contact; inertia is the force that moves the body".into());
     let bytes = file(&facts.join("\n"), &format!("{group}/{name}"), sampled.time_s(), &channels);
     let name: String = format!("{group}-{name}").chars().map(plain).collect();

@@ -149,6 +149,7 @@ pub(crate) fn case_of(
             Some(_) => None,
             None => curve.facts.body_unloading_stiffness_n_per_m,
         },
+        contact_time_s: curve.facts.contact_time_s,
         units: curve.units.unwrap_or(UnitSystem::SI),
         accept_energy: settings.accept_energy,
     };

@@ -231,7 +231,7 @@ fn found_elsewhere(record: &Record, stated_s: f64, setup: &Setup<'_>) -> Option<
     let is_elsewhere = (found.time_s - stated_s).abs() > found.interval_s.unwrap_or(0.0);
     is_elsewhere.then(|| {
         format!(
-            "contact: {} as set in the manifest; the force starts at {}",
+            "contact: {} as stated; the force starts at {}",
             milliseconds(stated_s),
             milliseconds(found.time_s)
         )

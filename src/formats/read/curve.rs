@@ -121,6 +121,8 @@ pub struct Metadata {
     pub mass_kg: Option<f64>,
     /// Mass of the other body in kg.
     pub other_mass_kg: Option<f64>,
+    /// Time of the first contact, in s, whatever the force there.
+    pub contact_time_s: Option<f64>,
     /// Maximum crush in m; points after it are what other tools need beyond it.
     pub max_deflection_m: Option<f64>,
     /// Where its runs' data end before that, in m.
@@ -150,6 +152,10 @@ impl Metadata {
             "speed_m_per_s" => self.speed_m_per_s = above_zero()?,
             "mass_kg" => self.mass_kg = above_zero()?,
             "other_mass_kg" => self.other_mass_kg = above_zero()?,
+            "contact_time_s" => {
+                let time_s = value.parse().ok().filter(|t: &f64| t.is_finite());
+                self.contact_time_s = Some(time_s.ok_or_else(|| wrong("a time in s"))?);
+            }
             "max_deflection_m" => self.max_deflection_m = above_zero()?,
             "data_end_m" => self.data_end_m = above_zero()?,
             "force_kind" => {

@@ -72,6 +72,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
         other_mass_kg,
         max_deflection_m: None,
         data_end_m: None,
+        contact_time_s: None,
     };
     Ok(ReadCurve {
         title: title(&format!("{}, {}", curve.provenance.group, curve.model), &mut notes),
