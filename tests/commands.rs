@@ -192,7 +192,7 @@ fn energy_audits_of_all_groups() {
     // At low speeds a quarter of a step is more than 1 % of the crush.
     let findings: Vec<&str> = check.lines().collect();
     for (found, case) in findings.iter().zip([
-        "3kmh: contact: between two states it is uncertain by about 0.16 mm",
+        "3kmh: contact: between two states it is uncertain by about 0.16 mm (up to 0.47 mm where the force rises over several states), and",
         "6kmh: contact: between two states it is uncertain by about 0.31 mm",
     ]) {
         assert!(found.starts_with(&format!("vehicle-pair/{case}")), "{check}");

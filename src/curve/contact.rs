@@ -16,6 +16,8 @@ const PAUSE_S: f64 = 0.010;
 /// the plane at every speed, by up to 0.2; of a force that begins with a step by nothing, of one that rises over one to two intervals
 /// and then stays by up to 0.6.
 const SHARE_OFF: f64 = 0.25;
+/// Of intervals of several milliseconds, in which the first peak of a nose lies, by up to 0.75 (every k-th state of the bundled runs).
+const MOST_OFF: f64 = 0.75;
 /// Of the impulse of an interval so much may be left where the line through the next ones begins, by their curvature and digits.
 const MOST_LEFT: f64 = 0.2;
 /// So many states before the threshold is reached may have a force of the contact.
@@ -38,6 +40,8 @@ pub(crate) struct Onset {
     /// From the last state without force to the first in contact, in s; `None` if the record
     /// begins in contact.
     pub interval_s: Option<f64>,
+    /// By how much it may be off where that is a part of the interval, in s.
+    pub at_most_s: Option<f64>,
     /// What the user should check: pulses before the contact, and a doubtful start.
     pub warnings: Vec<String>,
     /// The first state above the threshold.
@@ -111,7 +115,8 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
             milliseconds(time_s[second.first])
         ));
     }
-    Some(Onset { time_s: crossing_s, interval_s, warnings, first: contact.first })
+    let at_most_s = None;
+    Some(Onset { time_s: crossing_s, interval_s, at_most_s, warnings, first: contact.first })
 }
 
 impl Onset {
@@ -160,7 +165,8 @@ impl Onset {
         let share = if rise_n > 0.0 { share.max(1.5 - second_n / rise_n) } else { share };
         (force_n[i], force_n[i + 1]) = (line_n(0.0), line_n(1.0));
         let interval_s = Some(SHARE_OFF * step_s(i));
-        Self { time_s: time_s[i] + share * step_s(i), interval_s, ..self }
+        let at_most_s = Some(MOST_OFF * step_s(i));
+        Self { time_s: time_s[i] + share * step_s(i), interval_s, at_most_s, ..self }
     }
 }
 
@@ -287,6 +293,7 @@ mod tests {
             let off_s = found.time_s - (0.049 + 1e-3 * share);
             assert!(off_s.abs() < 5e-6 && found.warnings.is_empty(), "{share}: {found:?}");
             assert!((found.interval_s.unwrap() - 0.25e-3).abs() < 1e-9);
+            assert!((found.at_most_s.unwrap() - 0.75e-3).abs() < 1e-9);
             assert!(
                 (49..=60).all(|i| (force_n[i] / 1e6 - 1.0).abs() < 1e-9),
                 "{share}: {force_n:?}"

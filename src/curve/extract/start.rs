@@ -33,7 +33,7 @@ enum StartBy {
     /// The first state, which is in contact already; the crush before it, at least and at most.
     FirstState { missing_m: (f64, f64) },
     /// A crossing within an output interval of this length.
-    Crossing { interval_s: f64 },
+    Crossing { interval_s: f64, at_most_s: Option<f64> },
     /// The deceleration of the body, which starts later: reported where it is found.
     Body,
 }
@@ -92,7 +92,7 @@ impl Start {
         }
         let by = match onset.interval_s {
             _ if of_body => StartBy::Body,
-            Some(interval_s) => StartBy::Crossing { interval_s },
+            Some(interval_s) => StartBy::Crossing { interval_s, at_most_s: onset.at_most_s },
             None => StartBy::FirstState { missing_m: missing_m(record, setup) },
         };
         Ok((Self { time_s: onset.time_s, by }, remarks))
@@ -115,10 +115,19 @@ impl Start {
                     BEGINNING.1 * 100.0
                 ));
             }
-            StartBy::Crossing { interval_s } if step_m(interval_s) > CERTAIN_SHARE * crush_m => {
+            StartBy::Crossing { interval_s, at_most_s }
+                if step_m(interval_s) > CERTAIN_SHARE * crush_m =>
+            {
+                let most_mm = at_most_s.map(|most_s| {
+                    format!(
+                        " (up to {:.2} mm where the force rises over several states)",
+                        step_m(most_s) * 1e3
+                    )
+                });
                 remarks.warn(format!(
-                    "contact: between two states it is uncertain by about {:.2} mm, and so the crush by {:.1} % (contact_time or gap in the run, or contact_threshold in the recipe, sets it)",
+                    "contact: between two states it is uncertain by about {:.2} mm{}, and so the crush by {:.1} % (contact_time or gap in the run, or contact_threshold in the recipe, sets it)",
                     step_m(interval_s) * 1e3,
+                    most_mm.unwrap_or_default(),
                     100.0 * step_m(interval_s) / crush_m
                 ));
             }
