@@ -16,6 +16,7 @@ enum Quantity {
     Energy,
     Momentum,
     Mass,
+    MassFlow,
     Stress,
     Area,
     Volume,
@@ -58,17 +59,24 @@ const ENDINGS: [(&str, Quantity); 30] = [
     ("time_step", Quantity::Time),
 ];
 
-/// Parts of names of stresses and strains: of a layer, in a direction, of an integration point.
-const PARTS: [(&str, Quantity); 3] =
-    [("sig_", Quantity::Stress), ("sigma_", Quantity::Stress), ("eps", Quantity::Pure)];
+/// Parts of names: of stresses and strains of a layer, in a direction, of an integration point; of areas of a material.
+const PARTS: [(&str, Quantity); 4] = [
+    ("sig_", Quantity::Stress),
+    ("sigma_", Quantity::Stress),
+    ("eps", Quantity::Pure),
+    ("blocked_area", Quantity::Area),
+];
 
 /// Names that alone determine the quantity of a component of one section.
-const OF_SECTION: [(&str, &[&str], Quantity); 5] = [
+const OF_SECTION: [(&str, &[&str], Quantity); 8] = [
     ("spcforc", &["x_resultant", "y_resultant", "z_resultant"], Quantity::Force),
     ("bndout", &["x_total", "y_total", "z_total"], Quantity::Force),
     ("elout", &["axial", "shear_s", "shear_t"], Quantity::Force),
     ("elout", &["moment_s", "moment_t", "torsion"], Quantity::Moment),
     ("swforc", &["axial", "shear"], Quantity::Force),
+    ("swforc", &["torsion"], Quantity::Moment),
+    ("swforc", &["length"], Quantity::Length),
+    ("abstat", &["dm_dt_in", "dm_dt_out", "dm_dt_outp", "dm_dt_outv"], Quantity::MassFlow),
 ];
 
 fn quantity(section: &str, component: &str) -> Option<Quantity> {
@@ -104,6 +112,7 @@ pub(super) fn unit_of(section: &str, component: &str, system: UnitSystem) -> Opt
         }
         Quantity::Momentum => format!("{mass} {length}/{time}"),
         Quantity::Mass => mass.into(),
+        Quantity::MassFlow => format!("{mass}/{time}"),
         Quantity::Stress => {
             let size = system.force() / (system.length_m * system.length_m);
             named_or(size, &["Pa", "kPa", "MPa", "GPa"], || format!("{force}/{length}^2"))
@@ -142,5 +151,8 @@ mod tests {
         t("mm-t-s", "elout", "plastic_eps_ip2", Some("1"));
         t("mm-t-s", "elout/beam", "axial", Some("N"));
         t("mm-t-s", "swforc", "failure", None);
+        t("mm-t-s", "swforc", "length", Some("mm"));
+        t("mm-t-s", "abstat", "dm_dt_in", Some("t/s"));
+        t("mm-t-s", "abstat", "blocked_area_mat_3", Some("mm^2"));
     }
 }
