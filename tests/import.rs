@@ -694,8 +694,6 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
     says(&error, "the times are in another unit");
 }
 
-/// Predicted curves of a model, written as JSON and CSV and added again, make a group on which
-/// models train; a build into the same database keeps it.
 /// Exports of a case over time say when contact begins: a body force, which rises late, and an offset come back as they are.
 #[test]
 fn the_contact_of_an_exported_case_comes_back() {
@@ -736,6 +734,36 @@ fn the_contact_of_an_exported_case_comes_back() {
             assert!((found_m - crush_m).abs() < 1e-6, "{name}, {ending}: {found_m}, not {crush_m}");
             assert_eq!(found_kind, kind, "{name}, {ending}");
         }
+    }
+}
+
+/// A contact that a file states within its record is where the deflection counts from, whatever its sign and origin.
+#[test]
+fn a_stated_contact_within_a_record_counts_no_way_before_it() {
+    let folder = here();
+    let here = folder.path();
+    let (m, v, k): (f64, f64, f64) = (24e3, 10.0, 40e6);
+    let omega = (k / m).sqrt();
+    for sign in [1.0, -1.0] {
+        let mut text = "# contact_time_s: 0.01\ntime [s],displacement [m],force [N]\n".to_string();
+        for i in 0..=1_200 {
+            let t = f64::from(i) * 1e-4;
+            let (since, half) = (t - 0.01, std::f64::consts::PI / omega);
+            let (d, f) = match since {
+                s if s < 0.0 => (v * s, 0.0),
+                s if s < half => (v / omega * (omega * s).sin(), m * v * omega * (omega * s).sin()),
+                s => (-v * (s - half), 0.0),
+            };
+            text += &format!("{t},{},{f}\n", sign * (d + 0.1));
+        }
+        fs::write(here.join("r.csv"), text).unwrap();
+        crumple_ok(
+            here,
+            "db add c.h5 r.csv --group g --replace --speed 10m/s --kind wall --mass 24t -q",
+        );
+        let shown = json(&crumple_ok(here, "db show c.h5 --json -q"));
+        let crush = shown["groups"]["g"][0]["max_deflection_m"].as_f64().unwrap();
+        assert!((crush / (v / omega) - 1.0).abs() < 1e-3, "{sign}: {crush}");
     }
 }
 
@@ -790,6 +818,8 @@ fn a_short_crush_is_sampled_as_finely_as_a_long_one() {
     says(&said, "sampling: one state every 0.01 ms, as the crush is short");
 }
 
+/// Predicted curves of a model, written as JSON and CSV and added again, make a group on which
+/// models train; a build into the same database keeps it.
 #[test]
 fn predicted_curves_come_back_as_a_group_that_trains() {
     let folder = tempfile::tempdir().unwrap();

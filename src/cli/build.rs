@@ -110,10 +110,14 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let gone = report.removed_of.as_ref();
     let gone =
         gone.map(|other| of_others(format!("removed {}", removed(&report).join(", ")), other));
-    let replaced = report.replaced.values().next().map(|other| {
-        let names: Vec<&str> = report.replaced.keys().map(|name| &**name).collect();
+    let mut by_manifest: BTreeMap<&String, Vec<&str>> = BTreeMap::new();
+    for (name, other) in &report.replaced {
+        by_manifest.entry(other).or_default().push(name);
+    }
+    let replaced = by_manifest.into_iter().map(|(other, names)| {
         of_others(format!("replaced {} and kept tags and notes", names.join(", ")), other)
     });
+    let replaced: Vec<String> = replaced.collect();
     let of_others = gone.iter().chain(&replaced);
     outcome = outcome.max(options.warn_all(warnings.iter().chain(&of_group).chain(of_others)));
     let database = output.display().to_string();

@@ -50,7 +50,7 @@ pub(super) struct Args {
     /// Speed to leave out, with its unit; every inner speed in turn if absent
     #[arg(long, value_parser = arguments::speed, allow_hyphen_values = true, conflicts_with = "train")]
     speed: Option<f64>,
-    /// Speed of the one FE run for FDRM and NSDM; the nearest other one if absent, of several that of the nearest parameters
+    /// Speed of the one FE run for FDRM and NSDM; the nearest other one if absent, in speed and parameters
     #[arg(long, value_parser = arguments::speed, conflicts_with = "train")]
     fixed_speed: Option<f64>,
     /// Scenario of a train with FE's run as reference; may be repeated

@@ -40,7 +40,7 @@ pub(crate) fn rebound_stiffness_n_per_m(
 /// effective mass; of a table without times its own force.
 ///
 /// It is filtered with the lowest class that keeps the energy of the impact within 0.5 %; if the sampling allows no such class, with the one
-/// that changes the energy least; and if it allows none, not at all. A factor makes up for the rest, so that a body that this force stops
+/// that changes the energy least; and if it allows none, or none that keeps nine tenths of it, not at all. A factor makes up for the rest, so that a body that this force stops
 /// loses the energy that it loses in FE.
 pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
     let time_s = case.curves.sampled.time_s();
@@ -81,10 +81,7 @@ pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
     // A crush too short for every class.
     if best.as_ref().is_none_or(|best| changes(best) > MADE_UP) {
         let unfiltered = from_rest(raw.clone());
-        best = match (best, unfiltered) {
-            (Some(best), Some(unfiltered)) if changes(&best) <= changes(&unfiltered) => Some(best),
-            (best, unfiltered) => unfiltered.or(best),
-        };
+        best = unfiltered.filter(|of| best.is_none() || changes(of) <= MADE_UP).or(best);
     }
     match best {
         Some((mut force_n, share)) => {

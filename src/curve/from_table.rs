@@ -80,19 +80,16 @@ pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves,
     }
 }
 
+/// A deflection at contact below this share of the largest is rounding.
+const LEAST_OFFSET: f64 = 1e-6;
+
 /// Maximum number of states at the common interval: 15 s of 0.75 ms.
 const MOST_STATES: usize = 20_000;
 
 /// The motion that the table implies.
 fn retraced(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quality), Error> {
-    let mut interval_s = Sampling::default().interval_s;
-    let mut motion = retrace(table, impact, interval_s)?;
-    let end = motion.deflection_m.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
-    let finer_s = Sampling::interval_for(end.map_or(0.0, |(k, _)| motion.time_s[k]));
-    if finer_s < interval_s {
-        interval_s = finer_s;
-        motion = retrace(table, impact, interval_s)?;
-    }
+    let interval_s = Sampling::default().interval_s;
+    let motion = retrace(table, impact, interval_s)?;
     let (mut notes, mut warnings) = (motion.notes, motion.warnings);
     let original = Curve::new(motion.time_s, motion.deflection_m, motion.force_n)?;
     let claim = energy::StatedConditions {
@@ -164,11 +161,10 @@ fn recorded(
             time_s[0]
         })
     });
-    // What a file has at the contact that it states belongs to the deflection.
-    let offset_m = impact
-        .contact_time_s
-        .and_then(|s| interpolate(time_s, table.deflection_m, &[s]).ok())
-        .map_or(0.0, |at| at[0]);
+    // A record that begins at the contact that it states, as an exported case does, counts its deflection from there.
+    let begins = impact.contact_time_s == Some(time_s[0]);
+    let largest_m = table.deflection_m.iter().fold(0.0, |most: f64, d| most.max(d.abs()));
+    let first_m = Some(table.deflection_m[0]).filter(|d| begins && *d > LEAST_OFFSET * largest_m);
     let length_s = time_s[time_s.len() - 1] - time_s[0];
     let sampling = |interval_s: f64| {
         let states = (length_s / interval_s) as usize;
@@ -187,7 +183,7 @@ fn recorded(
         of_impulse: false,
         stated: Stated {
             contact: contact.map(|s| StatedContact::Time { s }),
-            offset_m,
+            offset_m: first_m.unwrap_or(0.0),
             accept_energy: impact.accept_energy,
             ..Stated::default()
         },
@@ -214,9 +210,9 @@ fn recorded(
     };
     let mut found = extracted(&setup)?;
     // A short crush needs more states than the usual interval gives, as far as the record has them.
-    let crush_s = found.curves.original.time_s()[loading::loading_end(&found.curves.original)];
-    let interval_s =
-        Sampling::interval_for(crush_s).max(length_s / (time_s.len().saturating_sub(1)) as f64);
+    let end = loading::loading_end(&found.curves.original);
+    let crush_s = found.curves.original.time_s()[end];
+    let interval_s = Sampling::interval_for(crush_s, crush_s / end.max(1) as f64);
     if interval_s < setup.sampling.interval_s {
         found = extracted(&Setup { sampling: sampling(interval_s), ..setup })?;
         notes.push(format!(

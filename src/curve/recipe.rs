@@ -388,9 +388,10 @@ pub(crate) const LEAST_STATES: f64 = 40.0;
 
 impl Sampling {
     /// The default's interval in s, or for a shorter crush the round one (1, 2 or 5 of a decade) of which it has at least
-    /// [`LEAST_STATES`].
-    pub(crate) fn interval_for(crush_s: f64) -> f64 {
-        let (usual_s, most_s) = (Self::default().interval_s, crush_s / LEAST_STATES);
+    /// [`LEAST_STATES`], if the states of the record are no further apart than that.
+    pub(crate) fn interval_for(crush_s: f64, apart_s: f64) -> f64 {
+        let (usual_s, most_s) =
+            (Self::default().interval_s, (crush_s / LEAST_STATES).max(apart_s * (1.0 + 1e-9)));
         if !(most_s > 0.0 && most_s < usual_s) {
             return usual_s;
         }

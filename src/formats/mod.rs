@@ -337,10 +337,9 @@ impl Format {
             let mut taken = BTreeSet::new();
             for (exported, case) in all.iter_mut().zip(cases) {
                 let plain: String = case.id.name.chars().map(export_curve::plain).collect();
-                let first = exported.files.first().map_or("", |file| &file.0).to_lowercase();
                 let numbered = (2..).map(|k| format!("{plain}-{k}"));
                 let mut folders = iter::once(plain.clone()).chain(numbered);
-                let free = |folder: &String| taken.insert((folder.to_lowercase(), first.clone()));
+                let free = |folder: &String| taken.insert(folder.to_lowercase());
                 let folder = folders.find(free).unwrap_or(plain);
                 exported.files.iter_mut().for_each(|f| f.0 = format!("{folder}/{}", f.0));
             }

@@ -324,7 +324,7 @@ pub(super) fn sampling(runs: &[&Impact]) -> Option<Proposed<Sampling>> {
         return None;
     }
     let shortest = runs.iter().map(|run| run.crush_time_s).filter(|s| *s > 0.0);
-    let finest = FINEST_S.min(Sampling::interval_for(shortest.fold(f64::INFINITY, f64::min)));
+    let finest = FINEST_S.min(Sampling::interval_for(shortest.fold(f64::INFINITY, f64::min), 0.0));
     let least = coarsest.max(finest).max(longest / MOST_STATES);
     let interval_s = rounded_interval(least, longest);
     let states = (longest / interval_s * (1.0 + 1e-6)).floor() as usize + 1;

@@ -36,6 +36,7 @@ pub use chain::{
     Body, Chain, Damping, Interface, RateFactor, Resistance, STANDARD_GRAVITY_M_PER_S2, Stopping,
 };
 use engine::Scheme;
+pub(crate) use law::StoredBy;
 pub use law::{EnvelopeEnd, ForceLaw, Unloading, UnloadingShape};
 use run::Grid;
 pub use run::{BodyHistory, InterfaceHistory, Ledger, Method, Record, Run, RunSettings};

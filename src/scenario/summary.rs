@@ -242,15 +242,20 @@ impl Prepared {
         };
         // A body that is still without contact may yet have one.
         let final_v = |k: usize| run.bodies.get(k).map_or(0.0, |body| body.final_v_m_per_s);
-        let still_closes = run
-            .interfaces
-            .iter()
-            .enumerate()
-            .any(|(k, of)| !of.has_touched() && final_v(k) > final_v(k + 1));
-        let goes_on = still_closes || bodies.iter().any(|body| body.still_loaded_at_end);
+        let closes = |k: usize| {
+            !run.interfaces[k].has_touched() && final_v(k) - final_v(k + 1) > LEAST_CLOSING_M_PER_S
+        };
+        let closing: Vec<usize> = (0..run.interfaces.len()).filter(|k| closes(*k)).collect();
+        let goes_on = !closing.is_empty() || bodies.iter().any(|body| body.still_loaded_at_end);
+        // Itself, or with one of its crush zones.
+        let is_beside = |name: &str| {
+            let beside = closing.iter().flat_map(|k| [*k, k + 1]);
+            let mut names = beside.filter_map(|k| Some(&*self.chain.bodies().get(k)?.name));
+            names.any(|other| other == name || is_zone_of(other, name))
+        };
         let is_open = |body: &BodySummary<'_>| {
             let has_no_contact = body.mean_deceleration_span_s.is_none();
-            body.still_loaded_at_end || has_no_contact && goes_on
+            body.still_loaded_at_end || has_no_contact && goes_on || is_beside(body.name)
         };
         let beyond_data: Vec<&str> = run.beyond_data().map(|k| &*interfaces[k].name).collect();
         // Beyond its data the force is an assumption, and with it all that follows.
@@ -318,6 +323,9 @@ impl Prepared {
         }
     }
 }
+
+/// Bodies that close more slowly do not meet.
+const LEAST_CLOSING_M_PER_S: f64 = 1e-3;
 
 /// Class of the filter for decelerations of vehicles.
 const CLASS: u32 = 60;

@@ -195,7 +195,7 @@ impl Start {
         let rest_ns = impulse(&contact.curve.time_s()[..=end], &contact.curve.force_n()[..=end]);
         if early_ns > EARLY_SHARE * (early_ns + rest_ns) {
             remarks.warn(format!(
-                "contact: before {}, the start set in the manifest, the force reaches {} and its impulse {}, {:.1} % of that up to the maximum crush: the curve leaves it out; check contact_time, gap and offset",
+                "contact: before {}, the start that is stated, the force reaches {} and its impulse {}, {:.1} % of that up to the maximum crush: the curve leaves it out; check contact_time, gap and offset",
                 milliseconds(contact.time_s),
                 Shown::one_force(force_n[..before].iter().copied().fold(0.0, f64::max)),
                 Shown::one_impulse(early_ns),

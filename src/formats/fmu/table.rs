@@ -2,21 +2,22 @@
 //! file.
 
 use crate::error::{Error, error};
-use crate::multibody::ForceLaw;
+use crate::multibody::{ForceLaw, StoredBy};
 use std::fmt::Write;
 
 /// Begins the block. `c/blank.c` has the same, and a test compares the rest of the layout.
 const MARK: &[u8; 16] = b"CRUMPLE TABLE 1\0";
-const VERSION: u32 = 2;
+const VERSION: u32 = 1;
 const POINTS: usize = 4096;
 const SHAPE: usize = 1024;
 const TOKEN: usize = 64;
 const HAS_MEMORY: u32 = 1;
+const BY_MEAN_FORCE: u32 = 2;
 
 /// Bytes before the numbers: mark, sum, six counts, token.
 const HEAD: usize = 16 + 8 + 6 * 4 + TOKEN;
 /// Bytes of the block.
-const SIZE: usize = HEAD + 8 * (5 + 5 * POINTS + 3 * SHAPE);
+const SIZE: usize = HEAD + 8 * (3 + 5 * POINTS + 3 * SHAPE);
 
 /// A checked table.
 pub(super) struct Table {
@@ -24,8 +25,8 @@ pub(super) struct Table {
     shape_points: u32,
     flags: u32,
     token: [u8; TOKEN],
-    /// Stiffness, steepest rise, largest share, until where the mean force stores energy and its stiffness.
-    numbers: [f64; 5],
+    /// Stiffness, steepest rise, largest share.
+    numbers: [f64; 3],
     /// Deflection, force, slope, work, dissipated energy.
     envelope: [Vec<f64>; 5],
     /// Length, force, rest.
@@ -51,16 +52,11 @@ impl Table {
         }
         let (flags, numbers, mut dissipated) = match &law.memory {
             // Never read, but no divisor should be 0.
-            None => (0, [1.0, 1.0, 0.5, 0.0, 0.0], Vec::new()),
+            None => (0, [1.0, 1.0, 0.5], Vec::new()),
             Some(memory) => (
-                HAS_MEMORY,
-                [
-                    memory.stiffness_n_per_m,
-                    memory.steepest_n_per_m,
-                    memory.largest_share,
-                    memory.by_mean.until_m,
-                    memory.by_mean.stiffness_n_per_m,
-                ],
+                HAS_MEMORY
+                    | if memory.stored_by == StoredBy::MeanForce { BY_MEAN_FORCE } else { 0 },
+                [memory.stiffness_n_per_m, memory.steepest_n_per_m, memory.largest_share],
                 memory.dissipated_j.clone(),
             ),
         };

@@ -14,8 +14,9 @@ use serde::Deserialize;
 
 use crate::curve::Envelope;
 pub(super) use pieces::{Branch, OnEnvelope, Piece};
+use unloading::Memory;
+pub(crate) use unloading::StoredBy;
 pub use unloading::UnloadingShape;
-use unloading::{ByMeanForce, Memory};
 
 /// What happens when the deflection decreases.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,7 +82,7 @@ impl ForceLaw {
     /// A law that unloads on a straight line. Forces below zero become zero, because an
     /// interface only pushes.
     pub fn new(envelope: Envelope, unloading: Unloading, end: EnvelopeEnd) -> Self {
-        Self::with(envelope, unloading, UnloadingShape::line(), end, ByMeanForce::default())
+        Self::with(envelope, unloading, UnloadingShape::line(), end, StoredBy::Force)
     }
 
     /// The same with an unloading branch that is not a straight line; its energy is that of the
@@ -92,32 +93,32 @@ impl ForceLaw {
         shape: UnloadingShape,
         end: EnvelopeEnd,
     ) -> Self {
-        Self::with(envelope, unloading, shape, end, ByMeanForce::default())
+        Self::with(envelope, unloading, shape, end, StoredBy::Force)
     }
 
     /// The law of a recorded motion: the unloading branch has its shape, and the energy of the
     /// line of the unloading stiffness from where the motion turned, at `turned_m`. The envelope may go on from there.
     ///
     /// A recorded force oscillates, but the energy stored in a structure does not.
-    /// Therefore the storable energy is taken from the mean force `work/δ` up to `turned_m`, scaled to that
-    /// energy there, and only bounded by `cδF`.
+    /// Therefore the storable energy is taken from the mean force `work/δ`, scaled to that
+    /// energy at `turned_m`, and only bounded by `cδF`.
     fn recorded(
         envelope: Envelope,
         unloading: Unloading,
         shape: UnloadingShape,
         (turned_m, end): (f64, EnvelopeEnd),
     ) -> Self {
-        let by_mean = match unloading {
-            Unloading::Elastic => ByMeanForce::default(),
+        let unloading = match unloading {
+            Unloading::Elastic => unloading,
             Unloading::Memory { stiffness_n_per_m } => {
                 let top = envelope.force_at(turned_m);
                 let mean = envelope.work_to(turned_m) / turned_m;
                 let scale = (mean / top).powi(2);
                 let scale = if scale > 0.0 && scale.is_finite() { scale } else { 1.0 };
-                ByMeanForce { until_m: turned_m, stiffness_n_per_m: stiffness_n_per_m * scale }
+                Unloading::Memory { stiffness_n_per_m: stiffness_n_per_m * scale }
             }
         };
-        Self::with(envelope, unloading, shape, end, by_mean)
+        Self::with(envelope, unloading, shape, end, StoredBy::MeanForce)
     }
 
     fn with(
@@ -125,7 +126,7 @@ impl ForceLaw {
         unloading: Unloading,
         shape: UnloadingShape,
         end: EnvelopeEnd,
-        by_mean: ByMeanForce,
+        stored_by: StoredBy,
     ) -> Self {
         let envelope = envelope.pushing();
         let (d, f, work_j) = (envelope.deflection_m(), envelope.force_n(), envelope.work_j());
@@ -152,7 +153,7 @@ impl ForceLaw {
                     work_j: work_j[i],
                 });
                 let (steepest, share) = (envelope.max_slope(), shape.share().min(0.5));
-                Some(Memory::new(stiffness_n_per_m, steepest, share, by_mean, points))
+                Some(Memory::new(stiffness_n_per_m, steepest, share, stored_by, points))
             }
         };
         let data_end_m = envelope.end_m();

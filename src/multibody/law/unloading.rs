@@ -3,6 +3,15 @@
 use super::{EnvelopeEnd, ForceLaw, OnEnvelope, Unloading};
 use crate::curve::{CurveUnloading, ForceCurve};
 
+/// What the stored energy of a structure follows from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum StoredBy {
+    /// The force at the maximum deflection.
+    Force,
+    /// The mean force up to there: a recorded force oscillates, the stored energy does not.
+    MeanForce,
+}
+
 /// Energy of the unloading branches of an envelope; see [`super::ForceLaw`] for the rule.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Memory {
@@ -13,19 +22,9 @@ pub(crate) struct Memory {
     /// `c`: a branch stores at most this share of force times deflection, since it would reach
     /// zero deflection with a force left otherwise.
     pub(crate) largest_share: f64,
-    pub(crate) by_mean: ByMeanForce,
+    pub(crate) stored_by: StoredBy,
     /// Energy that is lost once the deflection has been at each point of the envelope.
     pub(crate) dissipated_j: Vec<f64>,
-}
-
-/// Where the stored energy follows from the mean force up to the maximum deflection, not from the force there: a recorded
-/// force oscillates, the stored energy does not. Beyond the record the force is an assumption without oscillations.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct ByMeanForce {
-    /// 0 for a law that is not recorded.
-    pub(crate) until_m: f64,
-    /// With which the mean force there stores what the force there stores with the unloading stiffness.
-    pub(crate) stiffness_n_per_m: f64,
 }
 
 impl Memory {
@@ -35,16 +34,14 @@ impl Memory {
         stiffness_n_per_m: f64,
         steepest_rise_n_per_m: f64,
         largest_share: f64,
-        by_mean: ByMeanForce,
+        stored_by: StoredBy,
         points: impl Iterator<Item = OnEnvelope>,
     ) -> Self {
         let mut memory = Self {
             stiffness_n_per_m,
-            steepest_n_per_m: steepest_rise_n_per_m
-                .max(stiffness_n_per_m)
-                .max(by_mean.stiffness_n_per_m),
+            steepest_n_per_m: steepest_rise_n_per_m.max(stiffness_n_per_m),
             largest_share,
-            by_mean,
+            stored_by,
             dissipated_j: Vec::new(),
         };
         let mut dissipated_j = 0.0_f64;
@@ -63,24 +60,22 @@ impl Memory {
         let dissipated = self.dissipated_j[top.piece].max(top.work_j - self.by_stiffness_j(top));
         let least = self.storable_j(top, self.steepest_n_per_m);
         let stored = (top.work_j - dissipated).max(least);
-        match self.is_by_mean(top) {
-            true => stored.min(top.force_n * self.largest_share * top.deflection_m),
-            false => stored,
+        match self.stored_by {
+            StoredBy::Force => stored,
+            StoredBy::MeanForce => stored.min(top.force_n * self.largest_share * top.deflection_m),
         }
     }
 
     /// Energy of the branch of the unloading stiffness, were there no other.
     fn by_stiffness_j(&self, top: &OnEnvelope) -> f64 {
-        if !self.is_by_mean(top) {
-            return self.storable_j(top, self.stiffness_n_per_m);
+        match self.stored_by {
+            StoredBy::Force => self.storable_j(top, self.stiffness_n_per_m),
+            StoredBy::MeanForce => {
+                let (d, work_j) = (top.deflection_m, top.work_j);
+                let mean_n = if d > 0.0 { work_j / d } else { 0.0 };
+                (0.5 * mean_n * mean_n / self.stiffness_n_per_m).min(work_j)
+            }
         }
-        let (d, work_j) = (top.deflection_m, top.work_j);
-        let mean_n = if d > 0.0 { work_j / d } else { 0.0 };
-        (0.5 * mean_n * mean_n / self.by_mean.stiffness_n_per_m).min(work_j)
-    }
-
-    fn is_by_mean(&self, top: &OnEnvelope) -> bool {
-        self.by_mean.until_m > 0.0 && top.deflection_m <= self.by_mean.until_m
     }
 
     /// Energy that a branch of this stiffness, or the stiffer one to (0, 0), can store.

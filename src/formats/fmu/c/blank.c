@@ -15,8 +15,6 @@ const crumple_table_t crumple_table = {
     0.0,
     0.0,
     0.0,
-    0.0,
-    0.0,
     {0.0},
     {0.0},
     {0.0},

@@ -61,25 +61,21 @@ static double storable(const crumple_table_t *t, const top_t *top, double stiffn
     return top->force * smaller(0.5 * top->force / stiffness, bound);
 }
 
-static int is_by_mean(const crumple_table_t *t, const top_t *top) {
-    return t->mean_until > 0.0 && top->deflection <= t->mean_until;
-}
-
 /* Energy of the branch of the unloading stiffness, were there no other. */
 static double by_stiffness(const crumple_table_t *t, const top_t *top) {
     double mean;
-    if (!is_by_mean(t, top)) {
+    if (!(t->flags & CRUMPLE_BY_MEAN_FORCE)) {
         return storable(t, top, t->stiffness);
     }
     mean = top->deflection > 0.0 ? top->work / top->deflection : 0.0;
-    return smaller(0.5 * mean * mean / t->mean_stiffness, top->work);
+    return smaller(0.5 * mean * mean / t->stiffness, top->work);
 }
 
 /* Energy that comes back from a maximum deflection. */
 static double stored_from(const crumple_table_t *t, const top_t *top) {
     double dissipated = larger(t->dissipated[top->piece], top->work - by_stiffness(t, top));
     double stored = larger(top->work - dissipated, storable(t, top, t->steepest));
-    if (is_by_mean(t, top)) {
+    if (t->flags & CRUMPLE_BY_MEAN_FORCE) {
         stored = smaller(stored, top->force * t->largest_share * top->deflection);
     }
     return stored;
@@ -191,12 +187,12 @@ static double storable_slope(const crumple_table_t *t, const top_t *top, double 
 /* Slope of `by_stiffness` along the envelope. */
 static double by_stiffness_slope(const crumple_table_t *t, const top_t *top) {
     double mean;
-    if (!is_by_mean(t, top)) {
+    if (!(t->flags & CRUMPLE_BY_MEAN_FORCE)) {
         return storable_slope(t, top, t->stiffness);
     }
     mean = top->work / top->deflection;
-    if (0.5 * mean * mean / t->mean_stiffness < top->work) {
-        return mean * ((top->force - mean) / top->deflection) / t->mean_stiffness;
+    if (0.5 * mean * mean / t->stiffness < top->work) {
+        return mean * ((top->force - mean) / top->deflection) / t->stiffness;
     }
     return top->force;
 }
@@ -236,7 +232,7 @@ law_slopes_t law_slopes(const crumple_table_t *t, double deflection, double larg
         stored = storable(t, &top, t->steepest);
         slopes.stored = storable_slope(t, &top, t->steepest);
     }
-    if (is_by_mean(t, &top) &&
+    if ((t->flags & CRUMPLE_BY_MEAN_FORCE) &&
         top.force * t->largest_share * top.deflection < stored) {
         slopes.stored = t->largest_share * (top.force + top.deflection * slopes.force);
     }

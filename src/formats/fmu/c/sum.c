@@ -36,8 +36,6 @@ uint64_t crumple_table_sum(const crumple_table_t *t) {
     sum = mix_all(sum, &t->stiffness, 1);
     sum = mix_all(sum, &t->steepest, 1);
     sum = mix_all(sum, &t->largest_share, 1);
-    sum = mix_all(sum, &t->mean_until, 1);
-    sum = mix_all(sum, &t->mean_stiffness, 1);
     sum = mix_all(sum, t->deflection, t->points);
     sum = mix_all(sum, t->force, t->points);
     sum = mix_all(sum, t->slope, t->points);

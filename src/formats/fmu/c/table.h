@@ -8,12 +8,14 @@
 
 #include "names.h"
 
-#define CRUMPLE_TABLE_VERSION 2
+#define CRUMPLE_TABLE_VERSION 1
 #define CRUMPLE_POINTS 4096
 #define CRUMPLE_SHAPE 1024
 
 /* The envelope is followed back unless this is set. */
 #define CRUMPLE_HAS_MEMORY 1u
+/* Energy is stored by the mean force up to the maximum deflection, not by the force there. */
+#define CRUMPLE_BY_MEAN_FORCE 2u
 
 /* Without padding: the exporter counts on the places. SI. */
 typedef struct {
@@ -29,9 +31,6 @@ typedef struct {
     double stiffness;     /* unloading stiffness */
     double steepest;      /* steepest rise of the envelope, or the stiffness if that is more */
     double largest_share; /* of force times deflection that a branch can store */
-    /* Up to this deflection energy is stored by the mean force, not by the force there; 0 for none. */
-    double mean_until;
-    double mean_stiffness;
     /* One per point of the envelope; `slope` is that of the piece from there on. */
     double deflection[CRUMPLE_POINTS];
     double force[CRUMPLE_POINTS];
