@@ -369,7 +369,7 @@ fn outputs_replace_no_other_kind_of_file() {
     crumple_ok(here, "sweep scenario.toml -o other.csv -q --overwrite");
     assert!(before("other.csv").starts_with(b"# crumple sweep"));
     fs::copy(&nodout, here.join("other.csv")).unwrap();
-    // What is no stream is not written to one, nor to a file named "-".
+    // Models, databases and folders are not written to standard output, nor to a file named "-".
     for line in ["train curves.h5", "build study.toml", "demo", "man", "db export curves.h5"] {
         let error = crumple_fails(here, 2, &format!("{line} -o -"));
         says(&error, "this cannot be written to standard output: name it");
