@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::{crumple_ok, fixture, shared};
+use crate::common::{crumple_in, crumple_ok, fixture, shared};
 use crumple::history::EntityId;
 use crumple::solver::{ProblemCode, Selection, SolverFile, read, read_sections};
 
@@ -149,6 +149,30 @@ fn a_study_of_t01_alone() {
         assert!(
             b["case"]["notes"].to_string().contains("section rcforc of crashT01 agrees with it")
         );
+    }
+}
+
+/// States some milliseconds apart do not show where in the first of them the contact lies.
+#[test]
+fn a_contact_in_a_long_first_interval_is_uncertain() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = fs::read_to_string(fixture("fe/lead-car-wall/study.toml")).unwrap();
+    let (head, runs) = text.split_once("[[run]]").unwrap();
+    let run = runs.split("[[run]]").find(|run| run.contains("25kmh")).unwrap();
+    fs::write(folder.path().join("study.toml"), format!("{head}[[run]]{run}")).unwrap();
+    fs::create_dir(folder.path().join("25kmh")).unwrap();
+    let path = folder.path().join("25kmh/crashT01");
+    let bytes = fs::read(t01_of("lead-car-wall/25kmh")).unwrap();
+    fs::write(&path, &bytes).unwrap();
+    let states = section(&path, "nodout").time.len();
+    let (header, states) = bytes.split_at(bytes.len() - states * STATE);
+    for (every, is_uncertain) in [(1, false), (4, true)] {
+        let kept: Vec<&[u8]> = states.chunks(STATE).step_by(every).collect();
+        fs::write(&path, [header, &kept.concat()].concat()).unwrap();
+        let build = "build study.toml -o c.h5 --overwrite";
+        let said = String::from_utf8(crumple_in(folder.path(), build).stderr).unwrap();
+        let warning = "taken at the first state; the crush may be up to 20.8";
+        assert_eq!(said.contains(warning), is_uncertain, "{every}: {said}");
     }
 }
 
@@ -306,13 +330,14 @@ fn groups_of_one_kind_are_joined() {
     }
 }
 
+/// Bytes of a state of lead-car-wall's T01, in records of 4, 88, 24, 24, 432 and 36.
+const STATE: usize = 608 + 6 * 8;
+
 /// The bytes of a T01 in two files as a restart leaves them: each with the header, and states of its own.
 fn restarted(bytes: &[u8], header: usize, first: usize, again: usize) -> [Vec<u8>; 2] {
-    // Records of 4, 88, 24, 24, 432 and 36 bytes.
-    let state = 608 + 6 * 8;
     let states = &bytes[header..];
     let part = |states: &[u8]| [&bytes[..header], states].concat();
-    [part(&states[..first * state]), part(&states[(first - again) * state..])]
+    [part(&states[..first * STATE]), part(&states[(first - again) * STATE..])]
 }
 
 /// T01 and T02 are one record, whose impulses continue.
@@ -322,7 +347,7 @@ fn a_restart_goes_on_where_the_run_ended() {
     let at = |name: &str| folder.path().join(name);
     let bytes = fs::read(t01_of("lead-car-wall/25kmh")).unwrap();
     fs::write(at("wholeT01"), &bytes).unwrap();
-    let header = bytes.len() - section(&at("wholeT01"), "nodout").time.len() * (608 + 6 * 8);
+    let header = bytes.len() - section(&at("wholeT01"), "nodout").time.len() * STATE;
     for again in [0, 20] {
         let [first, second] = restarted(&bytes, header, 100, again);
         fs::write(at("runT01"), first).unwrap();

@@ -40,7 +40,7 @@ pub(crate) struct Onset {
     /// From the last state without force to the first in contact, in s; `None` if the record
     /// begins in contact.
     pub interval_s: Option<f64>,
-    /// By how much it may be off where that is a part of the interval, in s.
+    /// By how much it may be off at most, by impulses, in s.
     pub at_most_s: Option<f64>,
     /// What the user should check: pulses before the contact, and a doubtful start.
     pub warnings: Vec<String>,
@@ -159,7 +159,8 @@ impl Onset {
         });
         let Some(share) = share else {
             force_n[i] = first_ns / step_s(i);
-            return Self { time_s: time_s[i], interval_s: (i > 0).then_some(step_s(i)), ..self };
+            let (interval_s, at_most_s) = ((i > 0).then_some(step_s(i)), Some(step_s(i)));
+            return Self { time_s: time_s[i], interval_s, at_most_s, ..self };
         };
         // No earlier than where the line begins: nothing pulls.
         let share = if rise_n > 0.0 { share.max(1.5 - second_n / rise_n) } else { share };
@@ -321,6 +322,9 @@ mod tests {
         let (peak, force_n) = of(49.3e-3, &|t| 1e6 * t + if t > 0.0 { 800.0 } else { 0.0 });
         assert!((peak.time_s - 0.049).abs() < 1e-12, "{peak:?}");
         assert!((peak.interval_s.unwrap() - 1e-3).abs() < 1e-9);
+        assert!((peak.at_most_s.unwrap() - 1e-3).abs() < 1e-9);
+        let (peak, _) = of(0.3e-3, &|t| 1e6 * t + if t > 0.0 { 800.0 } else { 0.0 });
+        assert_eq!((peak.time_s, peak.interval_s, peak.at_most_s), (0.0, None, Some(1e-3)));
         assert!((force_n[49] / 1.5e6 - 1.0).abs() < 1e-9, "{}", force_n[49]);
     }
 }

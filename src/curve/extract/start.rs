@@ -12,6 +12,8 @@ use crate::unit::{Shown, Speed, km_per_h};
 const BEGINNING: (f64, f64) = (0.15, 0.003);
 /// A contact found within a step that closes more than this share of the crush is uncertain.
 const CERTAIN_SHARE: f64 = 0.01;
+/// Most noses touch as the run begins; a contact somewhere in the first interval of a run is uncertain where that closes more than this.
+const FIRST_SHARE: f64 = 0.03;
 /// Crush before the record's first state, as a share of the rest, that deserves a warning.
 const MISSING_SHARE: f64 = 0.005;
 /// Impulse before the contact that the manifest states, as a share of the loading branch's, likewise.
@@ -31,7 +33,7 @@ enum StartBy {
     /// The manifest's contact time or gap.
     Manifest,
     /// The first state, which is in contact already; the crush before it, at least and at most.
-    FirstState { missing_m: (f64, f64) },
+    FirstState { missing_m: (f64, f64), at_most_s: Option<f64> },
     /// A crossing within an output interval of this length.
     Crossing { interval_s: f64, at_most_s: Option<f64> },
     /// The deceleration of the body, which starts later: reported where it is found.
@@ -93,7 +95,10 @@ impl Start {
         let by = match onset.interval_s {
             _ if of_body => StartBy::Body,
             Some(interval_s) => StartBy::Crossing { interval_s, at_most_s: onset.at_most_s },
-            None => StartBy::FirstState { missing_m: missing_m(record, setup) },
+            None => {
+                let missing_m = missing_m(record, setup);
+                StartBy::FirstState { missing_m, at_most_s: onset.at_most_s }
+            }
         };
         Ok((Self { time_s: onset.time_s, by }, remarks))
     }
@@ -118,7 +123,7 @@ impl Start {
             StartBy::Crossing { interval_s, at_most_s }
                 if step_m(interval_s) > CERTAIN_SHARE * crush_m =>
             {
-                let most_mm = at_most_s.map(|most_s| {
+                let most_mm = at_most_s.filter(|&s| s > interval_s).map(|most_s| {
                     format!(
                         " (up to {:.2} mm where the force rises over several states)",
                         step_m(most_s) * 1e3
@@ -131,7 +136,7 @@ impl Start {
                     100.0 * step_m(interval_s) / crush_m
                 ));
             }
-            StartBy::FirstState { missing_m }
+            StartBy::FirstState { missing_m, .. }
                 if setup.stated.offset_m > 0.0
                     && (missing_m.0 - setup.stated.offset_m)
                         .max(setup.stated.offset_m - missing_m.1)
@@ -143,7 +148,7 @@ impl Start {
                     shown_missing(missing_m)
                 ));
             }
-            StartBy::FirstState { missing_m }
+            StartBy::FirstState { missing_m, .. }
                 if missing_m.1 > MISSING_SHARE * crush_m && setup.stated.offset_m == 0.0 =>
             {
                 let (least_m, most_m) = missing_m;
@@ -166,6 +171,15 @@ impl Start {
                     "contact: the record starts at {}, in contact: the first {} of the crush ({shares}) are missing; {offset}, or provide the earlier states",
                     milliseconds(self.time_s),
                     shown_missing(missing_m)
+                ));
+            }
+            StartBy::FirstState { at_most_s: Some(most_s), .. }
+                if step_m(most_s) > FIRST_SHARE * crush_m =>
+            {
+                remarks.warn(format!(
+                    "contact: it lies in the first interval and is taken at the first state; the crush may be up to {:.2} mm ({:.1} %) too large (contact_time or gap in the run sets it)",
+                    step_m(most_s) * 1e3,
+                    100.0 * step_m(most_s) / crush_m
                 ));
             }
             StartBy::FirstState { .. } => remarks.note(
