@@ -811,6 +811,10 @@ fn tables_hold_what_the_database_does() {
         "db export curves.h5 -o t.csv",
         "t.csv is a file: tables are written into a folder",
     );
+    // Tables that are not written anew may be of other cases.
+    let output = crumple_in(here, "db export curves.h5 --group lead-car-pair -o tables");
+    let said = String::from_utf8(output.stderr).unwrap();
+    says(&said, "originals.csv existed before and may be of other cases: --originals rewrites it");
 }
 
 #[test]

@@ -424,6 +424,28 @@ fn uneven_curves_for_lsdyna_are_noted() {
     assert!(!notes(&["lead50.json"]).contains("LCINT"));
 }
 
+/// Channels of an earlier record stay in a folder that is written anew, and that is said.
+#[test]
+fn channels_of_an_earlier_record_are_named() {
+    let folder = demo_folder();
+    let here = folder.path();
+    for (command, channels, first) in [
+        ("simulate two-sets.toml -o run.mme", "run.mme/Channel", "run.001"),
+        (
+            "export curves.h5 --group lead-car-wall --case 36kmh --to iso-mme -o case",
+            "case/Channel",
+            "lead-car-wall-36kmh.001",
+        ),
+    ] {
+        let said = |command| String::from_utf8(crumple_in(here, command).stderr).unwrap();
+        crumple_ok(here, command);
+        assert!(!said(command).contains("not written now"));
+        let channels = here.join(channels);
+        fs::copy(channels.join(first), channels.join(first.replace(".001", ".099"))).unwrap();
+        says(&said(command), "Channel: holds 1 file that was not written now: remove");
+    }
+}
+
 /// pyisomme reads the channels of a case, and those of a multi-body run.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]

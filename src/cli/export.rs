@@ -10,6 +10,7 @@ use crate::curve::{ForceKind, Parameter, Tail};
 use crate::error::Error;
 use crate::file::{not_written, write_all_whole};
 use crate::formats::{self, Exported, FORMATS, Format, Material, Options};
+use crate::plural::counted;
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{PredictedCurve, Query, WarningCode};
 use crate::unit::UnitSystem;
@@ -356,6 +357,9 @@ pub(super) fn write(
     write_all_whole(
         &files.iter().zip(&exported.files).map(|(p, f)| (&**p, &*f.1)).collect::<Vec<_>>(),
     )?;
+    if name == "iso-mme" {
+        warn_of_other_channels(&files, options);
+    }
     let document = document! {
         format: name,
         bytes: exported.files.iter().map(|f| f.1.len()).sum::<usize>(),
@@ -386,6 +390,21 @@ fn paths(path: &Path, format: &Format, exported: &Exported) -> Result<Vec<PathBu
         ));
     }
     Ok(exported.files.iter().map(|(name, _)| path.join(name)).collect())
+}
+
+/// Files that an earlier record left beside the channels of ISO-MME that were written last.
+pub(super) fn warn_of_other_channels(written: &[PathBuf], options: GlobalOptions) {
+    let Some(folder) = written.last().and_then(|file| file.parent()) else { return };
+    let found = fs::read_dir(folder).into_iter().flatten().flatten();
+    let others = found.filter(|entry| !written.contains(&entry.path())).count();
+    if others > 0 {
+        options.warn(&format!(
+            "{}: holds {} that {} not written now: remove what is of an earlier record, since some tools read all channels of a folder",
+            folder.display(),
+            counted(others, "file"),
+            if others == 1 { "was" } else { "were" }
+        ));
+    }
 }
 
 /// The folders of files within the folder that was named.

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Map, Value, json};
 
 use super::arguments::FileKind;
+use super::export::warn_of_other_channels;
 use super::{CommandResult, Failure, GlobalOptions, is_stdout, keep_inputs, output, usage};
 use crate::file::{not_written, write_all_whole, write_whole};
 use crate::formats::iso_mme::{Channel, Test, folder, interval_s, object};
@@ -52,7 +53,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let to_stdout = args.output.as_deref().is_some_and(is_stdout);
     if let Some(path) = args.output.as_ref().filter(|_| !to_stdout) {
         if is_mme(path) {
-            write_channels(path, &prepared, &run)?;
+            write_channels(path, &prepared, &run, options)?;
         } else if is_mdf(path) {
             write_whole(path, &mdf::of_run(&columns))?;
         } else {
@@ -229,7 +230,12 @@ fn print_limits(out: &mut dyn Write, limits: &Limits<'_>) -> io::Result<()> {
 }
 
 /// Writes the run into the folder at `path`, whose name without its extension names the files.
-pub(super) fn write_channels(path: &Path, prepared: &Prepared, run: &Run) -> Result<(), Failure> {
+fn write_channels(
+    path: &Path,
+    prepared: &Prepared,
+    run: &Run,
+    options: GlobalOptions,
+) -> Result<(), Failure> {
     let name = path.file_stem().and_then(|s| s.to_str()).unwrap_or("run");
     let bodies = prepared.chain.bodies();
     if bodies.len() > OBJECTS {
@@ -284,10 +290,11 @@ pub(super) fn write_channels(path: &Path, prepared: &Prepared, run: &Run) -> Res
     let exported = folder(&test, &channels)?;
     let inside = path.join("Channel");
     std::fs::create_dir_all(&inside).map_err(|e| not_written(&inside, e))?;
-    let files: Vec<(PathBuf, &[u8])> =
-        exported.files.iter().map(|(name, bytes)| (path.join(name), &**bytes)).collect();
-    let files: Vec<(&Path, &[u8])> = files.iter().map(|(path, bytes)| (&**path, *bytes)).collect();
-    Ok(write_all_whole(&files)?)
+    let paths: Vec<PathBuf> = exported.files.iter().map(|(name, _)| path.join(name)).collect();
+    let files = paths.iter().zip(&exported.files).map(|(path, file)| (&**path, &*file.1));
+    write_all_whole(&files.collect::<Vec<(&Path, &[u8])>>())?;
+    warn_of_other_channels(&paths, options);
+    Ok(())
 }
 
 /// Test objects that ISO-MME's codes distinguish.

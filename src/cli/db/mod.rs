@@ -242,13 +242,18 @@ fn export(args: &ExportArgs, options: GlobalOptions) -> CommandResult {
     }
     let files = curate::write_tables(&cases, &args.output, args.originals, described_as)?;
     let files: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
-    let description = args.output.join(curate::DESCRIPTION);
-    let is_old = !args.croissant && description.exists();
-    let warning = is_old.then(|| {
-        let old = description.display();
-        format!("{old} existed before and may describe other tables: --croissant rewrites it")
+    let others = [
+        (!args.originals, curate::TABLES[2], "--originals"),
+        (!args.croissant, curate::DESCRIPTION, "--croissant"),
+    ];
+    let left = others.into_iter().filter_map(|(is_left, name, option)| {
+        let old = args.output.join(name);
+        (is_left && old.exists()).then(|| {
+            let old = old.display();
+            format!("{old} existed before and may be of other cases: {option} rewrites it")
+        })
     });
-    let outcome = options.warn_all(&warning);
+    let outcome = options.warn_all(left);
     let database = args.database.display().to_string();
     let document = document! { database: database, cases: cases.len(), files: &files };
     options
