@@ -129,6 +129,50 @@ fn a_grid_is_run_in_its_stated_order() {
     assert_eq!(values, expected);
 }
 
+/// A choice of curves has no order: the correlation ratio of the ranks, whichever way the rows come.
+#[test]
+fn a_choice_of_curves_has_a_correlation_ratio() {
+    let folder = Folder::new(GRID);
+    let of_choice = |line: &str| {
+        let report = folder.json(&format!("{line} --json -q"));
+        let all = report["sensitivities"].as_array().unwrap().clone();
+        all.into_iter().filter(|s| s["varied"] == "curve[nose]").collect::<Vec<Value>>()
+    };
+    let found = of_choice("sweep s.toml -o out.csv");
+    let of = |result: &str| {
+        let of = found.iter().find(|s| s["result"] == result).unwrap();
+        of["rank_correlation"].as_f64().unwrap()
+    };
+    // All peaks of the soft nose are below those of the other.
+    assert_eq!(of("peak_force_N[A1|B1]"), 1.0);
+    // By the numbers of the rows, by another route: mean ranks of both noses.
+    let (header, rows) = rows(&folder.text("out.csv"));
+    for result in ["peak_force_N[B1|B2]", "max_deflection_m[A1|B1]", "final_v_m_per_s[A2]"] {
+        let column = header.iter().position(|name| name == result).unwrap();
+        let value = |row: &[String]| row[column].parse::<f64>().unwrap();
+        let mut order: Vec<&Vec<String>> = rows.iter().collect();
+        order.sort_by(|a, b| value(a).total_cmp(&value(b)));
+        assert!(order.windows(2).all(|w| value(w[0]) < value(w[1])), "{result} has no ties");
+        let soft: usize = (0..12).filter(|&k| order[k][2] == "soft").map(|k| k + 1).sum();
+        let off = soft as f64 / 6.0 - 6.5;
+        let within = (143.0 - 12.0 * off * off) / 10.0;
+        let expected = (1.0 - within / 13.0).max(0.0).sqrt();
+        assert!((of(result) - expected).abs() < 1e-12, "{result}: {} {expected}", of(result));
+    }
+    assert_eq!(of_choice("sweep s.toml -o out.csv"), found, "read from the file");
+    assert_eq!(of_choice("sweep s.toml -o out.h5"), found);
+    assert_eq!(of_choice("sweep s.toml -o out.h5"), found, "read from the file");
+    folder.ok("sweep s.toml --shard 1/2 -q -o 1.csv");
+    folder.ok("sweep s.toml --shard 2/2 -q -o 2.csv");
+    assert_eq!(of_choice("sweep merge 1.csv 2.csv -o merged.csv"), found);
+    let printed = folder.ok("sweep s.toml -o again.csv");
+    says(&printed, "rank corr. curve[nose]");
+    says(
+        &printed,
+        "of a choice of curves, which have no order, the correlation ratio of the ranks",
+    );
+}
+
 /// A crush zone is joined to its body: no gap of its curve can be varied.
 #[test]
 fn crush_zones_have_no_gap() {

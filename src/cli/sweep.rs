@@ -10,7 +10,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use crate::plan::OVER_LIMITS;
-use crate::sweep::{self, Precision, Report, Shard, Sweep, WriteOptions, share_interval};
+use crate::sweep::{
+    self, Precision, Report, Sensitivity, Shard, Sweep, WriteOptions, share_interval,
+};
 use crate::table::Table;
 
 use super::arguments::FileKind;
@@ -288,13 +290,19 @@ fn say(
     let document = document! { #[serde(flatten)] report: report, share_over_limits if_any: share.as_ref(), until if_any: reached, seconds: seconds, output: output };
     global.show(&document, |out| {
         output::table(out, statistics(report, is_grid, most_varied))?;
-        if let Some(least) = varied(report, most_varied).and(report.sensitivities.iter().map(|s| s.rows).min()) {
+        let varied = varied(report, most_varied);
+        let chosen = varied.iter().flatten().any(|varied| is_choice(varied));
+        if let Some(least) = varied.and(report.sensitivities.iter().map(|s| s.rows).min()) {
             // Values drawn at the points of a grid are as random as those of a sample.
             let chance = match is_grid {
                 false => format!("; below {:.2} it may be chance", 2.0 / (least as f64).sqrt()),
                 true => String::new(),
             };
-            writeln!(out, "rank corr.: Spearman's rank correlation{chance}")?;
+            let chosen = match chosen {
+                true => "; of a choice of curves, which have no order, the correlation ratio of the ranks (0 to 1)",
+                false => "",
+            };
+            writeln!(out, "rank corr.: Spearman's rank correlation{chosen}{chance}")?;
         } else if !report.sensitivities.is_empty() {
             writeln!(
                 out,
@@ -425,13 +433,22 @@ fn statistics(report: &Report, is_grid: bool, most_varied: usize) -> impl Into<T
         table.column(format!("rank corr. {varied}"), move |column| {
             let mut of = sensitivities.iter();
             let of = of.find(|of| of.varied == varied && of.result == column.column);
-            of.map_or("-".into(), |of| format!("{:+.2}", of.rank_correlation))
+            let text = |of: &Sensitivity| match is_choice(varied) {
+                true => format!("{:.2}", of.rank_correlation),
+                false => format!("{:+.2}", of.rank_correlation),
+            };
+            of.map_or("-".into(), text)
         })
     })
 }
 
 /// Varied quantities that a table has room for; with --verbose and as JSON there are all.
 const MOST_VARIED: usize = 6;
+
+/// Whether a column holds names of curves.
+fn is_choice(column: &str) -> bool {
+    column.starts_with("curve[")
+}
 
 /// What results may follow, if a table has room for it.
 fn varied(report: &Report, most: usize) -> Option<Vec<&str>> {

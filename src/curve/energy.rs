@@ -152,7 +152,7 @@ impl Cause {
         match self {
             Self::OtherUnits => "likely the units of its columns".into(),
             Self::Half(mass) => format!(
-                "likely the mass{mass}, half a structure taken for a whole one, or the force of one of two sides"
+                "likely the mass{mass}, half a structure taken for a whole one, an impact of two vehicles for one against a wall (--kind), or the force of one of two sides"
             ),
             Self::OneBody(mass) => format!(
                 "likely the speed of one body taken for the closing speed of two (--kind), or the mass{mass}"

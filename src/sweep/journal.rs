@@ -94,12 +94,13 @@ pub(super) fn write_locked(
     let mut flow = progress(tally.report.done);
     if flow.is_continue() {
         let rows = head.rows().start + tally.report.done..head.rows().end;
+        let names = sweep.names();
         run::rows(sweep, rows, options.chunk, |chunk| {
             let bytes: Vec<u8> = chunk.iter().flat_map(|(_, line)| line.iter().copied()).collect();
             file.write_all(&bytes).map_err(&write_failed)?;
             let sums: String = chunk.iter().map(|(_, line)| sum(line)).collect();
             of_rows.write_all(sums.as_bytes()).map_err(&write_failed)?;
-            chunk.iter().for_each(|(row, _)| tally.see_row(row));
+            chunk.iter().for_each(|(row, _)| tally.see_row(row, &names));
             flow = progress(tally.report.done);
             Ok(flow)
         })?;
@@ -135,10 +136,11 @@ pub fn write_rows(
     let head = ShardHeader::of(sweep, options.shard);
     let mut tally = Tally::new(&head);
     out.write_all(head.text().as_bytes()).map_err(failed(name))?;
+    let names = sweep.names();
     run::rows(sweep, head.rows(), options.chunk, |chunk| {
         for (row, line) in chunk {
             out.write_all(line).map_err(failed(name))?;
-            tally.see_row(row);
+            tally.see_row(row, &names);
         }
         Ok(progress(tally.report.done))
     })?;

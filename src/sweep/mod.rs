@@ -241,6 +241,11 @@ impl Sweep {
         self.design.items
     }
 
+    /// The names that the values of each variable are indices of; none if they are numbers.
+    fn names(&self) -> Vec<Vec<String>> {
+        self.variables.iter().map(|v| v.names.clone()).collect()
+    }
+
     /// Identifies the sweep: BLAKE3 of plan, scenario, the files it names and
     /// this program's version.
     pub fn hash(&self) -> &str {

@@ -163,6 +163,11 @@ impl ShardHeader {
         (1..self.columns.len()).filter(|&column| !self.is_text(column))
     }
 
+    /// The columns of names of curves.
+    pub(crate) fn choice_columns(&self) -> impl Iterator<Item = usize> {
+        (1..self.columns.len().saturating_sub(2)).filter(|&column| self.is_text(column))
+    }
+
     pub(crate) fn is_text(&self, column: usize) -> bool {
         let name = &self.columns[column];
         name.starts_with("curve[") || column + 2 >= self.columns.len()

@@ -43,7 +43,7 @@ pub(crate) fn rows(
     chunk: Chunk,
     mut give: impl FnMut(&[(Row, Vec<u8>)]) -> Result<ControlFlow<()>, Error>,
 ) -> Result<(), Error> {
-    let names: Vec<Vec<String>> = sweep.variables.iter().map(|v| v.names.clone()).collect();
+    let names = sweep.names();
     let workers = Mutex::new(Vec::new());
     let threads = rayon::current_num_threads();
     let least = (2 * threads) as u64;

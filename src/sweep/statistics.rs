@@ -70,13 +70,23 @@ impl Column {
     }
 }
 
+/// The choices of a curve.
+struct Choice {
+    column: usize,
+    name: String,
+    /// Curves that were chosen, in the order in which they came.
+    names: Vec<String>,
+    /// Of the rows in the sample, the place of the curve's name.
+    sample: Vec<f64>,
+}
+
 /// How a result follows a varied quantity.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Sensitivity {
     pub varied: String,
     pub result: String,
     /// Spearman's: 1 if the result always grows with the quantity, −1 if it always falls, about 0 if it does not
-    /// follow it in one direction.
+    /// follow it in one direction. Of a choice of curves, which have no order, the correlation ratio of the ranks, from 0 to 1.
     pub rank_correlation: f64,
     /// Rows that it rests on.
     pub rows: u64,
@@ -98,32 +108,37 @@ pub(super) fn sample_threshold(rows: u64) -> u64 {
     if rows <= SAMPLE { u64::MAX } else { (u64::MAX / rows).saturating_mul(SAMPLE) }
 }
 
-fn sensitivities(columns: &[Column]) -> Vec<Sensitivity> {
+fn sensitivities(columns: &[Column], choices: &[Choice]) -> Vec<Sensitivity> {
     let result_of = |column: &Column| result_of(&column.name);
     let (varied, results): (Vec<&Column>, Vec<&Column>) =
         columns.iter().partition(|column| result_of(column).is_none());
     let measures =
         results.into_iter().filter(|c| result_of(c).is_some_and(|r| !NO_MEASURES.contains(&r)));
-    let ranks_of = |column: &Column| {
-        let is_whole = column.sample.iter().all(|value| !value.is_nan());
-        is_whole.then(|| ranks(&column.sample))
+    let of_numbers = varied.iter().map(|of| (&*of.name, &of.sample, false));
+    let of_choices = choices.iter().map(|of| (&*of.name, &of.sample, true));
+    let varied: Vec<(&str, &Vec<f64>, bool)> = of_numbers.chain(of_choices).collect();
+    let ranks_of = |sample: &[f64]| {
+        let is_whole = sample.iter().all(|value| !value.is_nan());
+        is_whole.then(|| ranks(sample))
     };
-    let of_varied: Vec<Option<Vec<f64>>> = varied.iter().map(|column| ranks_of(column)).collect();
+    let of_varied: Vec<Option<Vec<f64>>> =
+        varied.iter().map(|(_, sample, _)| ranks_of(sample)).collect();
     let mut all = Vec::new();
     for result in measures {
-        let of_result = ranks_of(result);
-        for (varied, of_varied) in varied.iter().zip(&of_varied) {
+        let of_result = ranks_of(&result.sample);
+        for ((varied, sample, is_choice), of_varied) in varied.iter().zip(&of_varied) {
+            let follows = if *is_choice { correlation_ratio } else { correlation };
             let (correlation, rows) = match (of_varied, &of_result) {
-                (Some(x), Some(y)) => (correlation(x, y), x.len()),
+                (Some(x), Some(y)) => (follows(x, y), x.len()),
                 _ => {
-                    let pairs = varied.sample.iter().zip(&result.sample);
+                    let pairs = sample.iter().zip(&result.sample);
                     let pairs = pairs.filter(|(x, y)| !(x.is_nan() || y.is_nan()));
                     let (x, y): (Vec<f64>, Vec<f64>) = pairs.map(|(x, y)| (*x, *y)).unzip();
-                    (correlation(&ranks(&x), &ranks(&y)), x.len())
+                    (follows(&ranks(&x), &ranks(&y)), x.len())
                 }
             };
             if let Some(rank_correlation) = correlation.filter(|_| rows >= LEAST_ROWS) {
-                let (varied, result) = (varied.name.clone(), result.name.clone());
+                let (varied, result) = (varied.to_string(), result.name.clone());
                 all.push(Sensitivity { varied, result, rank_correlation, rows: rows as u64 });
             }
         }
@@ -155,6 +170,28 @@ fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
         (xx, yy, xy) = (xx + x * x, yy + y * y, xy + x * y);
     }
     (xx > 0.0 && yy > 0.0).then(|| xy / (xx * yy).sqrt())
+}
+
+/// Root of the share of the variance of `y` that lies between the groups of equal `x`, less what chance brings on average (Kelley, Proc.
+/// Natl. Acad. Sci. 21, 1935); `None` if there is one group, or `y` does not vary.
+fn correlation_ratio(x: &[f64], y: &[f64]) -> Option<f64> {
+    let mut pairs: Vec<(f64, f64)> = x.iter().copied().zip(y.iter().copied()).collect();
+    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let about_mean = |values: &mut dyn Iterator<Item = f64>| {
+        let values: Vec<f64> = values.collect();
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.iter().map(|v| (v - mean).powi(2)).sum::<f64>()
+    };
+    let groups = pairs.chunk_by(|a, b| a.0 == b.0);
+    let (mut count, mut within) = (0, 0.0);
+    for group in groups {
+        count += 1;
+        within += about_mean(&mut group.iter().map(|pair| pair.1));
+    }
+    let whole = about_mean(&mut y.iter().copied());
+    let (rows, count) = (y.len() as f64, f64::from(count));
+    let is_known = count > 1.0 && rows > count && whole > 0.0;
+    is_known.then(|| (1.0 - within / (rows - count) / (whole / (rows - 1.0))).max(0.0).sqrt())
 }
 
 /// Quantile of the normal distribution that leaves out 2.5 %.
@@ -266,6 +303,7 @@ pub(super) struct Tally {
     head: ShardHeader,
     pub report: Report,
     columns: Vec<Column>,
+    choices: Vec<Choice>,
     reasons: Vec<Reason>,
     /// An item is in the sample if its hash is not above this.
     threshold: u64,
@@ -287,6 +325,12 @@ impl Tally {
             max: f64::NEG_INFINITY,
             sample: Vec::new(),
         };
+        let choice = |c: usize| Choice {
+            column: c,
+            name: head.columns[c].clone(),
+            names: Vec::new(),
+            sample: Vec::new(),
+        };
         let threshold = sample_threshold(rows);
         Self {
             report: Report {
@@ -303,17 +347,20 @@ impl Tally {
                 sensitivities: Vec::new(),
             },
             columns: head.number_columns().map(column).collect(),
+            choices: head.choice_columns().map(choice).collect(),
             reasons: Vec::new(),
             head: head.clone(),
             threshold,
         }
     }
 
-    /// Takes a row with its numbers, in order of the columns; NaN is left out.
-    pub(crate) fn see(
+    /// Takes a row with its numbers, in order of the columns, of which NaN is left out; `chosen` gives the name of the curve
+    /// in a column of choices.
+    pub(crate) fn see<'a>(
         &mut self,
         item: u64,
         numbers: impl Iterator<Item = f64>,
+        chosen: impl Fn(usize) -> Option<&'a str>,
         status: Status,
         message: &str,
     ) {
@@ -332,6 +379,14 @@ impl Tally {
             column.about.1 += off * (value - column.about.0);
             column.min = column.min.min(value);
             column.max = column.max.max(value);
+        }
+        for choice in self.choices.iter_mut().filter(|_| sampled) {
+            let name = chosen(choice.column).unwrap_or_default();
+            let known = choice.names.iter().position(|known| known == name);
+            choice.sample.push(known.unwrap_or(choice.names.len()) as f64);
+            if known.is_none() {
+                choice.names.push(name.into());
+            }
         }
         let report = &mut self.report;
         report.done += 1;
@@ -352,10 +407,12 @@ impl Tally {
         }
     }
 
-    pub(crate) fn see_row(&mut self, row: &Row) {
+    /// Takes a row; `names[k]` are those of value `k`, if it is an index.
+    pub(crate) fn see_row(&mut self, row: &Row, names: &[Vec<String>]) {
         let columns: Vec<usize> = self.head.number_columns().collect();
         let numbers = columns.into_iter().map(|c| row.values[c - 1]);
-        self.see(row.item, numbers, row.status, &row.message);
+        let chosen = |c: usize| Some(&**names.get(c - 1)?.get(row.values[c - 1] as usize)?);
+        self.see(row.item, numbers, chosen, row.status, &row.message);
     }
 
     /// Takes a line that ought to be the next one; false if it is not, or is not whole.
@@ -367,12 +424,13 @@ impl Tally {
         let Some(line) = parsed else { return false };
         let numbers = head.number_columns().map(|c| Line::number(line.values.get(c - 1)?));
         let Some(numbers) = numbers.collect::<Option<Vec<f64>>>() else { return false };
-        self.see(next, numbers.into_iter(), line.status, &line.message);
+        let chosen = |c: usize| line.values.get(c - 1).copied();
+        self.see(next, numbers.into_iter(), chosen, line.status, &line.message);
         true
     }
 
     pub(crate) fn close(mut self) -> Report {
-        self.report.sensitivities = sensitivities(&self.columns);
+        self.report.sensitivities = sensitivities(&self.columns, &self.choices);
         self.report.reasons = self.reasons.iter().map(|r| (r.text(), r.count)).collect();
         self.report.columns = self.columns.into_iter().map(Column::close).collect();
         self.report
@@ -405,7 +463,7 @@ mod tests {
             sample: (0..rows).map(of).collect(),
         };
         let columns: Vec<Column> = columns.iter().zip(&of).map(column).collect();
-        let found = sensitivities(&columns);
+        let found = sensitivities(&columns, &[]);
         let names: Vec<(&str, u64)> = found.iter().map(|s| (&*s.result, s.rows)).collect();
         assert_eq!(names, [("peak_force_N[A|wall]", 12), ("final_v_m_per_s[A]", 11)]);
         assert!((found[0].rank_correlation - 1.0).abs() < 1e-12);
@@ -413,6 +471,13 @@ mod tests {
         // order within the pairs to 107.5.
         let expected = -(107.5f64 / 110.0).sqrt();
         assert!((found[1].rank_correlation - expected).abs() < 1e-12, "{found:?}");
+        // Two pairs in two groups: 0.5 + 0.5 of 5 within them, of 2 and 3 degrees of freedom.
+        let ratio = correlation_ratio(&[1.0, 0.0, 0.0, 1.0], &[4.0, 1.0, 2.0, 3.0]).unwrap();
+        assert!((ratio - (1.0 - 0.5 / (5.0 / 3.0)).sqrt()).abs() < 1e-12, "{ratio}");
+        // No more between the groups than chance brings, one group, and groups of one row.
+        assert_eq!(correlation_ratio(&[0.0, 1.0, 1.0, 0.0], &[1.0, 2.0, 3.0, 4.0]), Some(0.0));
+        assert_eq!(correlation_ratio(&[0.0; 4], &[1.0, 2.0, 3.0, 4.0]), None);
+        assert_eq!(correlation_ratio(&[0.0, 1.0], &[1.0, 2.0]), None);
         let (low, high) = share_interval(0.0, 20);
         assert!(low == 0.0 && (high - 0.161).abs() < 1e-3, "{high}");
         for count in [7, 100, 300, 2410] {
@@ -456,7 +521,7 @@ mod tests {
             let mut tally = Tally::new(&head);
             for item in 0..rows {
                 let x = item as f64 / (rows - 1) as f64;
-                tally.see(item, [x, f64::NAN].into_iter(), Status::Ok, "");
+                tally.see(item, [x, f64::NAN].into_iter(), |_| None, Status::Ok, "");
             }
             let [x, y] = &tally.close().columns[..] else { panic!() };
             assert_eq!((x.count, x.min, x.max), (rows, Some(0.0), Some(1.0)));

@@ -1,5 +1,7 @@
 //! Finished CSV converted to HDF5: a dataset per column, described in `schemas/sweep.md`.
 
+use std::borrow::Cow;
+use std::collections::HashMap;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -230,6 +232,7 @@ impl FinishedTable {
 
     fn tally(&self, tally: &mut Tally) -> Result<(), Error> {
         let numbers: Vec<usize> = self.head.number_columns().collect();
+        let choices: Vec<usize> = self.head.choice_columns().collect();
         let (items, status) = (self.head.rows(), self.head.columns.len() - 2);
         for first in items.clone().step_by(ROWS as usize) {
             let (row, rows) = (first - items.start, ROWS.min(items.end - first));
@@ -251,7 +254,10 @@ impl FinishedTable {
                     number => text(&self.table.read(status + 2, number as u64, 1)?).into_owned(),
                 };
                 let number = |&c: &usize| f64::from_le_bytes(eight(bytes(c)));
-                tally.see(item, numbers.iter().map(number), found, &message);
+                let chosen: HashMap<usize, Cow<'_, str>> =
+                    choices.iter().map(|&c| (c, text(bytes(c)))).collect();
+                let chosen = |c: usize| chosen.get(&c).map(|name| &**name);
+                tally.see(item, numbers.iter().map(number), chosen, found, &message);
             }
         }
         Ok(())
@@ -266,7 +272,7 @@ fn integer(bytes: &[u8]) -> i64 {
     i64::from_le_bytes(eight(bytes))
 }
 
-fn text(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
+fn text(bytes: &[u8]) -> Cow<'_, str> {
     let end = bytes.iter().rposition(|b| *b != 0).map_or(0, |at| at + 1);
     String::from_utf8_lossy(&bytes[..end])
 }
