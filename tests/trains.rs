@@ -725,6 +725,46 @@ fn a_crush_that_goes_on_after_the_end_is_warned_of() {
     assert_eq!(long["warnings"], json!([]));
 }
 
+/// Of shipped trains that end every 30 ms, what is named as still being crushed grows by more than 1 %.
+#[test]
+fn what_is_named_as_still_being_crushed_grows() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let mut named = 0;
+    for scenario in ["train-set", "two-sets", "eight-on-eight"] {
+        let text = std::fs::read_to_string(here.join(format!("{scenario}.toml"))).unwrap();
+        let (head, rest) = text.split_once("duration = \"").unwrap();
+        let (_, rest) = rest.split_once('"').unwrap();
+        let at = |ms: u32| {
+            let text = format!("{head}duration = \"{ms}ms\"{rest}");
+            std::fs::write(here.join("s.toml"), text).unwrap();
+            parsed(&crumple_ok(here, "simulate s.toml --json -q"))
+        };
+        let crush = |of: &Value, name: &str| {
+            let mut all = of["summary"]["interfaces"].as_array().unwrap().iter();
+            all.find(|i| i["name"] == name).unwrap()["max_deflection_m"].as_f64().unwrap()
+        };
+        let long = at(2000);
+        assert!(!long["warnings"].to_string().contains("still being crushed"), "{scenario}");
+        for ms in (30..=600).step_by(30) {
+            let short = at(ms);
+            let warnings = short["warnings"].as_array().unwrap().iter();
+            for warning in warnings.filter_map(|w| w.as_str()) {
+                let Some((_, names)) = warning.split_once("energy are not final: ") else {
+                    continue;
+                };
+                let (names, _) = names.split_once("; lengthen").unwrap();
+                for name in names.split(", ") {
+                    let grows = crush(&long, name) / crush(&short, name) - 1.0;
+                    assert!(grows > 0.01, "{scenario} at {ms} ms: {name} by {grows}");
+                    named += 1;
+                }
+            }
+        }
+    }
+    assert!(named > 20, "{named}");
+}
+
 /// A run that is too short for its mean deceleration says so, by every method.
 #[test]
 fn a_run_that_ends_while_loading_is_said() {

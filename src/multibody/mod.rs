@@ -178,22 +178,23 @@ fn free_travel(chain: &Chain, run: &Run) -> Vec<String> {
 /// Growth of a crush after the end of the run, as a share of it, that deserves a warning.
 const GROWTH: f64 = 0.01;
 
-/// Of interfaces that are crushed further after the end of the run, between bodies whose main contact is over.
+/// Of interfaces that are crushed further after the end of the run, between bodies whose main contact is over: by how much follows from
+/// the closing speed and how fast it falls.
 fn still_crushed(chain: &Chain, run: &Run, end_s: f64) -> Option<String> {
-    let (bodies, last_s) = (chain.bodies(), end_s - 1.5 * run.step_s);
+    let last_s = end_s - 1.5 * run.step_s;
     let is_loaded = |k: usize| run.bodies.get(k).is_some_and(is_cut);
-    let speed = |k: usize| run.bodies.get(k).map_or(0.0, |body| body.final_v_m_per_s);
-    let grows = |k: usize, interface: &Interface| {
-        let (history, closing) = (&run.interfaces[k], speed(k) - speed(k + 1));
-        // A wall weighs more than anything.
-        let ahead = bodies.get(k + 1).map_or(0.0, |body| 1.0 / body.mass_kg);
-        let energy_j = 0.5 * closing * closing / (1.0 / bodies[k].mass_kg + ahead);
+    // A wall stands still.
+    let of = |k: usize| {
+        run.bodies.get(k).map_or((0.0, 0.0), |b| (b.final_v_m_per_s, b.final_a_m_per_s2))
+    };
+    let grows = |k: usize| {
+        let (history, (v, a), (v_ahead, a_ahead)) = (&run.interfaces[k], of(k), of(k + 1));
+        let (closing, falls) = (v - v_ahead, a_ahead - a);
         let crush_m = history.max_deflection_m;
-        let force_n = interface.law.force_n(crush_m, crush_m);
         closing > 0.0
-            && history.max_deflection_time_s >= last_s
-            && energy_j > GROWTH * crush_m * force_n
             && crush_m > 0.0
+            && history.max_deflection_time_s >= last_s
+            && 0.5 * closing * closing > GROWTH * crush_m * falls
             && !is_loaded(k)
             && !is_loaded(k + 1)
     };
@@ -201,7 +202,7 @@ fn still_crushed(chain: &Chain, run: &Run, end_s: f64) -> Option<String> {
         .interfaces()
         .iter()
         .enumerate()
-        .filter(|(k, interface)| grows(*k, interface))
+        .filter(|(k, _)| grows(*k))
         .map(|(_, interface)| interface.name.as_str())
         .collect();
     (!names.is_empty()).then(|| {

@@ -114,6 +114,8 @@ pub struct BodyHistory {
     pub a_m_per_s2: Vec<f64>,
     /// Speed at the end of the run, in m/s.
     pub final_v_m_per_s: f64,
+    /// Acceleration by contacts at the end of the run, in m/s².
+    pub(crate) final_a_m_per_s2: f64,
     /// Mean of `−a` while the body's net contact force acts for the first time, until it ends or
     /// changes its sign. Up to 1 kN, of a body below 1 t 1 m/s², longer than a look of 0.25 ms, it does not act; contacts that
     /// change the speed by less than 0.5 % of the largest change do not count.

@@ -190,6 +190,7 @@ impl EventRecorder {
             }
             let spans = spans.ended();
             history.final_v_m_per_s = final_v_m_per_s;
+            history.final_a_m_per_s2 = self.present.seen_a[self.layout.of(i)];
             if record != Record::Closing && interval_s <= COARSEST_S {
                 let speeds = &history.v_m_per_s;
                 let flight = Flight::new(speeds, interval_s);
