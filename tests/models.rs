@@ -1,9 +1,10 @@
 //! Models of the force over speed and deflection: few cases, many parameters, left-out speeds.
 
 use std::collections::BTreeMap;
+use std::fs;
 
 use crate::common::{
-    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, fixture, root, says,
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, fixture, json, root, says,
 };
 use crumple::assess::{Choice, train, validate};
 use crumple::assess::{Purpose, Selection, gaps};
@@ -705,7 +706,9 @@ fn several_parameters() {
             "the model needs obstacle, one of pole, wall: give --parameter obstacle=…",
         );
         let crush = Query { rule: Some(MaxCrushRule::Spline), ..ask(0.0, "wall") };
-        assert!(predict(&model, &crush).unwrap_err().to_string().contains("try --max-crush"));
+        assert!(
+            predict(&model, &crush).unwrap_err().to_string().contains("the monotone rule has one")
+        );
     }
     let auto =
         train("made", &cases, Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None })
@@ -2013,6 +2016,88 @@ fn a_speed_that_nearly_repeats_another_promises_nothing() {
     // Speeds of their own.
     let apart = found(&[38.0, 48.0]);
     assert!(apart.notes.iter().all(|said| !said.contains("nearly repeat")), "{:?}", apart.notes);
+}
+
+/// Nor does it in comparisons and pictures: what is left out goes with those that nearly repeat it.
+#[test]
+fn a_comparison_leaves_out_what_nearly_repeats_a_speed() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    // Springs, stiffer at 36 and 36.3 km/h than the others show.
+    let mass_kg: f64 = 20e3;
+    for (name, km_per_h, stiffness) in [
+        ("20", 20.0, 2.0e6),
+        ("30", 30.0, 2.1e6),
+        ("36", 36.0, 3.0e6),
+        ("36.3", 36.3, 3.0e6),
+        ("45", 45.0, 2.3e6),
+        ("60", 60.0, 2.4e6_f64),
+    ] {
+        let end_m = km_per_h / 3.6 * (mass_kg / stiffness).sqrt();
+        let d = |k: i32| end_m * f64::from(k) / 200.0;
+        let rows = (0..=200).map(|k| format!("{:.6},{:.3}\n", d(k), stiffness * d(k)));
+        fs::write(here.join("t.csv"), format!("d_m,F_N\n{}", rows.collect::<String>())).unwrap();
+        for database in ["all.h5", "one.h5"] {
+            if (database, name) != ("one.h5", "36.3") {
+                crumple_ok(
+                    here,
+                    &format!(
+                        "db add {database} t.csv --group g --case {name}kmh --kind wall --mass 20t --speed {km_per_h}km/h --unloading 50MN/m"
+                    ),
+                );
+            }
+        }
+    }
+    let compared = json(&crumple_ok(here, "compare all.h5 --nsdm-seeds 0 --json -q"));
+    let compared = compared["comparisons"].as_array().unwrap();
+    let cases: Vec<&Value> = compared.iter().map(|c| &c["case"]).collect();
+    assert_eq!(cases, ["30kmh", "36kmh", "45kmh"]);
+    let best = compared[1]["rows"].as_array().unwrap().iter().find(|r| r["method"] == "best");
+    let best = best.unwrap();
+    assert!(best["force_l1"].as_f64().unwrap() > 0.2, "{best}");
+    assert!(best["curve"].to_string().contains("on 4 speeds"), "{best}");
+    let error = crumple_fails(here, 1, "compare all.h5 --speed 36km/h --fixed-speed 36.3km/h");
+    says(&error, "the fixed curve is that of 36.3 km/h, the speed that is left out");
+    let drawn = |database: &str| {
+        crumple_ok(here, &format!("plot {database} --left-out 36km/h -o c.svg --overwrite"));
+        fs::read_to_string(here.join("c.svg")).unwrap()
+    };
+    assert_eq!(drawn("all.h5"), drawn("one.h5"));
+    let subsets = json(&crumple_ok(here, "validate all.h5 --subsets --json -q"));
+    let subsets = subsets["groups"][0]["subsets"].as_array().unwrap();
+    assert!(subsets.iter().all(|of| of["subsets"] == 3), "of five speeds: {subsets:?}");
+}
+
+/// A method that has no curve at a speed leaves the others their rows.
+#[test]
+fn a_method_without_a_curve_leaves_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let rows = |end_m: f64, force_n: f64| -> String {
+        (0..=200).map(|k| format!("{:.6},{:.3}\n", end_m * f64::from(k) / 200.0, force_n)).collect()
+    };
+    // The spline through the faster ones falls below zero at the slowest.
+    for (km_per_h, end_m) in [(10.0, 0.03), (25.0, 0.05), (40.0, 0.5), (60.0, 1.6)] {
+        let force_n = 0.5 * 20e3 * (km_per_h / 3.6_f64).powi(2) / end_m;
+        fs::write(here.join("t.csv"), format!("d_m,F_N\n{}", rows(end_m, force_n))).unwrap();
+        crumple_ok(
+            here,
+            &format!(
+                "db add c.h5 t.csv --group g --case {km_per_h}kmh --kind wall --mass 20t --speed {km_per_h}km/h --unloading 500MN/m"
+            ),
+        );
+    }
+    let output = crumple_in(here, "compare c.h5 --nsdm-seeds 0 --speed 10km/h --json");
+    let found: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let methods: Vec<&Value> =
+        found["rows"].as_array().unwrap().iter().map(|row| &row["method"]).collect();
+    assert!(methods.contains(&&Value::from("best")) && !methods.contains(&&Value::from("ddtcm")));
+    let missing = found["missing"][0].as_str().unwrap();
+    says(missing, "ddtcm has no row: the maximum crush by the spline rule is -");
+    says(
+        &String::from_utf8(output.stderr).unwrap(),
+        "warning: at 10 km/h (10kmh) ddtcm has no row",
+    );
 }
 
 /// A structure gives back the energy of its crush, whatever mass has crushed it: F²/2k of the law that the runs follow.

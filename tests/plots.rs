@@ -197,7 +197,7 @@ fn every_kind_of_file_is_drawn() {
         ("curves.h5 --group lead-car-wall", &["FE at 72 km/h", "deflection [m]", "force [MN]"][..]),
         ("curves.h5 --group lead-car-wall --force body", &["lead-car-wall: body force (not filtered) by wall speed"]),
         ("curves.h5 --group lead-car-pair --left-out 48km/h", &["FE at 48 km/h", "closing speed [m/s]"]),
-        ("lead.model --speed 50km/h", &["FE at 48 km/h", "FE at 60 km/h", "maximum crush", "empirical 90 % range from 5 left-out inner speeds"]),
+        ("lead.model --speed 50km/h", &["FE at 48 km/h", "FE at 60 km/h", "maximum crush", "empirical 90 % range from 5 curves left out at inner speeds"]),
         ("lead50.json", &["lead-car-wall at 50 km/h: contact force by the model crush-law"]),
         ("lead50.json --force body", &["lead-car-wall at 50 km/h: body force by the model crush-law"]),
         ("scenario.toml --quantity energy", &["kinetic", "A1|wall", "energy [MJ]", "time [ms]"]),

@@ -5,11 +5,14 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::left_out::{LeftOutCase, NotLeftOut};
-use super::methods::{self, ComparisonSettings};
+use super::methods::{self, ComparisonSettings, Method};
 use super::reference::Reference;
 use super::row::{Row, RowBuilder};
+use super::validate::without_repeated;
 use crate::curve::Case;
-use crate::dataset::{TrainingCase, TrainingSet, is_same_speed, nearest_case};
+use crate::dataset::{
+    TrainingCase, TrainingSet, is_same_speed, is_within, nearest_case, nearly_same,
+};
 use crate::error::{Error, ErrorCode, error};
 use crate::nsdm::{self, Identifiability, Nsdm, Start};
 use crate::plural::counted;
@@ -45,6 +48,9 @@ pub(crate) struct Comparison {
     pub training_time_s: Option<f64>,
     /// One row per method.
     pub rows: Vec<Row>,
+    /// Methods without a row, with the reason.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub missing: Vec<String>,
     /// What the fits of the spring and damper are worth; null if none was made.
     pub nsdm: Option<NsdmReport>,
 }
@@ -97,14 +103,19 @@ pub(crate) fn inner_cases(
     fixed_m_per_s: Option<f64>,
 ) -> Result<Compared, Error> {
     let set = TrainingSet::new(group, cases)?;
-    let mut speeds = set.speeds_m_per_s();
-    speeds.dedup_by(|a, b| is_same_speed(*a, *b));
+    let all = set.speeds_m_per_s();
+    let mut speeds = all.clone();
+    speeds.dedup_by(|v, before| is_within(*v, nearly_same(&all, *before)));
     if speeds.len() < 3 {
         return Err(too_few(speeds.len()));
     }
-    let ends = [speeds[0], speeds[speeds.len() - 1]];
-    let is_inner = |v: f64| ends.iter().chain(&fixed_m_per_s).all(|s| !is_same_speed(*s, v));
-    let inner = (0..set.cases.len()).filter(|&k| is_inner(set.cases[k].speed_m_per_s));
+    let ends = [all[0], all[all.len() - 1]];
+    let is_inner = |v: f64| {
+        let left_out = nearly_same(&all, v);
+        ends.iter().chain(&fixed_m_per_s).all(|s| !is_within(*s, left_out))
+    };
+    let (judged, _) = without_repeated(&set);
+    let inner = judged.into_iter().filter(|&k| is_inner(set.cases[k].speed_m_per_s));
     let (cut, whole): (Vec<usize>, Vec<usize>) = inner.partition(|&k| set.cases[k].truncated);
     let cut: Vec<String> = cut.into_iter().map(|k| set.cases[k].name.clone()).collect();
     if whole.is_empty() && cut.is_empty() {
@@ -158,6 +169,15 @@ pub(crate) fn compare(
     let left_out = left_out(index, &set)?;
     let LeftOutCase { case, rest, reference, .. } = &left_out;
     let speed = case.conditions.speed.m_per_s;
+    if let Some(asked) = settings.fixed_speed_m_per_s
+        && is_within(asked, nearly_same(&set.speeds_m_per_s(), left_out.own.speed_m_per_s))
+    {
+        return Err(error!(
+            Comparison,
+            "the fixed curve is that of {asked}, the speed that is left out: choose another one",
+            asked = km_per_h(asked)
+        ));
+    }
     let fixed = fixed_case(group, &left_out, settings)?;
     let fixed_case: &Case = &fixed.case;
     let times = rest.cases.iter().map(|case| case.solver_time_s());
@@ -182,10 +202,18 @@ pub(crate) fn compare(
         compared.push(rows.of_nsdm(&fitted)?);
         report = Some(nsdm_report(&fitted, fixed_case, reference, settings)?);
     }
-    compared.push(rows.row(methods::ddtcm(&left_out, settings.seed)?)?);
-    let is_other = |c: &&Case| !is_same_speed(c.conditions.speed.m_per_s, speed);
-    let others: Vec<Case> = cases.iter().filter(is_other).cloned().collect();
-    compared.push(rows.row(methods::best(&left_out, group, &others, settings.seed)?)?);
+    let mut missing = Vec::new();
+    let mut add =
+        |name: &str, predict: &dyn Fn() -> Result<Method, Error>, rows_of: &mut Vec<Row>| {
+            match predict() {
+                Ok(method) => rows_of.push(rows.row(method)?),
+                Err(error) => missing.push(format!("{name} has no row: {error}")),
+            }
+            Ok::<(), Error>(())
+        };
+    add("ddtcm", &|| methods::ddtcm(&left_out, settings.seed), &mut compared)?;
+    let best = || methods::best(&left_out, group, &set.others(cases, speed), settings.seed);
+    add("best", &best, &mut compared)?;
 
     Ok(Comparison {
         group: group.into(),
@@ -201,8 +229,14 @@ pub(crate) fn compare(
         fe_time_s: case.provenance.solver_wall_time_s,
         training_time_s,
         rows: compared,
+        missing,
         nsdm: report,
     })
+}
+
+/// Whether a method has a row in each of the comparisons, so that its means are those of the others.
+pub(crate) fn has_all(comparisons: &[Comparison], method: &str) -> bool {
+    comparisons.iter().all(|c| c.rows.iter().any(|row| row.method == method))
 }
 
 /// Mean of a method's rows over the comparisons.
@@ -262,13 +296,6 @@ fn fixed_case<'a>(
     let all = || rest.cases.iter().map(|c| &**c);
     let mut from: Vec<&TrainingCase> = all().filter(may_serve).collect();
     match settings.fixed_speed_m_per_s {
-        Some(asked) if is_same_speed(asked, own.speed_m_per_s) => {
-            return Err(error!(
-                Comparison,
-                "the fixed curve is that of {asked}, the speed that is left out: choose another one",
-                asked = km_per_h(asked)
-            ));
-        }
         Some(asked) if from.is_empty() => return Err(no_case(group, asked, rest)),
         None if from.is_empty() => from = all().collect(),
         _ => {}

@@ -152,8 +152,14 @@ pub(super) fn ddtcm(left_out: &LeftOutCase<'_>, seed: u64) -> Result<Method, Err
     let rule = model.max_crush_rule;
     let (curve, predict_s) = predicted(left_out, &model, Some(rule))?;
     let driving = curve.driving(left_out.rest.force_kind)?;
-    let made_from = format!("forest on {}", counted(left_out.rest.cases.len(), "speed"));
+    let made_from = format!("forest on {}", trained_on(left_out));
     method("ddtcm", made_from, left_out, &curve, driving, (fit_s, predict_s))
+}
+
+/// How many speeds, or cases of several designs, a model is trained on.
+fn trained_on(left_out: &LeftOutCase<'_>) -> String {
+    let rest = &left_out.rest;
+    counted(rest.cases.len(), if rest.features.is_empty() { "speed" } else { "case" })
 }
 
 /// The model that leaving speeds out chooses among the others; the body force drives.
@@ -168,7 +174,7 @@ pub(super) fn best(
     let fit_s = start.elapsed().as_secs_f64();
     let (curve, predict_s) = predicted(left_out, &model, None)?;
     let driving = curve.driving(ForceKind::Body)?;
-    let made_from = format!("{} on {}", curve.model, counted(left_out.rest.cases.len(), "speed"));
+    let made_from = format!("{} on {}", curve.model, trained_on(left_out));
     method("best", made_from, left_out, &curve, driving, (fit_s, predict_s))
 }
 

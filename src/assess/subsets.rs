@@ -12,10 +12,10 @@ use super::choose::{Purpose, physical, scores};
 use super::left_out::LeftOutCase;
 use super::scatter::scatter;
 use super::validate::{
-    MOST_SPEEDS as MOST_LEFT_OUT, Tables, fittable, left_out_cases, mean, trials,
+    MOST_SPEEDS as MOST_LEFT_OUT, Tables, fittable, left_out_cases, mean, trials, without_repeated,
 };
 use crate::curve::Case;
-use crate::dataset::{TrainingSet, is_same_speed};
+use crate::dataset::{TrainingSet, is_within, nearly_same};
 use crate::error::Error;
 use crate::plural::counted;
 use crate::surrogate::ModelKind;
@@ -70,8 +70,10 @@ pub(crate) fn subsets(
     candidates: &[ModelKind],
 ) -> Result<Result<Vec<OverSubsets>, String>, Error> {
     let set = TrainingSet::new(group, cases)?;
-    let mut speeds = set.speeds_m_per_s();
-    speeds.dedup_by(|a, b| is_same_speed(*a, *b));
+    // Speeds that nearly repeat one another are kept or left out together.
+    let all = set.speeds_m_per_s();
+    let mut speeds: Vec<(f64, f64)> = all.iter().map(|v| nearly_same(&all, *v)).collect();
+    speeds.dedup_by(|next, before| is_within(next.0, *before));
     if !SPEEDS.contains(&speeds.len()) {
         let (least, most) = SPEEDS.into_inner();
         let found = counted(speeds.len(), "speed");
@@ -97,13 +99,15 @@ pub(crate) fn subsets(
 /// The choice and every model by one subset; `None` if it lacks no speed inside its range, or one of the models cannot predict that.
 fn subset(
     set: &TrainingSet,
-    speeds: &[f64],
+    speeds: &[(f64, f64)],
     candidates: &[ModelKind],
     scatter: Option<&Scatter>,
 ) -> Option<Vec<Trial>> {
-    let has = |v: f64| speeds.iter().any(|kept| is_same_speed(*kept, v));
+    let has = |v: f64| speeds.iter().any(|kept| is_within(v, *kept));
     let kept = set.with(|case| has(case.speed_m_per_s));
-    let lacking = set.cases.iter().filter(|case| !has(case.speed_m_per_s));
+    let (judged, _) = without_repeated(set);
+    let lacking = judged.into_iter().map(|k| &set.cases[k]);
+    let lacking = lacking.filter(|case| !has(case.speed_m_per_s));
     let lacking = lacking.filter_map(|case| LeftOutCase::of(case, kept.clone()).ok());
     let lacking: Vec<LeftOutCase<'_>> = lacking.filter(|case| case.inner).collect();
     if lacking.is_empty() {

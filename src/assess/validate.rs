@@ -334,7 +334,7 @@ pub(super) fn left_out_cases(
 
 /// The cases that are judged, of those that nearly repeat each other one: as several they would count as evidence several times. And
 /// a note on the others.
-fn without_repeated(set: &TrainingSet) -> (Vec<usize>, Option<String>) {
+pub(super) fn without_repeated(set: &TrainingSet) -> (Vec<usize>, Option<String>) {
     let speeds = set.speeds_m_per_s();
     let (mut judged, mut others): (Vec<usize>, Vec<String>) = (Vec::new(), Vec::new());
     for (k, case) in set.cases.iter().enumerate() {

@@ -8,6 +8,7 @@ use crate::curve::{Case, CurveUnloading, ForceCurve, ForceKind};
 use crate::dataset::{TrainingCase, TrainingSet, is_same_speed};
 use crate::error::{Error, error};
 use crate::plot::{self, Axis, Chart, Mark, Panel, Series, Shown};
+use crate::plural::counted;
 use crate::surrogate::band::{Band, LeftOutSpeeds};
 use crate::surrogate::{ModelCase, PredictedCurve, predict};
 use crate::unit::{SpeedKind, km_per_h};
@@ -200,15 +201,12 @@ fn band_name(curve: &PredictedCurve) -> String {
     match &curve.provenance.band {
         Some(band) => {
             let which = match band.left_out {
-                LeftOutSpeeds::Inner => "inner",
-                LeftOutSpeeds::Ends => "end",
+                LeftOutSpeeds::Inner => "inner speeds",
+                LeftOutSpeeds::Ends => "the ends",
             };
-            let speeds = if band.curves == 1 { "speed" } else { "speeds" };
             let Band { level, curves, .. } = band;
-            format!(
-                "empirical {:.0} % range from {curves} left-out {which} {speeds}",
-                100.0 * level
-            )
+            let curves = counted(*curves, "curve");
+            format!("empirical {:.0} % range from {curves} left out at {which}", 100.0 * level)
         }
         None => "band of the curve's file".into(),
     }
@@ -296,7 +294,7 @@ pub fn left_out_at(
             km_per_h(speed_m_per_s)
         ));
     };
-    let others: Vec<Case> = cases.iter().filter(|c| !is_that(c)).cloned().collect();
+    let others = set.others(cases, case.conditions.speed.m_per_s);
     let model = train(group, &others, choice)?;
     let curve = predict(&model, &query_of(case, &model))?;
     let run = Reference::of(case)?.run(&curve.driving(moving_force(&curve))?)?;

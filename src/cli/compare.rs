@@ -110,6 +110,11 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     }
     drop(bar);
     let inner = comparisons.iter().all(|c| c.inner);
+    let missing = comparisons.iter().flat_map(|c| {
+        let at = km_per_h(c.speed_m_per_s);
+        c.missing.iter().map(move |why| format!("at {at} ({}) {why}", c.case))
+    });
+    let outcome = options.warn_all(missing);
     if !inner {
         options.warn("the left-out speed is an end of the range: the models extrapolate");
     }
@@ -118,7 +123,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     } else {
         several(&comparisons, options)?;
     }
-    Ok(Outcome::warned_if(!inner || !cut.is_empty()))
+    Ok(outcome.max(Outcome::warned_if(!inner || !cut.is_empty())))
 }
 
 fn percent(error: f64) -> String {
@@ -229,7 +234,8 @@ fn print_nsdm(out: &mut dyn Write, nsdm: &NsdmReport) -> io::Result<()> {
 /// Comparisons at several speeds, and their means by method.
 fn several(comparisons: &[Comparison], options: GlobalOptions) -> CommandResult {
     let rows = comparisons.first().map_or(&[][..], |first| &first.rows);
-    let means = rows.iter().map(|row| {
+    let rows = rows.iter().filter(|row| compare::has_all(comparisons, &row.method));
+    let means = rows.map(|row| {
         let mean = |of: &dyn Fn(&Row) -> f64| compare::mean(comparisons, &row.method, of);
         let score = |rating: &Rating| score(rating).unwrap_or(f64::NAN);
         document! {

@@ -19,12 +19,12 @@ use crate::curve::Case;
 use crate::database::Database;
 use crate::dataset::{TrainingSet, is_same_speed};
 use crate::rating::acceptance::{ACCEPTANCE, Acceptance, STANDARD};
+use crate::surrogate::ModelKind;
 use crate::surrogate::band::{self, Band, LeftOutSpeeds, POWER_OF_GAP};
 use crate::surrogate::leave_one_out::{
     Floor, LeftOut, PeakError, Scatter, SpeedScatter, Validation,
 };
 use crate::surrogate::max_crush::MaxCrushRule;
-use crate::surrogate::{Means, ModelKind};
 use crate::table::Table;
 use crate::unit::km_per_h;
 
@@ -351,23 +351,11 @@ fn print_subsets(out: &mut dyn Write, group: &str, of: &[OverSubsets]) -> io::Re
     output::table(out, table)
 }
 
-/// How many inner speeds means are over, and cases, if some speeds have several.
-fn inner(validation: &Validation, of: &Means) -> String {
-    let rows = validation.rows.iter().filter(|row| row.inner && row.model == of.model);
-    let mut speeds: Vec<f64> = rows.map(|row| row.speed_m_per_s).collect();
-    speeds.sort_by(f64::total_cmp);
-    speeds.dedup_by(|a, b| is_same_speed(*a, *b));
-    match speeds.len() == of.speeds {
-        true => counted(of.speeds, "inner speed"),
-        false => format!("{} cases of {}", of.speeds, counted(speeds.len(), "inner speed")),
-    }
-}
-
 /// The mean errors of each model, which is chosen and why, and a line for each band.
 fn print_summary(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
     let group = &validation.group;
     if let Some(first) = validation.means.first() {
-        let left_out = inner(validation, first);
+        let left_out = validation.inner_speeds(first);
         writeln!(out, "{group}: mean errors over {left_out} left out in turn")?;
         let table = Table::of(&validation.means)
             .column("model", |m| marked(&m.model, &validation.chosen))
@@ -444,7 +432,7 @@ fn own_curve(force: &str) -> String {
 fn print_means(out: &mut dyn Write, validation: &Validation) -> io::Result<()> {
     let group = &validation.group;
     if let Some(first) = validation.means.first() {
-        let left_out = inner(validation, first);
+        let left_out = validation.inner_speeds(first);
         writeln!(
             out,
             "{group}: means over {left_out} left out in turn; the body force drives the runs"

@@ -401,6 +401,13 @@ impl TrainingSet {
         })
     }
 
+    /// The cases of the group that stay when one of its speeds, in m/s, is left out with those that nearly repeat it.
+    pub(crate) fn others(&self, cases: &[Case], speed_m_per_s: f64) -> Vec<Case> {
+        let left_out = nearly_same(&self.speeds_m_per_s(), speed_m_per_s);
+        let others = cases.iter().filter(|c| !is_within(c.conditions.speed.m_per_s, left_out));
+        others.cloned().collect()
+    }
+
     /// Hash over the fingerprints of the cases.
     pub(crate) fn hash(&self) -> String {
         let mut hash = blake3::Hasher::new();

@@ -6,7 +6,7 @@ use super::{
     mass, metres, percent, signed_percent,
 };
 use crate::assess::choose::{Purpose, Selection, next_run};
-use crate::assess::compare::{Comparison, case_named, compare, inner_cases, mean};
+use crate::assess::compare::{Comparison, case_named, compare, has_all, inner_cases, mean};
 use crate::assess::left_out::query_of;
 use crate::assess::validate::{Choice, acceptance, train_chosen, validate};
 use crate::assess::{ComparisonSettings, Row};
@@ -175,13 +175,12 @@ impl Validated<'_> {
                     percent(means.force_l1),
                     percent(means.velocity_l1),
                     percent(means.max_crush_error),
-                    counted(means.speeds, "inner speed")
+                    validation.inner_speeds(means)
                 ),
             ));
         }
-        if !validation.means.is_empty() {
-            let speeds = validation.means.first().map_or(0, |means| means.speeds);
-            let left_out = counted(speeds, "inner speed");
+        if let Some(first) = validation.means.first() {
+            let left_out = validation.inner_speeds(first);
             let caption = format!(
                 "{group}: errors against FE, means over {left_out}, each left out in turn (Σ|p − r|/Σ|r|; the body force drives one mass)"
             );
@@ -357,10 +356,12 @@ impl Validated<'_> {
             .map(|index| compare(group, cases, index, &asked))
             .collect::<Result<Vec<Comparison>, _>>()?;
         let Some(first) = comparisons.first() else { return Ok(()) };
+        let rows = first.rows.iter().filter(|row| has_all(&comparisons, &row.method));
+        let rows: Vec<&Row> = rows.collect();
         let mean = |row: &Row, of: fn(&Row) -> f64| mean(&comparisons, &row.method, of);
         let crush_m = comparisons.iter().map(|c| c.reference_max_crush_m).sum::<f64>();
         let crush_m = crush_m / comparisons.len() as f64;
-        let table = Table::of(&first.rows)
+        let table = Table::of(&rows)
             .column("method", |row| &row.method)
             .column("driven by", |row| row.driven_by.map_or("spring and damper", ForceKind::name))
             .column("velocity", |row| percent(mean(row, |r| r.velocity_l1)))
@@ -380,6 +381,12 @@ impl Validated<'_> {
             format!("{group}: each method in one multi-body model against FE, {left_out}"),
             table,
         ));
+        for of in &comparisons {
+            let speed = km_per_h(of.speed_m_per_s);
+            let missing = of.missing.iter();
+            parts
+                .extend(missing.map(|why| Part::Text(format!("At {speed} ({}): {why}.", of.case))));
+        }
         parts.push(Part::Text(methods_explained(settings.nsdm_seeds)));
         Ok(())
     }

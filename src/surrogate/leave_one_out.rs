@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::band::{Band, ForceScatter};
 use super::max_crush::MaxCrushRule;
 use crate::curve::ForceKind;
+use crate::dataset::is_same_speed;
+use crate::plural::counted;
 
 /// Errors of one model at one speed that was left out.
 ///
@@ -96,6 +98,18 @@ impl Validation {
     /// The means of the model that was chosen, if any speed was left out.
     pub(crate) fn chosen_means(&self) -> Option<&Means> {
         self.means.iter().find(|means| means.model == self.chosen)
+    }
+
+    /// How many inner speeds means are over, and cases, if some speeds have several.
+    pub(crate) fn inner_speeds(&self, of: &Means) -> String {
+        let rows = self.rows.iter().filter(|row| row.inner && row.model == of.model);
+        let mut speeds: Vec<f64> = rows.map(|row| row.speed_m_per_s).collect();
+        speeds.sort_by(f64::total_cmp);
+        speeds.dedup_by(|a, b| is_same_speed(*a, *b));
+        match speeds.len() == of.speeds {
+            true => counted(of.speeds, "inner speed"),
+            false => format!("{} cases of {}", of.speeds, counted(speeds.len(), "inner speed")),
+        }
     }
 }
 

@@ -222,10 +222,10 @@ pub(super) fn chosen(crush: &MaxCrush, rule: MaxCrushRule) -> Result<f64, Error>
     match crush.by(rule) {
         Some(end) if end > 0.0 && end.is_finite() => Ok(end),
         found => Err(
-            error!(Prediction at "max_crush", "the maximum crush by the {rule} rule is {found}: expected a length above 0; try --max-crush {other}", found = found.map_or("not defined for these cases".into(), |d| format!("{d:.3} m")), other = MaxCrushRule::ALL
+            error!(Prediction at "max_crush", "the maximum crush by the {rule} rule is {found}: expected a length above 0; {other}", found = found.map_or("not defined for these cases".into(), |d| format!("{d:.3} m")), other = MaxCrushRule::ALL
                 .into_iter()
                 .find(|&r| crush.by(r).is_some_and(|d| d > 0.0 && d.is_finite()))
-                .map_or("(no rule applies here)", MaxCrushRule::name), rule = rule.name()),
+                .map_or("no rule has one".into(), |r| format!("the {} rule has one (--max-crush of crumple predict)", r.name())), rule = rule.name()),
         ),
     }
 }

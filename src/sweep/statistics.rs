@@ -473,7 +473,7 @@ mod tests {
         assert!((found[1].rank_correlation - expected).abs() < 1e-12, "{found:?}");
         // Two pairs in two groups: 0.5 + 0.5 of 5 within them, of 2 and 3 degrees of freedom.
         let ratio = correlation_ratio(&[1.0, 0.0, 0.0, 1.0], &[4.0, 1.0, 2.0, 3.0]).unwrap();
-        assert!((ratio - (1.0 - 0.5 / (5.0 / 3.0)).sqrt()).abs() < 1e-12, "{ratio}");
+        assert!((ratio - (1.0 - 0.5 / (5.0 / 3.0_f64)).sqrt()).abs() < 1e-12, "{ratio}");
         // No more between the groups than chance brings, one group, and groups of one row.
         assert_eq!(correlation_ratio(&[0.0, 1.0, 1.0, 0.0], &[1.0, 2.0, 3.0, 4.0]), Some(0.0));
         assert_eq!(correlation_ratio(&[0.0; 4], &[1.0, 2.0, 3.0, 4.0]), None);
