@@ -396,6 +396,7 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         ("a.k", deck("x", card, &fields(1.0, 1.0).replace("1000000", "&param")), Some("SI"), &["columns 21-40: expected a number, found \"&param\""][..]),
         ("a.k", deck("x", card, "1,2\n"), Some("SI"), &["the curve has 1 point:"][..]),
         ("a.k", deck("x", card, "0,0\n1,nan\n2,2\n3,3\n"), Some("SI"), &["line 8, field 2: expected a number, found \"nan\""][..]),
+        ("a.csv", "d_mm;F_kN\n0.0;0\n5.0;990\n10.0;1,012\n".into(), None, &["line 4, field 2: \"1,012\" has the sign \",\", and \"0.0\" in line 2 the sign \".\": only one of them can be decimal"][..]),
         ("a.k", "*KEYWORD\n*NODE\n1,2\n".into(), Some("SI"), &["expected a *DEFINE_CURVE, found none in this deck"][..]),
     ];
     cases.into_iter().for_each(|(name, bytes, units, expected)| t(name, bytes, units, expected));

@@ -400,6 +400,7 @@ fn wrong_input_says_where_and_what_to_do() {
     file("note", "no solver wrote this\n");
     file("twice.csv", "t,a,a\n");
     file("short.csv", "t,a\n0,1\n1\n");
+    file("thousands.csv", "t;a\n0.0;990\n0.1;1,012\n");
     file("wide.csv", "t,a\n0,1\n0,5,2\n");
     file("bare.csv", "0,1\n1,2\n");
     file("one.csv", "time\n0\n");
@@ -422,6 +423,7 @@ fn wrong_input_says_where_and_what_to_do() {
         (&["a.csv", "a.csv", "--to=0.001s"][..], 1, "the common times from 0 s to 0.001 s hold 11 samples at 10 kHz: at least 12 are needed; check the units of time and the requested interval"),
         (&["a.csv", "twice.csv:a"][..], 1, "twice.csv: 2 columns are called \"a\": rename all but one"),
         (&["a.csv", "short.csv"][..], 1, "short.csv: line 3, column 2 (\"a\"): expected a number, found \"\""),
+        (&["a.csv", "thousands.csv"][..], 1, "thousands.csv: line 3, field 2: \"1,012\" has the sign \",\", and \"0.0\" in line 2 the sign \".\": only one of them can be decimal"),
         (&["a.csv", "wide.csv"][..], 1, "wide.csv: line 3: expected 2 fields, one for each column of the table, found 3: write decimal points, or semicolons between columns, and name every column in the header"),
         (&["a.csv", "bare.csv"][..], 1, "bare.csv: line 1: expected a header with the names of the columns, found numbers: write for example \"time_s,a_m_per_s2\" above them"),
         (&["a.csv", "one.csv"][..], 1, "one.csv: line 1: expected at least two columns separated by commas, semicolons, tabs or blanks, the first of them the time, found \"time\""),

@@ -225,7 +225,7 @@ pub(super) fn chosen(crush: &MaxCrush, rule: MaxCrushRule) -> Result<f64, Error>
             error!(Prediction at "max_crush", "the maximum crush by the {rule} rule is {found}: expected a length above 0; {other}", found = found.map_or("not defined for these cases".into(), |d| format!("{d:.3} m")), other = MaxCrushRule::ALL
                 .into_iter()
                 .find(|&r| crush.by(r).is_some_and(|d| d > 0.0 && d.is_finite()))
-                .map_or("no rule has one".into(), |r| format!("the {} rule has one (--max-crush of crumple predict)", r.name())), rule = rule.name()),
+                .map_or("no rule has one".into(), |r| format!("the {} rule has one (--max-crush of crumple predict and export)", r.name())), rule = rule.name()),
         ),
     }
 }

@@ -11,8 +11,19 @@ pub(super) struct Decoded<'a> {
 /// Bytes by which UTF-16 without a mark is recognised.
 const BEGINNING: usize = 64;
 
-/// The bytes as text; invalid bytes are replaced.
+/// The bytes as text; invalid bytes are replaced, and so are carriage returns where nothing else ends a line.
 pub(super) fn decoded(bytes: &[u8]) -> Decoded<'_> {
+    let of = of_encoding(bytes);
+    match of.text.contains('\r') && !of.text.contains('\n') {
+        true => Decoded {
+            text: of.text.replace('\r', "\n").into(),
+            note: of.note.or(Some("text: lines end in carriage returns")),
+        },
+        false => of,
+    }
+}
+
+fn of_encoding(bytes: &[u8]) -> Decoded<'_> {
     let of_pairs = |rest: &[u8], pair: fn([u8; 2]) -> u16, note| {
         let mut units: Vec<u16> = rest.chunks_exact(2).map(|two| pair([two[0], two[1]])).collect();
         if rest.len() % 2 == 1 {
@@ -109,6 +120,8 @@ mod tests {
         t(latin1, Some("Latin-1,"));
         let plain: Vec<u8> = "d_m;F_N\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
         assert_eq!(decoded(&plain).text, "d_m;F_N\n");
+        assert_eq!(decoded(b"d_m;F_N\r0;1\r").text, "d_m;F_N\n0;1\n");
+        assert_eq!(decoded(b"d_m;F_N\r\n0;1\r\n").text, "d_m;F_N\r\n0;1\r\n");
         assert_eq!(decoded(&[0xFF, 0xFE, b'a', 0, b'b']).text, "a?");
     }
 

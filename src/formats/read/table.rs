@@ -85,6 +85,12 @@ impl Separator {
         }
     }
 
+    /// The sign in a field that is read as decimal, where both may be.
+    fn decimal(self, field: &str) -> Option<char> {
+        let is_either = !matches!(self, Self::Any | Self::Comma);
+        field.chars().find(|c| is_either && matches!(c, '.' | ','))
+    }
+
     /// Whether a field is meant as a number.
     fn is_number(self, field: &str) -> bool {
         self.any_number(field).is_some()
@@ -350,13 +356,33 @@ impl<'a> Table<'a> {
         rows.map(move |(line, text)| row(before + line, text, separator))
     }
 
-    /// Gives each row to `take`, and refuses rows that have other columns than the table.
+    /// Gives each row to `take`, and refuses rows that have other columns than the table, and numbers in the columns `used` of which some
+    /// have a decimal point and some a decimal comma.
     pub(super) fn each_row(
         &self,
+        used: &[usize],
         mut take: impl FnMut(&Row) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let mut rows = 0;
+        let mut decimal: Option<(char, u64, &str)> = None;
         for row in self.rows() {
+            for (&column, text) in used.iter().map(|column| (column, row.field(*column))) {
+                let Some(sign) = self.separator.decimal(text) else { continue };
+                let is_number = || self.separator.is_number(text);
+                match decimal {
+                    None if is_number() => decimal = Some((sign, row.line, text)),
+                    Some((other, line, first)) if other != sign && is_number() => {
+                        return Err(error!(
+                            CurveFile,
+                            "{place}: \"{text}\" has the sign \"{sign}\", and \"{first}\" in line {line} the sign \"{other}\": only one of them can be decimal; write numbers without separators of thousands",
+                            place = Place::Field { line: row.line, field: column + 1 },
+                            text = shown(text),
+                            first = shown(first)
+                        ));
+                    }
+                    _ => {}
+                }
+            }
             let found = row.fields.len();
             if self.has_axes() && found != 2 {
                 return Err(not_two(row.line, &row.fields.join(" ")));

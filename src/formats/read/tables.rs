@@ -98,7 +98,8 @@ fn columns(
     let (taken, units_used) = layout(table, units, input.options, &mut notes)?;
     let mut lines = Vec::new();
     let mut values: [Vec<f64>; 3] = Default::default();
-    table.each_row(|row| {
+    let used: Vec<usize> = taken.iter().map(|column| column.field).collect();
+    table.each_row(&used, |row| {
         for column in &taken {
             let place = Place::Field { line: row.line, field: column.field + 1 };
             let value =
@@ -202,7 +203,7 @@ pub(crate) fn history(bytes: &[u8], wanted: Option<&str>) -> Result<History, Err
         values: Vec::new(),
     };
     let name_of = |field: usize| &table.names[field].1;
-    table.each_row(|row| {
+    table.each_row(&[time, field], |row| {
         let line = row.line;
         // Beside a longer curve with times of its own.
         if times.len() > 1 && row.field(time).is_empty() && row.field(field).is_empty() {
