@@ -112,6 +112,14 @@ fn csv_columns_in_any_order_with_decimal_commas_or_without_units() {
     let text = format!("{facts}time [ms],d_m,force_N\n0,0,0\n1,0.01,1e6\n2,0.02,2e6\n3,0.01,0\n");
     let (curve, _) = read_bytes("a.csv", text.as_bytes(), &given(None)).unwrap();
     assert_eq!(curve.time_s, Some(vec![0.0, 1e-3, 2e-3, 3e-3]));
+    let backwards = "time [ms],d_m,force_N\n3,0.01,0\n2,0.02,2e6\n1,0.01,1e6\n0,0,0\n";
+    let (reversed, _) = read_bytes("a.csv", backwards.as_bytes(), &given(None)).unwrap();
+    assert_eq!(
+        (&reversed.time_s, &reversed.deflection_m, &reversed.force_n),
+        (&curve.time_s, &curve.deflection_m, &curve.force_n)
+    );
+    let note = "times: they fall from row to row, and the rows are reversed";
+    assert!(reversed.notes.iter().any(|n| n == note), "{:?}", reversed.notes);
     assert_eq!(curve.facts.mass_kg, Some(24e3));
     assert_eq!(curve.facts.speed_m_per_s, Some(10.0));
     assert_eq!(curve.facts.unloading_stiffness_n_per_m, Some(8e7));
@@ -397,6 +405,7 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         ("a.k", deck("x", card, "1,2\n"), Some("SI"), &["the curve has 1 point:"][..]),
         ("a.k", deck("x", card, "0,0\n1,nan\n2,2\n3,3\n"), Some("SI"), &["line 8, field 2: expected a number, found \"nan\""][..]),
         ("a.csv", "d_mm;F_kN\n0.0;0\n5.0;990\n10.0;1,012\n".into(), None, &["line 4, field 2: \"1,012\" has the sign \",\", and \"0.0\" in line 2 the sign \".\": only one of them can be decimal"][..]),
+        ("a.csv", "t_ms,d_mm,F_kN\n0,0,0\n1,5,90\n2,9,95\n1.5,7,99\n3,12,90\n".into(), None, &["line 5: the time 0.0015 s comes after 0.002 s: expected times that increase; sort the rows, or remove those that a restart has written again"][..]),
         ("a.k", "*KEYWORD\n*NODE\n1,2\n".into(), Some("SI"), &["expected a *DEFINE_CURVE, found none in this deck"][..]),
     ];
     cases.into_iter().for_each(|(name, bytes, units, expected)| t(name, bytes, units, expected));

@@ -165,6 +165,16 @@ fn recorded(
     let begins = impact.contact_time_s == Some(time_s[0]);
     let largest_m = table.deflection_m.iter().fold(0.0, |most: f64, d| most.max(d.abs()));
     let first_m = Some(table.deflection_m[0]).filter(|d| begins && *d > LEAST_OFFSET * largest_m);
+    let taken_off_m = table.deflection_m[0];
+    if contact == Some(time_s[0])
+        && first_m.is_none()
+        && taken_off_m.abs() > LEAST_OFFSET * largest_m
+    {
+        notes.push(format!(
+            "deflection: counts from contact, where the record has {:.1} mm",
+            taken_off_m * 1e3
+        ));
+    }
     let length_s = time_s[time_s.len() - 1] - time_s[0];
     let sampling = |interval_s: f64| {
         let states = (length_s / interval_s) as usize;

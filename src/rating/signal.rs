@@ -138,14 +138,16 @@ impl Pair {
         least: usize,
     ) -> Result<Self, Error> {
         let (r, p) = (reference.range_s(), prediction.range_s());
+        // To a nanosecond, since times in milliseconds are not exact in seconds.
+        let shown = |time_s: f64| (time_s * 1e9).round() / 1e9;
         let no_overlap = || {
             error!(
                 Rating,
                 "there are no common times: the reference goes from {} s to {} s, the prediction from {} s to {} s; check the units of time",
-                r.0,
-                r.1,
-                p.0,
-                p.1
+                shown(r.0),
+                shown(r.1),
+                shown(p.0),
+                shown(p.1)
             )
         };
         let common = (r.0.max(p.0), r.1.min(p.1));
@@ -161,8 +163,8 @@ impl Pair {
             return Err(error!(
                 Rating,
                 "the requested interval, {asked}, is empty or lies outside the common times from {} s to {} s",
-                common.0,
-                common.1
+                shown(common.0),
+                shown(common.1)
             ));
         }
         // Times are rounded: a last sample that is missed by so little still counts.
@@ -170,14 +172,18 @@ impl Pair {
         if samples > MOST_COMMON {
             return Err(error!(
                 Rating,
-                "the common times from {from_s} s to {to_s} s hold {samples:.0} samples at 10 kHz, {MOST_COMMON:.0} at most; check the units of time, or choose a shorter interval"
+                "the common times from {} s to {} s hold {samples:.0} samples at 10 kHz, {MOST_COMMON:.0} at most; check the units of time, or choose a shorter interval",
+                shown(from_s),
+                shown(to_s)
             ));
         }
         let samples = samples as usize;
         if samples < least {
             return Err(error!(
                 Rating,
-                "the common times from {from_s} s to {to_s} s hold {samples} samples at 10 kHz: at least {least} are needed; check the units of time and the requested interval"
+                "the common times from {} s to {} s hold {samples} samples at 10 kHz: at least {least} are needed; check the units of time and the requested interval",
+                shown(from_s),
+                shown(to_s)
             ));
         }
         let time_s: Vec<f64> =

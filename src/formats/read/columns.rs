@@ -108,6 +108,7 @@ impl ReadCurve {
             return Err(too_few(points, ""));
         }
         self.check_finite()?;
+        self.put_times_in_order()?;
         if self.time_s.is_none() {
             let mut points = Points::of(&self);
             let crush_m = self.facts.max_deflection_m;
@@ -115,6 +116,27 @@ impl ReadCurve {
             (self.deflection_m, self.force_n) = table.iter().map(|p| (p.d, p.f)).unzip();
         }
         Ok(self)
+    }
+
+    /// Reverses a record whose times fall from row to row, and refuses one of which some do.
+    fn put_times_in_order(&mut self) -> Result<(), Error> {
+        let Some(time_s) = &mut self.time_s else { return Ok(()) };
+        if time_s.windows(2).all(|w| w[1] <= w[0]) {
+            time_s.reverse();
+            self.deflection_m.reverse();
+            self.force_n.reverse();
+            self.lines.reverse();
+            self.notes.push("times: they fall from row to row, and the rows are reversed".into());
+            return Ok(());
+        }
+        let Some(i) = time_s.windows(2).position(|w| w[1] < w[0]) else { return Ok(()) };
+        // To a nanosecond, since times in milliseconds are not exact in seconds.
+        let [before, after] = [i, i + 1].map(|i| (time_s[i] * 1e9).round() / 1e9);
+        Err(error!(
+            CurveFile,
+            "{place}: the time {after} s comes after {before} s: expected times that increase; sort the rows, or remove those that a restart has written again",
+            place = self.place(i + 1)
+        ))
     }
 
     fn place(&self, point: usize) -> Place {
