@@ -1,5 +1,7 @@
 //! The report on a group: its runs, the accuracy of predictions, a prediction, the methods.
 
+use std::collections::BTreeSet;
+
 use super::figure::Figure;
 use super::{
     Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, ToDo, Verdict, energy, force,
@@ -11,7 +13,7 @@ use crate::assess::left_out::query_of;
 use crate::assess::validate::{Choice, acceptance, train_chosen, validate};
 use crate::assess::{ComparisonSettings, Row};
 use crate::charts;
-use crate::curve::{Case, ForceKind};
+use crate::curve::{Case, ForceKind, Parameter};
 use crate::dataset::TrainingSet;
 use crate::error::Error;
 use crate::plural::counted;
@@ -112,13 +114,21 @@ fn known_or_new(
     }
 }
 
-/// Speed, mass, peak, crush and audit of every run.
+/// Speed, mass, parameters, peak, crush and audit of every run.
 fn runs(cases: &[Case]) -> impl Into<Table> {
     let kind = cases.first().map_or("impact", |case| case.conditions.speed.kind.name());
-    Table::of(cases)
+    let parameters: BTreeSet<&String> =
+        cases.iter().flat_map(|case| case.conditions.parameters.keys()).collect();
+    let table = Table::of(cases)
         .column("run", |case| &case.id.name)
         .column(format!("{kind} speed"), |case| km_per_h(case.conditions.speed.m_per_s))
-        .column("mass", |case| masses(case))
+        .column("mass", |case| masses(case));
+    let table = parameters.into_iter().fold(table, |table, name| {
+        table.column(name.as_str(), move |case| {
+            case.conditions.parameters.get(name).map_or("–".into(), Parameter::to_string)
+        })
+    });
+    table
         .column("peak force", |case| force(case.peak_force_n()))
         .column("maximum crush", |case| metres(case.max_deflection_m()))
         .column("work", |case| energy(case.quality.audit.work_j))
@@ -438,19 +448,24 @@ fn middle_of_widest_gap(cases: &[Case]) -> Option<f64> {
 const HASH: usize = 12;
 
 /// The section of files that the curves come from.
-pub(super) fn add_sources<'a>(content: &mut Content, cases: impl Iterator<Item = &'a Case>) {
-    let sources =
-        cases.flat_map(|case| case.provenance.sources.iter().map(move |source| (&case.id, source)));
+/// `cases`: each with the title of its group.
+pub(super) fn add_sources<'a>(
+    content: &mut Content,
+    cases: impl Iterator<Item = (&'a str, &'a Case)>,
+) {
+    let sources = cases.flat_map(|(title, case)| {
+        case.provenance.sources.iter().map(move |source| (title, &case.id.name, source))
+    });
     let table = Table::of(sources)
-        .column("run", |(id, _)| format!("{}, {}", id.group, id.name))
-        .column("file", |(_, source)| &source.path)
-        .column("format", |(_, source)| &source.format)
-        .column("solver", |(_, source)| {
+        .column("run", |(title, name, _)| format!("{title}, {name}"))
+        .column("file", |(.., source)| &source.path)
+        .column("format", |(.., source)| &source.format)
+        .column("solver", |(.., source)| {
             let solver = [&source.solver, &source.version].into_iter().flatten();
             solver.map(String::as_str).collect::<Vec<_>>().join(" ")
         })
-        .column("size", |(_, source)| format!("{} kB", source.size_bytes.div_ceil(1000)))
-        .column("BLAKE3", |(_, source)| Cell {
+        .column("size", |(.., source)| format!("{} kB", source.size_bytes.div_ceil(1000)))
+        .column("BLAKE3", |(.., source)| Cell {
             text: source.blake3.chars().take(HASH).collect(),
             title: format!("BLAKE3 {}", source.blake3),
             is_chosen: false,

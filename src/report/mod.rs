@@ -229,7 +229,8 @@ pub(crate) fn report(
         side_by_side::add_designs(&mut content, &designs);
     }
     side_by_side::add_scenarios(&mut content, ran)?;
-    group::add_sources(&mut content, groups.iter().flat_map(|(_, _, cases)| *cases));
+    let all = groups.iter().flat_map(|(title, _, cases)| cases.iter().map(|case| (&**title, case)));
+    group::add_sources(&mut content, all);
     if !scenarios.is_empty() {
         content.verdict(Verdict::known(
             "All scenarios",
