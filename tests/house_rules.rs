@@ -46,7 +46,7 @@ const MAY_NAME: [(&str, &str); 38] = [
     ("sweep", "guess scenario plan multibody hdf5 stream manifest file unit"),
     ("init", "guess scenario surrogate study solver curve signal history file unit"),
     ("assess", "guess plural manifest scenario nsdm rating multibody surrogate dataset database solver curve signal history file unit"),
-    ("charts", "guess rating plan sweep scenario assess multibody surrogate dataset curve signal history plot unit"),
+    ("charts", "guess plural rating plan sweep scenario assess multibody surrogate dataset curve signal history plot unit"),
     ("report", "plural table rating charts assess scenario multibody surrogate dataset database curve plot unit"),
     ("failure", "report charts sweep assess scenario import init curate nsdm formats multibody surrogate dataset build study database history_hdf5 rating solver manifest plot file"),
 ];
@@ -229,7 +229,7 @@ fn functions_are_the_same_on_every_platform() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 85036), ("files", 306), ("public types", 165), ("error types", 9)];
+    [("lines", 85383), ("files", 306), ("public types", 165), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {
