@@ -92,8 +92,7 @@ pub(crate) struct NsdmFit {
     pub law: Nsdm,
 }
 
-/// Which cases a comparison leaves out: indices among those of a group's training set; and the names of the inner cases that ended
-/// while loading and cannot serve as a reference.
+/// Which cases a comparison leaves out: indices among those of a group's training set; and why others are not compared.
 pub(crate) type Compared = (Vec<usize>, Vec<String>);
 
 /// The cases of a group whose speeds lie between others. The speed of a fixed curve, in m/s, is not one of them.
@@ -114,7 +113,7 @@ pub(crate) fn inner_cases(
         let left_out = nearly_same(&all, v);
         ends.iter().chain(&fixed_m_per_s).all(|s| !is_within(*s, left_out))
     };
-    let (judged, _) = without_repeated(&set);
+    let (judged, repeated) = without_repeated(&set);
     let inner = judged.into_iter().filter(|&k| is_inner(set.cases[k].speed_m_per_s));
     let (cut, whole): (Vec<usize>, Vec<usize>) = inner.partition(|&k| set.cases[k].truncated);
     let cut: Vec<String> = cut.into_iter().map(|k| set.cases[k].name.clone()).collect();
@@ -131,7 +130,11 @@ pub(crate) fn inner_cases(
             cut.join(", ")
         ));
     }
-    Ok((whole, cut))
+    Ok((whole, cut.into_iter().map(not_compared).chain(repeated).collect()))
+}
+
+fn not_compared(case: String) -> String {
+    format!("case \"{case}\" ended while loading and cannot serve as the reference: not compared")
 }
 
 /// The cases of a group at a speed in m/s.
@@ -144,7 +147,9 @@ pub(crate) fn cases_at(group: &str, cases: &[Case], speed_m_per_s: f64) -> Resul
         (true, true) => Err(no_case(group, speed_m_per_s, &set)),
         // The comparison says why there is none.
         (true, false) => Ok((cut, Vec::new())),
-        _ => Ok((whole, cut.into_iter().map(|k| set.cases[k].name.clone()).collect())),
+        _ => {
+            Ok((whole, cut.into_iter().map(|k| not_compared(set.cases[k].name.clone())).collect()))
+        }
     }
 }
 

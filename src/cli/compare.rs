@@ -92,15 +92,11 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     };
     let database = Database::read(path)?;
     let (group, cases) = database.group_or_only(path, args.group.as_deref())?;
-    let (compared, cut) = match args.speed {
+    let (compared, others) = match args.speed {
         Some(speed) => compare::cases_at(group, cases, speed)?,
         None => compare::inner_cases(group, cases, args.fixed_speed)?,
     };
-    for case in &cut {
-        options.warn(&format!(
-            "case \"{case}\" ended while loading and cannot serve as the reference: not compared"
-        ));
-    }
+    let outcome = options.warn_all(&others);
     let bar = Bar::new(options, "comparing");
     let mut comparisons = Vec::new();
     let speeds = TrainingSet::new(group, cases)?.speeds_m_per_s();
@@ -114,7 +110,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         let at = km_per_h(c.speed_m_per_s);
         c.missing.iter().map(move |why| format!("at {at} ({}) {why}", c.case))
     });
-    let outcome = options.warn_all(missing);
+    let outcome = outcome.max(options.warn_all(missing));
     if !inner {
         options.warn("the left-out speed is an end of the range: the models extrapolate");
     }
@@ -123,7 +119,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     } else {
         several(&comparisons, options)?;
     }
-    Ok(outcome.max(Outcome::warned_if(!inner || !cut.is_empty())))
+    Ok(outcome.max(Outcome::warned_if(!inner)))
 }
 
 fn percent(error: f64) -> String {

@@ -6,7 +6,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
-use super::layout::{self, ATTRIBUTES, BODY_FORCE, Content, FoundCase, FoundGroup, OLDEST, Opened};
+use super::layout::{self, ATTRIBUTES, BODY_FORCE, Content, OLDEST};
+use super::opened::{self, FoundCase, FoundGroup, Opened};
 use super::{group, listed};
 use crate::curve::body::body_force_n;
 use crate::curve::{Case, Curve, EnergyAudit, ForceKind, energy, group as siblings, loading};
@@ -46,7 +47,7 @@ pub(crate) struct Checked {
 /// Checks the database file at `path`; damage of a case is a finding.
 pub(crate) fn check(path: &Path) -> Result<Checked, Error> {
     // Each has its own bound of bytes, and every dataset is read twice.
-    let (raw, decoded) = (layout::open(path)?, layout::open(path)?);
+    let (raw, decoded) = (opened::open(path)?, opened::open(path)?);
     let mut checked = Checked::default();
     for group in raw.groups()? {
         let mut readable = Vec::new();

@@ -7,9 +7,8 @@ use std::path::Path;
 use std::{fmt, fs};
 
 use super::group::{self, GROUP_ATTRIBUTES};
-use super::layout::{
-    self, BODY_FORCE, CASE_ATTRIBUTES, Content, FoundGroup, ORIGINAL, Opened, PLOT, ROOT, VERSION,
-};
+use super::layout::{self, BODY_FORCE, CASE_ATTRIBUTES, Content, ORIGINAL, PLOT, ROOT, VERSION};
+use super::opened::{self, FoundGroup, Opened};
 use super::{CasePath, Database};
 use crate::curve::{Case, CaseId};
 use crate::error::{Error, error};
@@ -24,8 +23,8 @@ pub(super) fn write_keeping(
     path: &Path,
     before: &BTreeSet<Item>,
 ) -> Result<(), Error> {
-    let is_current = layout::open(path)?.version == VERSION;
-    let mut old = layout::decode(path)?;
+    let is_current = opened::open(path)?.version == VERSION;
+    let mut old = opened::decode(path)?;
     let moves = Moves::of(&old, database, before);
     let before: BTreeSet<Item> = before.iter().map(|item| moves.of_item(item)).collect();
     let would_drop = |what: String| {
@@ -44,19 +43,19 @@ pub(super) fn write_keeping(
         });
         edited.map_err(|e| match e {
             // If the copy can be read, the editor cannot do it.
-            EditError::Hdf5(e) => match layout::open(draft).and_then(|draft| found(&draft)) {
+            EditError::Hdf5(e) => match opened::open(draft).and_then(|draft| found(&draft)) {
                 Ok(_) => would_drop(format!("{} ({e})", listed(&before))),
                 Err(unread) => unread,
             },
             EditError::Content(e) => e,
         })?;
         // Whatever went wrong in it is seen here, before the old file is replaced.
-        let after = found(&layout::open(draft)?)?;
+        let after = found(&opened::open(draft)?)?;
         let lost: BTreeSet<Item> = before.difference(&after).cloned().collect();
         if !lost.is_empty() {
             return Err(would_drop(listed(&lost)));
         }
-        if layout::decode(draft)?.same_content(database) {
+        if opened::decode(draft)?.same_content(database) {
             Ok(())
         } else {
             Err(would_drop(listed(&before)))
@@ -145,7 +144,7 @@ pub(crate) fn replace_labels(path: &Path, case: &Case) -> Result<bool, Error> {
 /// writes anew.
 fn around(path: &Path, case: &Case) -> Result<BTreeSet<Item>, Error> {
     let CaseId { group, name, .. } = &case.id;
-    let opened = layout::open(path)?;
+    let opened = opened::open(path)?;
     let mut all = Foreign(BTreeSet::new());
     let mut walk = || -> Result<(), hdf5::Error> {
         let root = opened.file.root();

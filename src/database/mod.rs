@@ -26,6 +26,7 @@ pub(crate) mod check;
 mod edit;
 mod group;
 mod layout;
+mod opened;
 
 pub(crate) use edit::replace_labels;
 pub(crate) use layout::record_hash;
@@ -39,7 +40,7 @@ use crate::curve::{Case, CaseId, Origin, StoppedMass};
 use crate::error::{Error, error};
 use crate::file::{accepts_changed, is_file, write_at, write_whole};
 use crate::hdf5;
-use layout::FoundCase;
+use opened::FoundCase;
 
 /// The cases of one database file.
 ///
@@ -90,7 +91,7 @@ impl Database {
 
     /// Reads a database file, also with cases whose values are not those that were written.
     pub(crate) fn read_as_it_is(path: &Path) -> Result<Self, Error> {
-        layout::decode(path)
+        opened::decode(path)
     }
 
     /// The names of the groups of a database file and of their cases in order of speed, without reading a case.
@@ -98,7 +99,7 @@ impl Database {
     /// # Errors
     /// If the file is missing, not HDF5, not a curve database, of another layout, or damaged.
     pub fn names(path: &Path) -> Result<Vec<(String, Vec<String>)>, Error> {
-        let opened = layout::open(path)?;
+        let opened = opened::open(path)?;
         let names = opened.groups()?.into_iter().map(|group| {
             let found: Vec<String> = group.cases.into_iter().map(|(name, _)| name).collect();
             let mut names = group.listed.unwrap_or_default();
@@ -118,7 +119,7 @@ impl Database {
     /// As for [`Database::read`], if the group is not named and there are several, and if the
     /// group has no such case.
     pub fn read_case(path: &Path, group: Option<&str>, case: &str) -> Result<Case, Error> {
-        let opened = layout::open(path)?;
+        let opened = opened::open(path)?;
         if let Some((group, found)) = opened.find(group, case) {
             let FoundCase { case, hashes, .. } = opened.case(&group, case, &found)?;
             if layout::is_altered(&case, &hashes)? && !accepts_changed() {
@@ -142,7 +143,7 @@ impl Database {
         group: Option<&str>,
         case: &str,
     ) -> Result<Option<Case>, Error> {
-        let opened = layout::open(path)?;
+        let opened = opened::open(path)?;
         if opened.version != layout::VERSION {
             return Ok(None);
         }
@@ -166,7 +167,7 @@ impl Database {
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         let is_there = is_file(path)?;
         if is_there {
-            let foreign = edit::found(&layout::open(path)?)?;
+            let foreign = edit::found(&opened::open(path)?)?;
             if !foreign.is_empty() {
                 return edit::write_keeping(self, path, &foreign);
             }
@@ -386,7 +387,7 @@ impl Database {
         path: &Path,
         groups: impl Iterator<Item = &'g str>,
     ) -> BTreeMap<String, StoppedMass> {
-        let opened = layout::open(path).ok();
+        let opened = opened::open(path).ok();
         let of_group = |group: &'g str| {
             let cases = self.cases(group);
             let is_as_written = !self.altered.keys().any(|case| case.group == group);
@@ -420,13 +421,13 @@ pub(crate) fn remember_origin(case: &mut Case) {
 
 /// What other programs have put into the file at `path`, as a message lists it; `None` if nothing.
 pub(crate) fn foreign_items(path: &Path) -> Result<Option<String>, Error> {
-    let items = edit::found(&layout::open(path)?)?;
+    let items = edit::found(&opened::open(path)?)?;
     Ok((!items.is_empty()).then(|| edit::listed(&items)))
 }
 
 /// Whether the file at `path` is a curve database.
 pub(crate) fn is_database(path: &Path) -> bool {
-    layout::open(path).is_ok()
+    opened::open(path).is_ok()
 }
 
 /// Puts the cases of a group into their order: by speed, then name.
