@@ -177,6 +177,8 @@ fn free_travel(chain: &Chain, run: &Run) -> Vec<String> {
 
 /// Growth of a crush after the end of the run, as a share of it, that deserves a warning.
 const GROWTH: f64 = 0.01;
+/// How long an interface whose closing speed does not fall goes on at least, in s.
+const PUSHED_S: f64 = 0.1;
 
 /// Of interfaces that are crushed further after the end of the run, between bodies whose main contact is over: by how much follows from
 /// the closing speed and how fast it falls.
@@ -191,10 +193,14 @@ fn still_crushed(chain: &Chain, run: &Run, end_s: f64) -> Option<String> {
         let (history, (v, a), (v_ahead, a_ahead)) = (&run.interfaces[k], of(k), of(k + 1));
         let (closing, falls) = (v - v_ahead, a_ahead - a);
         let crush_m = history.max_deflection_m;
+        let further_m = match falls > 0.0 {
+            true => 0.5 * closing * closing / falls,
+            false => closing * PUSHED_S,
+        };
         closing > 0.0
             && crush_m > 0.0
             && history.max_deflection_time_s >= last_s
-            && 0.5 * closing * closing > GROWTH * crush_m * falls
+            && further_m > GROWTH * crush_m
             && !is_loaded(k)
             && !is_loaded(k + 1)
     };

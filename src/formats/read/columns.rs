@@ -121,7 +121,7 @@ impl ReadCurve {
     /// Reverses a record whose times fall from row to row, and refuses one of which some do.
     fn put_times_in_order(&mut self) -> Result<(), Error> {
         let Some(time_s) = &mut self.time_s else { return Ok(()) };
-        if time_s.windows(2).all(|w| w[1] <= w[0]) {
+        if time_s.windows(2).all(|w| w[1] <= w[0]) && time_s.last() < time_s.first() {
             time_s.reverse();
             self.deflection_m.reverse();
             self.force_n.reverse();
