@@ -653,6 +653,64 @@ fn a_vehicle_that_is_still_to_be_hit_is_not_judged() {
     }
 }
 
+/// A second contact that may become the larger one is no verdict, before and while it acts.
+#[test]
+fn a_vehicle_that_is_being_hit_again_is_not_judged() {
+    let laws = "nose = { stages = [ { stroke = \"3m\", from = \"0N\", to = \"15MN\" } ], law = \"elastic\" }\n\
+        in = { stages = [ { stroke = \"2m\", from = \"0N\", to = \"200MN\" } ], law = \"elastic\", gap = \"1500mm\" }\n";
+    let text = |duration: &str| {
+        format!(
+            "[run]\nduration = \"{duration}\"\n[curves]\n{laws}\
+             [[train]]\nname = \"A\"\nspeed = \"3m/s\"\nvehicles = [ {{ name = \"A1\", mass = \"24t\" }} ]\n\
+             [[train]]\nname = \"B\"\nspeed = \"-5m/s\"\ninner = \"in\"\n\
+             vehicles = [ {{ name = \"B1\", mass = \"12t\" }}, {{ name = \"B2\", mass = \"900t\" }} ]\n\
+             [contact]\ncurve = \"nose\"\n\
+             [limits]\nstandard = \"X\"\nedition = \"1\"\nmean_deceleration_g = 5.5\ntrains = [ \"A\" ]\n"
+        )
+    };
+    // Contacts of A1 from 0 to 126 ms, 4.3 g, and from 279 to 404 ms, 7.1 g.
+    for (duration, over, unknown) in [
+        ("260ms", json!([]), json!(["A1"])),
+        ("300ms", json!([]), json!(["A1"])),
+        ("340ms", json!([]), json!(["A1"])),
+        ("400ms", json!([]), json!(["A1"])),
+        ("450ms", json!(["A1"]), json!([])),
+        ("900ms", json!(["A1"]), json!([])),
+    ] {
+        let limits = &run(&text(duration))["summary"]["limits"];
+        assert_eq!((&limits["over"], &limits["unknown"]), (&over, &unknown), "{duration}");
+    }
+}
+
+/// A structure is fully crushed at 1.5 times the largest crush of its runs, however much energy the curve was asked for.
+#[test]
+fn a_heavy_vehicle_bottoms_where_a_light_one_does() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let crush_m = 1.5 * 1.62632;
+    for (mass, speed) in [("60t", "72km/h"), ("24t", "110km/h")] {
+        let text = format!(
+            "[run]\nduration = \"600ms\"\n[curves]\nnose = {{ model = \"lead.model\" }}\n\
+             [[train]]\nname = \"A\"\nspeed = \"{speed}\"\nvehicles = [ {{ name = \"A1\", mass = \"{mass}\" }} ]\n\
+             [wall]\n[contact]\ncurve = \"nose\"\n"
+        );
+        std::fs::write(here.join("s.toml"), text).unwrap();
+        let found = parsed(&crumple_ok(here, "simulate s.toml --json -q"));
+        let interface = &found["summary"]["interfaces"][0];
+        let number = |key: &str| interface[key].as_f64().unwrap();
+        let further = number("max_deflection_m") / crush_m - 1.0;
+        assert!((0.02..0.15).contains(&further), "{mass}: {interface}");
+        assert!(number("peak_force_N") > 15e6, "{mass}: {interface}");
+    }
+    // The table of a curve that reaches so far by itself rises there, too.
+    crumple_ok(here, "predict lead.model --speed 100km/h --extrapolate -o far.json");
+    let table = crumple_ok(here, "export far.json --to csv -q");
+    let rows = table.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit()));
+    let last: Vec<f64> =
+        rows.last().unwrap().split(',').map(|field| field.parse().unwrap()).collect();
+    assert!((1.02..1.15).contains(&(last[0] / crush_m)) && last[1] > 15e6, "{last:?}");
+}
+
 /// A limit is held against the contact that changes the speed most, too, whatever small one comes first.
 #[test]
 fn a_first_small_pulse_hides_no_other() {

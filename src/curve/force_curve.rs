@@ -172,15 +172,27 @@ impl ForceCurve {
         let stiffness_n_per_m = known.unwrap_or_else(|| self.loading.steepest_rise());
         // A force that never rises bottoms by no slope.
         let tail = if stiffness_n_per_m > 0.0 { tail } else { Tail::Hold };
-        let (loading, beyond) = (&self.loading, self.beyond.take());
-        let is_followed = beyond.is_none() && data_end_m < loading.end_m();
+        let beyond = self.beyond.take();
+        let is_followed = beyond.is_none() && data_end_m < self.loading.end_m();
+        let fully_m = FULLY_CRUSHED * data_end_m;
+        if beyond.is_some() && tail == Tail::Bottom && self.loading.end_m() > fully_m {
+            // A prediction for more energy than the structure takes shows no force beyond that.
+            let (d, f) = (self.loading.deflection_m(), self.loading.force_n());
+            let below = d.partition_point(|d| *d < fully_m * (1.0 - 1e-9));
+            let with = |values: &[f64], last: f64| [&values[..below], &[last]].concat();
+            let cut = Envelope::new(with(d, fully_m), with(f, self.loading.force_at(fully_m)))?;
+            let interval_m = grid_m(&cut, fully_m);
+            self.loading = bottomed(&cut, cut.peak_force_n(), interval_m, stiffness_n_per_m)?;
+            return Ok(Self { data_end_m: Some(data_end_m), ..self });
+        }
+        let loading = &self.loading;
         self.loading = if is_followed && tail == Tail::Bottom {
             let interval_m = grid_m(loading, data_end_m);
             bottomed(loading, loading.peak_force_n(), interval_m, stiffness_n_per_m)?
         } else if is_followed {
             return Ok(self);
         } else {
-            with_tail(loading, beyond.as_ref(), stiffness_n_per_m, tail)?
+            with_tail(loading, beyond.as_ref(), data_end_m, stiffness_n_per_m, tail)?
         };
         Ok(Self { data_end_m: Some(data_end_m), ..self })
     }
@@ -245,13 +257,14 @@ const COARSEST: f64 = 0.01;
 const LAST: f64 = 0.1;
 
 /// The curve with its tail. `beyond` is the same force along deflections of which some lie
-/// beyond the curve's end, where that is known.
+/// beyond the curve's end, where that is known; `data_end_m` is how far its source has data.
 ///
 /// Points stand at multiples of the curve's last interval, so that a fine table of even deflections
 /// stays one.
 pub(crate) fn with_tail(
     curve: &Envelope,
     beyond: Option<&Envelope>,
+    data_end_m: f64,
     stiffness_n_per_m: f64,
     tail: Tail,
 ) -> Result<Envelope, Error> {
@@ -272,7 +285,7 @@ pub(crate) fn with_tail(
         }
     };
     let mut level_n = end_n;
-    let mut crushed_m = on_grid(FULLY_CRUSHED * end_m);
+    let mut crushed_m = on_grid(FULLY_CRUSHED * end_m.min(data_end_m));
     match beyond.filter(|b| b.end_m() > end_m && b.force_at(end_m) > 0.0) {
         Some(beyond) => {
             let share = end_n / beyond.force_at(end_m);
@@ -391,21 +404,21 @@ mod tests {
 
     #[test]
     fn holds_and_then_rises_with_the_unloading_stiffness() {
-        let with = with_tail(&sample(), None, 50e6, Tail::Bottom).unwrap();
+        let with = with_tail(&sample(), None, f64::INFINITY, 50e6, Tail::Bottom).unwrap();
         assert_eq!(with.deflection_m()[..101], sample().deflection_m()[..]);
         assert!((with.force_at(1.4) - 1e6).abs() < 1e-3);
         let rise = with.force_at(1.53) - with.force_at(1.52);
         assert!((rise / 0.01 / 50e6 - 1.0).abs() < 1e-9);
         assert!(with.peak_force_n() >= 3e6);
-        let held = with_tail(&sample(), None, 50e6, Tail::Hold).unwrap();
+        let held = with_tail(&sample(), None, f64::INFINITY, 50e6, Tail::Hold).unwrap();
         assert!((held.end_m() - 1.5).abs() < 1e-9);
         assert!((held.peak_force_n() - 1e6).abs() < 1e-3);
-        assert_eq!(with_tail(&sample(), None, 50e6, Tail::None).unwrap(), sample());
+        assert_eq!(with_tail(&sample(), None, f64::INFINITY, 50e6, Tail::None).unwrap(), sample());
     }
 
     #[test]
     fn keeps_an_even_table_even() {
-        let with = with_tail(&sample(), None, 50e6, Tail::Bottom).unwrap();
+        let with = with_tail(&sample(), None, f64::INFINITY, 50e6, Tail::Bottom).unwrap();
         for d in with.deflection_m() {
             let steps = d / 0.01;
             assert!((steps - steps.round()).abs() < 1e-6, "{d}");
@@ -417,7 +430,7 @@ mod tests {
     fn a_coarse_table_bottoms_where_a_fine_one_does() {
         let d = vec![0.0, 0.02, 0.04, 0.06, 0.4];
         let coarse = Envelope::new(d, vec![0.0, 0.9e6, 1e6, 1.2e6, 1.2e6]).unwrap();
-        let with = with_tail(&coarse, None, 80e6, Tail::Bottom).unwrap();
+        let with = with_tail(&coarse, None, f64::INFINITY, 80e6, Tail::Bottom).unwrap();
         assert!((with.force_at(0.6) - 1.2e6).abs() < 1e-3);
         assert!((with.force_at(0.61) - 2e6).abs() < 1.0);
         assert!((3.6e6..3.6e6 + 80e6 * 0.004).contains(&with.peak_force_n()));
@@ -426,7 +439,7 @@ mod tests {
     #[test]
     fn follows_faster_runs_at_its_own_level() {
         let beyond = Envelope::new(vec![0.0, 1.0, 1.8], vec![0.0, 2e6, 4e6]).unwrap();
-        let with = with_tail(&sample(), Some(&beyond), 50e6, Tail::Hold).unwrap();
+        let with = with_tail(&sample(), Some(&beyond), f64::INFINITY, 50e6, Tail::Hold).unwrap();
         assert!((with.force_at(1.4) - 1.5e6).abs() < 1.0);
         assert!((with.end_m() - 1.8).abs() < 0.02);
     }
@@ -434,7 +447,7 @@ mod tests {
     #[test]
     fn a_force_that_has_fallen_returns_to_its_level() {
         let fallen = Envelope::new(vec![0.0, 0.5, 0.99, 1.0], vec![0.0, 1e6, 1e6, 0.0]).unwrap();
-        let with = with_tail(&fallen, None, 50e6, Tail::Hold).unwrap();
+        let with = with_tail(&fallen, None, f64::INFINITY, 50e6, Tail::Hold).unwrap();
         assert!((with.force_at(1.2) - 0.95e6).abs() < 1e3);
     }
 }

@@ -82,7 +82,9 @@ impl ExportCurve {
         }
         let beyond = predicted.beyond_envelope()?;
         let follows_faster_runs = beyond.as_ref().is_some_and(|b| b.end_m() > loading.end_m());
-        let with = |curve: &Envelope| with_tail(curve, beyond.as_ref(), stiffness, tail);
+        let with = |curve: &Envelope| {
+            with_tail(curve, beyond.as_ref(), predicted.data_end_m(), stiffness, tail)
+        };
         let continued = with(&loading)?;
         let band = predicted.force_low_n.as_ref().zip(predicted.force_high_n.as_ref());
         // An edge goes on by the rule of the curve. It is not that of a softened curve.

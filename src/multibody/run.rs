@@ -127,6 +127,8 @@ pub struct BodyHistory {
     /// Of a later contact that changes the speed more than any other: the mean of `−a` in m/s², from when until when in s,
     /// and whether the run ends while it acts. `None` if the first contact does.
     pub main_contact: Option<(f64, (f64, f64), bool)>,
+    /// Changes of speed in m/s, in magnitude: by the contact that acts when the run ends, and by the one that changes it most.
+    pub(crate) running_and_largest_change: (Option<f64>, f64),
     /// Mean of `−a` over the 120 ms in which its magnitude is largest, with windows that end at
     /// the outputs; `None` in a shorter run and for outputs more than 5 ms apart.
     pub moving_mean_deceleration_m_per_s2: Option<f64>,

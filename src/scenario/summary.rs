@@ -192,6 +192,29 @@ pub(crate) struct OccupantLimit<'a> {
 }
 
 impl Prepared {
+    /// Whether a contact that acts when the run ends, or one that is to come, may change the speed of body `i` by more than the largest so
+    /// far: what it has changed, the bodies that still close with it, and a rebound by as much as both are all that can drive it.
+    fn may_have_larger_contact(&self, run: &Run, i: usize) -> bool {
+        let count = self.chain.bodies().len();
+        // A wall stands still.
+        let speed = |k: usize| run.bodies.get(k).map_or(0.0, |body| body.final_v_m_per_s);
+        let closing = |k: usize| speed(k) - speed(k + 1);
+        let has = |k: usize| k < run.interfaces.len();
+        let mut behind = i;
+        while behind > 0 && closing(behind - 1) > -LEAST_CLOSING_M_PER_S {
+            behind -= 1;
+        }
+        let mut ahead = i;
+        while ahead < count && has(ahead) && closing(ahead) > -LEAST_CLOSING_M_PER_S {
+            ahead += 1;
+        }
+        let (running, largest) = run.bodies[i].running_and_largest_change;
+        let is_hit = |k: usize| has(k) && closing(k) > LEAST_CLOSING_M_PER_S;
+        let goes_on = running.is_some() || i > 0 && is_hit(i - 1) || is_hit(i);
+        let drive = (speed(behind) - speed(i)).max(speed(i) - speed(ahead)).max(0.0);
+        goes_on && 2.0 * (running.unwrap_or(0.0) + drive) > largest
+    }
+
     /// What `run`, a run of this scenario, comes to.
     pub(crate) fn summary<'a>(&'a self, run: &'a Run) -> Summary<'a> {
         let (bodies, interfaces) = (self.chain.bodies(), self.chain.interfaces());
@@ -238,7 +261,7 @@ impl Prepared {
         let bodies: Vec<BodySummary<'a>> = self.order.iter().map(of_body).collect();
         let judged = || {
             let all = self.order.iter().zip(&bodies).filter(|(i, _)| self.limited.contains(i));
-            all.map(|(_, body)| body)
+            all.map(|(i, body)| (*i, body))
         };
         // A body that is still without contact may yet have one.
         let final_v = |k: usize| run.bodies.get(k).map_or(0.0, |body| body.final_v_m_per_s);
@@ -253,9 +276,12 @@ impl Prepared {
             let mut names = beside.filter_map(|k| Some(&*self.chain.bodies().get(k)?.name));
             names.any(|other| other == name || is_zone_of(other, name))
         };
-        let is_open = |body: &BodySummary<'_>| {
+        let is_open = |i: usize, body: &BodySummary<'_>| {
             let has_no_contact = body.mean_deceleration_span_s.is_none();
-            body.still_loaded_at_end || has_no_contact && goes_on || is_beside(body.name)
+            body.still_loaded_at_end
+                || has_no_contact && goes_on
+                || is_beside(body.name)
+                || self.may_have_larger_contact(run, i)
         };
         let beyond_data: Vec<&str> = run.beyond_data().map(|k| &*interfaces[k].name).collect();
         // Beyond its data the force is an assumption, and with it all that follows.
@@ -272,10 +298,12 @@ impl Prepared {
                 what,
                 limit,
                 over: judged()
+                    .map(|(_, body)| body)
                     .filter(|body| is_known && met(body).is_some_and(|met| met.abs() > limit))
                     .map(|body| body.name)
                     .collect(),
                 unknown: judged()
+                    .map(|(_, body)| body)
                     .filter(|body| !is_known || met(body).is_none())
                     .map(|body| body.name)
                     .collect(),
@@ -291,10 +319,13 @@ impl Prepared {
             edition: &limits.edition,
             mean_deceleration_limit_g: limits.mean_deceleration_g,
             trains: &limits.trains,
-            over: judged().filter(|body| is_known && is_over(body)).map(|body| body.name).collect(),
+            over: judged()
+                .filter(|(_, body)| is_known && is_over(body))
+                .map(|(_, body)| body.name)
+                .collect(),
             unknown: judged()
-                .filter(|body| !is_known || is_open(body) && !is_over(body))
-                .map(|body| body.name)
+                .filter(|(i, body)| !is_known || is_open(*i, body) && !is_over(body))
+                .map(|(_, body)| body.name)
                 .collect(),
             occupants: occupants(limits),
             beyond_data,

@@ -188,7 +188,9 @@ impl EventRecorder {
             if let Some(span) = phase.at_end_of_run(end) {
                 spans.close(span);
             }
+            let running = spans.running();
             let spans = spans.ended();
+            history.running_and_largest_change = (running, spans.largest_change());
             history.final_v_m_per_s = final_v_m_per_s;
             history.final_a_m_per_s2 = self.present.seen_a[self.layout.of(i)];
             if record != Record::Closing && interval_s <= COARSEST_S {

@@ -212,6 +212,15 @@ impl Spans {
         }
     }
 
+    /// Magnitude of the change of speed by the span that the end of the run has cut.
+    pub(crate) fn running(&self) -> Option<f64> {
+        self.last.filter(|last| last.is_cut).map(|last| last.change())
+    }
+
+    pub(crate) fn largest_change(&self) -> f64 {
+        self.largest.map_or(0.0, |largest| largest.change())
+    }
+
     /// All have been closed.
     pub(crate) fn ended(mut self) -> Self {
         if let Some(last) = self.last.take() {
