@@ -1,5 +1,6 @@
 //! The report on a scenario: what drives it, what came of it, and how far that can be trusted.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use super::figure::Figure;
@@ -35,6 +36,8 @@ pub(super) struct Numbers {
     pub vehicles: Vec<(String, [Option<f64>; 5])>,
     /// By interface: largest crush in m and energy in J.
     pub interfaces: Vec<(String, [Option<f64>; 2])>,
+    /// Interfaces that were crushed beyond the data of their curves.
+    pub beyond_data: Vec<String>,
 }
 
 /// Histories that a page shows.
@@ -155,7 +158,12 @@ impl Numbers {
             .interfaces
             .iter()
             .map(|of| (of.name.into(), [Some(of.history.max_deflection_m), of.energy_j]));
-        Self { vehicles: of_vehicle.collect(), interfaces: of_interface.collect() }
+        let beyond = summary.interfaces.iter().filter(|of| of.history.is_beyond_data());
+        Self {
+            vehicles: of_vehicle.collect(),
+            interfaces: of_interface.collect(),
+            beyond_data: beyond.map(|of| of.name.into()).collect(),
+        }
     }
 }
 
@@ -189,17 +197,19 @@ const RANGES: &str = "Smallest and largest of three runs: with the curves as the
 
 /// Each vehicle's results over the bands.
 fn ranges_of_vehicles(found: &Numbers, edges: &[Numbers]) -> impl Into<Table> {
-    let of = |i: usize, k: usize| {
+    let of = |i: usize, k: usize, unit: &str| {
         let range = range(found, edges, |n| n.vehicles.get(i)?.1[k]);
         range.map_or("–".into(), |(low, high)| {
-            format!("{low:.2} to {high:.2} g").replace('-', "−")
+            format!("{low:.2} to {high:.2} {unit}").replace('-', "−")
         })
     };
     Table::of(found.vehicles.iter().enumerate())
         .column("vehicle", |(_, (name, _))| name)
-        .column("mean deceleration", move |(i, _)| of(*i, 0))
-        .column("peak (CFC 60)", move |(i, _)| of(*i, 1))
-        .column("120 ms mean", move |(i, _)| of(*i, 2))
+        .column("mean deceleration", move |(i, _)| of(*i, 0, "g"))
+        .column("peak (CFC 60)", move |(i, _)| of(*i, 1, "g"))
+        .column("120 ms mean", move |(i, _)| of(*i, 2, "g"))
+        .column("secondary impact", move |(i, _)| of(*i, 3, "m/s"))
+        .column("occupant load", move |(i, _)| of(*i, 4, "g"))
 }
 
 /// Each interface's results over the bands.
@@ -275,6 +285,42 @@ fn add_limits(
         .filter(|body| limits.over.contains(&body.name))
         .map(|body| format!("{} ({})", body.name, body.mean_text()))
         .collect();
+    // A value of a vehicle that a limit lies so close to that it may be on either side.
+    let found = Numbers::of(summary);
+    let close = |k: usize, limit: f64, unit: &str| {
+        let judged = found.vehicles.iter().enumerate();
+        let judged = judged.filter(|(_, (name, _))| limits.judged.contains(&&**name));
+        let close = judged.filter_map(|(i, (name, values))| {
+            let of = |n: &Numbers| n.vehicles.get(i)?.1[k].map(f64::abs);
+            let (low, high) = range(&found, edges, of)?;
+            if edges.is_empty() {
+                let value = values[k]?;
+                let is_close = (value.abs() / limit - 1.0).abs() < force_error;
+                return is_close.then(|| format!("{name} ({value:.2} {unit})"));
+            }
+            (low..=high).contains(&limit).then(|| format!("{name} ({low:.2} to {high:.2} {unit})"))
+        });
+        let close = close.collect::<Vec<_>>().join(", ");
+        let than = match edges {
+            [] => format!(
+                "closer to the limit of {limit} {unit} than the curves' own mean force error of {}",
+                percent(force_error)
+            ),
+            _ => format!("the limit of {limit} {unit} lies within what the curves' bands give"),
+        };
+        (!close.is_empty() && limits.beyond_data.is_empty()).then(|| format!("{than}: {close}"))
+    };
+    let beyond: BTreeSet<&str> =
+        edges.iter().flat_map(|edge| &edge.beyond_data).map(String::as_str).collect();
+    let beyond = match &*Vec::from_iter(beyond).join(", ") {
+        "" => String::new(),
+        beyond => format!(
+            ", but at an edge of the curves' bands {beyond} goes beyond the data of its curve"
+        ),
+    };
+    let within = if beyond.is_empty() { "kept" } else { "unknown" };
+    let limit_g = limits.mean_deceleration_limit_g;
+    let close_g = close(0, limit_g, "g");
     if !limits.beyond_data.is_empty() {
         let beyond = limits.beyond_data.join(", ");
         verdict(
@@ -283,43 +329,29 @@ fn add_limits(
         );
     } else if !over.is_empty() {
         verdict("over", format!("{what}: {}", over.join(", ")));
-    } else if limits.unknown.is_empty() {
-        verdict("kept", format!("{what}: no vehicle"));
+    } else if limits.unknown.is_empty() && close_g.is_none() {
+        verdict(within, format!("{what}: no vehicle{beyond}"));
     }
     if !limits.unknown.is_empty() && limits.beyond_data.is_empty() {
         let unknown = limits.unknown.join(", ");
         verdict("unknown", format!("{what}: the run ended before it was known for {unknown}"));
     }
-    let limit_g = limits.mean_deceleration_limit_g;
-    let found = Numbers::of(summary);
-    let close = found.vehicles.iter().enumerate().filter_map(|(i, (name, [g, ..]))| {
-        let of = |n: &Numbers| n.vehicles.get(i)?.1[0].map(f64::abs);
-        let (low, high) = range(&found, edges, of)?;
-        if edges.is_empty() {
-            let g = (*g)?;
-            let is_close = (g.abs() / limit_g - 1.0).abs() < force_error;
-            return is_close.then(|| format!("{name} ({g:.2} g)"));
-        }
-        (low..=high).contains(&limit_g).then(|| format!("{name} ({low:.2} to {high:.2} g)"))
-    });
-    let close = close.collect::<Vec<_>>().join(", ");
-    if !close.is_empty() && limits.beyond_data.is_empty() {
-        let than = match edges {
-            [] => format!(
-                "closer to the limit of {limit_g} g than the curves' own mean force error of {}",
-                percent(force_error)
-            ),
-            _ => format!("the limit of {limit_g} g lies within what the curves' bands give"),
-        };
-        verdict("unknown", format!("{than}: {close}"));
+    if let Some(close) = close_g {
+        verdict("unknown", close);
     }
     for of in &limits.occupants {
-        let state = match (of.over.is_empty(), of.unknown.is_empty()) {
-            (false, _) => "over",
-            (true, true) => "kept",
-            (true, false) => "unknown",
-        };
-        verdict(state, format!("occupants, {}", limits.occupants_text(of)));
+        let (k, unit) = if of.what == "occupant_load_g" { (4, "g") } else { (3, "m/s") };
+        let close = close(k, of.limit, unit);
+        let text = format!("occupants, {}", limits.occupants_text(of));
+        match (of.over.is_empty(), of.unknown.is_empty()) {
+            (false, _) => verdict("over", text),
+            (true, false) => verdict("unknown", text),
+            (true, true) if close.is_none() => verdict(within, format!("{text}{beyond}")),
+            (true, true) => {}
+        }
+        if let Some(close) = close {
+            verdict("unknown", format!("occupants, {close}"));
+        }
     }
 }
 

@@ -127,6 +127,9 @@ pub(crate) struct Limits<'a> {
     pub(crate) mean_deceleration_limit_g: f64,
     /// Trains that it is for; null for all.
     pub(crate) trains: &'a Option<Vec<String>>,
+    /// Their vehicles.
+    #[serde(skip)]
+    pub(crate) judged: Vec<&'a str>,
     /// Bodies whose mean deceleration is over it.
     pub(crate) over: Vec<&'a str>,
     /// Bodies that are still loaded at the end, so that their mean may yet rise or fall, or that a contact may still reach;
@@ -319,6 +322,7 @@ impl Prepared {
             edition: &limits.edition,
             mean_deceleration_limit_g: limits.mean_deceleration_g,
             trains: &limits.trains,
+            judged: judged().map(|(_, body)| body.name).collect(),
             over: judged()
                 .filter(|(_, body)| is_known && is_over(body))
                 .map(|(_, body)| body.name)
