@@ -471,12 +471,15 @@ fn filtered(run: &Motion, body: &BodyMotion, class: u32, notes: &mut Vec<String>
 
 type Part = (Shown, Vec<f64>, Vec<f64>);
 
-/// Force over deflection from where the interface closes, before which its gap is open; from where it is crushed
-/// further than its curve has data it is another part.
+/// Force over deflection from where the interface closes, before which its gap is open, with the slack of a coupling that pulls; from
+/// where it is crushed further than its curve has data it is another part.
 fn crush(interface: &InterfaceMotion) -> Vec<Part> {
-    let pairs = interface.deflection_m.iter().zip(&interface.force_n);
-    let mut closed: Vec<(f64, f64)> =
-        pairs.filter(|(d, f)| **d > 0.0 || **f != 0.0).map(|(d, f)| (*d, *f)).collect();
+    let pairs = || interface.deflection_m.iter().copied().zip(interface.force_n.iter().copied());
+    let pulled_m = pairs().filter(|(_, f)| *f != 0.0).map(|(d, _)| d).fold(0.0, f64::min);
+    let mut closed: Vec<(f64, f64)> = pairs()
+        .skip_while(|(d, f)| *d <= 0.0 && *f == 0.0)
+        .filter(|(d, f)| *d > pulled_m || *f != 0.0)
+        .collect();
     if closed.first().is_some_and(|(d, _)| *d > 0.0) {
         closed.insert(0, (0.0, 0.0));
     }

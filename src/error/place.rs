@@ -172,6 +172,11 @@ impl KeyPath {
         }
     }
 
+    /// Whether its last key is `name`.
+    pub(crate) fn ends_with(&self, name: &str) -> bool {
+        matches!(self.steps.last(), Some(Step::Key(last)) if last == name)
+    }
+
     /// A path within the value at this one.
     pub(crate) fn then(mut self, inner: Self) -> Self {
         self.steps.extend(inner.steps);

@@ -391,20 +391,25 @@ impl Run {
     }
 }
 
-/// The error of a curve that must not be left and has ended; `what` is `crushed` or `pulled apart by`.
+/// The error of a curve that must not be left and has ended, in compression or as the law of tension.
 pub(super) fn curve_ended(
     (k, interface): (usize, &Interface),
     law: &ForceLaw,
-    what: &str,
+    is_tension: bool,
     deflection_m: f64,
     time_s: f64,
 ) -> Error {
     let (name, end_m) = (&interface.name, law.end_m());
+    let (what, curve, of) = match is_tension {
+        true => ("pulled apart by", "tension curve", " in that"),
+        false => ("crushed", "curve", ""),
+    };
+    let key = KeyPath::of("interfaces").item(k);
     error!(
         Simulation,
-        "interface {name} is {what} {deflection_m:.4} m at {time_s:.6} s, beyond the end of its curve's data ({end_m:.4} m): give a longer curve, or end = \"hold\""
+        "interface {name} is {what} {deflection_m:.4} m at {time_s:.6} s, beyond the end of its {curve}'s data ({end_m:.4} m): give a longer {curve}, or end = \"hold\"{of}"
     )
-    .at(KeyPath::of("interfaces").item(k))
+    .at(if is_tension { key.key("tension") } else { key })
 }
 
 /// The error of a position or speed that is not finite any more.

@@ -36,7 +36,10 @@ impl Prepared {
             return Place::of_file(&self.origin.path);
         };
         match key.item_of("interfaces") {
-            Some(k) => document.place(&curve(&self.used[k].curve).key("end")),
+            Some(k) => {
+                let last = if key.ends_with("tension") { "tension" } else { "end" };
+                document.place(&curve(&self.used[k].curve).key(last))
+            }
             None => document.place(key),
         }
     }

@@ -52,7 +52,7 @@ impl Happening {
 
 /// A gap or a crush below this, in m, is none: outputs round.
 const LEAST_M: f64 = 1e-6;
-/// A contact is open again after so much time without force, in s: shorter ones are rattle.
+/// What an interface does for less time, in s, is rattle.
 const OPEN_S: f64 = 0.01;
 
 /// In order of time; between outputs by linear interpolation, but for the first contact and the largest crush, which the
@@ -67,10 +67,10 @@ pub(super) fn sequence<'a>(prepared: &'a Prepared, run: &Run) -> Vec<Event<'a>> 
             events.push(Event { time_s, interface: &interface.name, what });
         };
         let crossing = |level_m| crossing_s(&run.time_s, &history.largest_deflection_m, level_m);
+        contacts(&run.time_s, history).into_iter().for_each(|(time_s, what)| add(time_s, what));
         let Some(crushed_s) = crossing(LEAST_M) else { continue };
         let contact_s = history.contact_time_s.unwrap_or(crushed_s);
         add(contact_s, Happening::Contact);
-        contacts(&run.time_s, history).into_iter().for_each(|(time_s, what)| add(time_s, what));
         if is_plates {
             continue;
         }
@@ -102,29 +102,52 @@ fn crossing_s(time_s: &[f64], values: &[f64], level: f64) -> Option<f64> {
     Some(time_s[before] + share * (time_s[k] - time_s[before]))
 }
 
-/// Where the force ends for longer than a rattle, and where it then begins again.
+/// What an interface does at an output.
+#[derive(Clone, Copy, PartialEq)]
+enum State {
+    Open,
+    Pushes,
+    /// A coupling beyond its initial length, which a damper may push meanwhile.
+    Pulls,
+}
+
+/// Where the force ends for longer than a rattle, and where it then begins again; of a coupling, where it begins to pull. The first
+/// push is left out.
 fn contacts(time_s: &[f64], history: &InterfaceHistory) -> Vec<(f64, Happening)> {
-    let mut events = Vec::new();
-    let is_loaded = |k: usize| history.force_n[k] != 0.0;
-    let Some(mut at) = (0..time_s.len()).find(|k| is_loaded(*k)) else { return events };
-    while let Some(open) = (at..time_s.len()).find(|k| !is_loaded(*k)) {
-        let again = (open..time_s.len()).find(|k| is_loaded(*k));
-        let end = again.unwrap_or(time_s.len() - 1);
-        if time_s[end] - time_s[open] >= OPEN_S {
-            let pulled = history.force_n[open - 1] < 0.0;
-            let what = if pulled { Happening::Slack } else { Happening::Opened };
-            events.push((opened_s(time_s, &history.force_n, open), what));
-            let begun = |k: usize| {
-                let pulls = history.force_n[k] < 0.0;
-                let what = if pulls { Happening::Pull } else { Happening::ContactAgain };
-                (begun_s(time_s, &history.force_n, k), what)
-            };
-            events.extend(again.map(begun));
+    let state = |k: usize| match history.force_n[k] {
+        0.0 => State::Open,
+        _ if history.deflection_m.get(k).is_some_and(|d| *d < -LEAST_M) => State::Pulls,
+        _ => State::Pushes,
+    };
+    // Begin of each stretch; those shorter than a rattle go on as what was before.
+    let mut stretches: Vec<(usize, State)> = vec![(0, State::Open)];
+    let mut at = 0;
+    while at < time_s.len() {
+        let now = state(at);
+        let next = (at..time_s.len()).find(|k| state(*k) != now);
+        let lasts_s = time_s[next.unwrap_or(time_s.len() - 1)] - time_s[at];
+        let before = stretches[stretches.len() - 1].1;
+        // The first contact is short in a light collision.
+        let is_first = stretches.len() == 1 && now != State::Open;
+        if now != before && (lasts_s >= OPEN_S || is_first) {
+            stretches.push((at, now));
         }
-        let Some(again) = again else { break };
-        at = again;
+        at = next.unwrap_or(time_s.len());
     }
-    events
+    let event = |pair: &[(usize, State)]| {
+        let [(_, before), (k, now)] = *pair else { return None };
+        Some(match (before, now) {
+            (State::Pulls, State::Open) => {
+                (opened_s(time_s, &history.force_n, k), Happening::Slack)
+            }
+            (_, State::Open) => (opened_s(time_s, &history.force_n, k), Happening::Opened),
+            (_, State::Pulls) => (begun_s(time_s, &history.force_n, k), Happening::Pull),
+            (_, State::Pushes) => (begun_s(time_s, &history.force_n, k), Happening::ContactAgain),
+        })
+    };
+    let pushes = stretches.iter().position(|(_, state)| *state == State::Pushes);
+    let events = stretches.windows(2).enumerate();
+    events.filter(|(i, _)| Some(i + 1) != pushes).filter_map(|(_, pair)| event(pair)).collect()
 }
 
 /// When a force that is 0 at output `open` and was not before ended: along the line through its last two values.
@@ -138,6 +161,9 @@ fn opened_s(time_s: &[f64], force_n: &[f64], open: usize) -> f64 {
 
 /// When a force that is not 0 at output `k` and was before began: along the line through its first two values.
 fn begun_s(time_s: &[f64], force_n: &[f64], k: usize) -> f64 {
+    if k == 0 {
+        return time_s[0];
+    }
     let rise = force_n.get(k + 1).map_or(0.0, |next| next - force_n[k]);
     let share = if rise * force_n[k] > 0.0 { force_n[k] / rise } else { 1.0 };
     time_s[k] - share.min(1.0) * (time_s[k] - time_s[k - 1])

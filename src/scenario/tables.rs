@@ -177,7 +177,7 @@ pub(crate) struct StageTable {
     pub(crate) name: Option<String>,
     /// Length of the stage.
     pub(crate) stroke: LengthText,
-    /// Force at the start of the stage, 0 if absent: it steps there from the stage before.
+    /// Force at the start of the stage, 0 if absent: it steps there from the stage before, over 0.1 mm.
     pub(crate) from: Option<ForceText>,
     /// Force at its end; the same as at its start if absent.
     pub(crate) to: Option<ForceText>,
@@ -204,7 +204,7 @@ fn zero() -> Vec<f64> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum LawName {
-    /// Elastic-plastic: unloads on a line of the unloading stiffness.
+    /// Elastic-plastic: unloads on a line of the unloading stiffness, or a steeper one where that would return more than has been absorbed.
     #[default]
     Memory,
     /// Follows the curve back, as in the reference model.

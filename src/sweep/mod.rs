@@ -188,6 +188,9 @@ impl Sweep {
             }));
         }
         // Where another curve stands in its place, what a row varies of a curve is idle.
+        let mut all = (*scenario).clone();
+        let named: Vec<String> =
+            all.curve_names_mut().into_iter().map(|name| name.clone()).collect();
         for vary in
             plan.vary.iter().filter(|v| [What::Band, What::Force, What::Gap].contains(&v.what))
         {
@@ -198,7 +201,9 @@ impl Sweep {
             };
             let choices = plan.vary.iter().filter(|v| v.what == What::Curve).filter_map(|v| {
                 let values: Vec<&str> = v.values.iter().flatten().map(|value| &*value.0).collect();
-                (v.curve.as_ref() == Some(curve) || values.contains(&&**curve)).then_some(values)
+                let is_here = v.curve.as_ref() == Some(curve);
+                let is_chosen = !named.contains(curve) && values.contains(&&**curve);
+                (is_here || is_chosen).then_some(values)
             });
             let others = choices.flatten().filter(|other| *other != curve && !is_own(other));
             let others: Vec<&str> = others.collect();

@@ -153,12 +153,17 @@ fn compared(
     let until_s = reference.until.map_or(f64::MAX, |t| t.0);
     let states = fe.time_s.iter().take_while(|&&t| t <= until_s * (1.0 + 1e-9)).count();
     if states < 3 {
-        return Err(error!(
-            Comparison,
-            "FE's record has {} up to {until_s} s: at least 3 are needed",
-            crate::plural::counted(states, "state")
-        )
-        .at_key("reference.until"));
+        let states = crate::plural::counted(states, "state");
+        return Err(match reference.until {
+            Some(_) => error!(
+                Comparison at "reference.until",
+                "FE's record has {states} up to {until_s} s: at least 3 are needed"
+            ),
+            None => error!(
+                Comparison at "reference.contact",
+                "FE's record has {states} from the contact on: at least 3 are needed"
+            ),
+        });
     }
     let time_s = &fe.time_s[..states];
     let sources = Sources::read(path, scenario)?;

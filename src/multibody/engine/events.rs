@@ -139,17 +139,17 @@ impl Engine<'_> {
     #[inline(always)]
     fn check_end(&self, m: &Crossing) -> Result<(), Error> {
         let interface = &self.fixed.chain.interfaces()[m.k];
-        let (law, contacts, what) = match (&interface.tension, &self.pull) {
+        let (law, contacts, is_tension) = match (&interface.tension, &self.pull) {
             (Some(tension), Some(pull)) if m.direction == Direction::Tension => {
-                (&tension.law, pull, "pulled apart by")
+                (&tension.law, pull, true)
             }
-            _ => (&interface.law, &self.push, "crushed"),
+            _ => (&interface.law, &self.push, false),
         };
         let deflection_m = contacts.deflection_m(StepPoint::End, m.k);
         if !law.is_beyond_end(deflection_m) {
             return Ok(());
         }
-        Err(curve_ended((m.k, interface), law, what, deflection_m, self.end_s))
+        Err(curve_ended((m.k, interface), law, is_tension, deflection_m, self.end_s))
     }
 
     /// A force that began or ended in the step; restitution is that of compression.

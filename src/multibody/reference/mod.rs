@@ -159,7 +159,7 @@ impl<'a> Reference<'a> {
             let contact = self.motion.contact(&self.y, k);
             if interface.law.is_beyond_end(contact.deflection_m) {
                 let (law, deflection_m) = (&interface.law, contact.deflection_m);
-                return Err(curve_ended((k, interface), law, "crushed", deflection_m, time_s));
+                return Err(curve_ended((k, interface), law, false, deflection_m, time_s));
             }
             self.record_contact(k, &contact, time_s);
             self.events.interfaces[k].pulled(-contact.force_n());
