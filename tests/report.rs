@@ -104,6 +104,55 @@ fn its_numbers_are_those_of_the_commands() {
     assert!(!page.contains("vehicle-pair"), "only the group that was asked for");
 }
 
+/// Limits that lie within what the bands give are no verdict, nor is one where an edge of them leaves the data.
+#[test]
+fn limits_are_held_against_the_bands() {
+    let folder = demo_folder();
+    let verdicts = |speed: &str, limits: [&str; 3]| -> Vec<(String, String)> {
+        let [mean_g, secondary, load_g] = limits;
+        let text = format!(
+            "[run]\nduration = \"400ms\"\n[curves]\nnose = {{ model = \"lead.model\" }}\n\
+             [[train]]\nname = \"A\"\nspeed = \"{speed}\"\nvehicles = [ {{ name = \"A1\", mass = \"24t\" }} ]\n\
+             [wall]\n[contact]\ncurve = \"nose\"\n[limits]\nstandard = \"X\"\nedition = \"1\"\n\
+             mean_deceleration_g = {mean_g}\nsecondary_impact = \"{secondary}m/s\"\noccupant_load_g = {load_g}\n"
+        );
+        fs::write(folder.path().join("s.toml"), text).unwrap();
+        crumple_ok(folder.path(), "report s.toml -o s.html");
+        let page = fs::read_to_string(folder.path().join("s.html")).unwrap();
+        let lines = page.split("<li class=\"").skip(1).map(|item| {
+            let (class, rest) = item.split_once('"').unwrap();
+            (class.to_string(), rest.split("</li>").next().unwrap().to_string())
+        });
+        lines.filter(|(_, text)| text.contains("limit") || text.contains("above")).collect()
+    };
+    let of = |all: &[(String, String)]| -> Vec<String> {
+        all.iter().map(|(class, _)| class.split(' ').next().unwrap().to_string()).collect()
+    };
+    let far = verdicts("40km/h", ["30", "30", "60"]);
+    assert_eq!(of(&far), ["kept"; 3], "{far:?}");
+    let at = |member: i32| {
+        let text = fs::read_to_string(folder.path().join("s.toml")).unwrap();
+        let text = text.replace("lead.model\"", &format!("lead.model\", band = {member}"));
+        fs::write(folder.path().join("edge.toml"), text).unwrap();
+        let run = crumple_ok(folder.path(), "simulate edge.toml --json -q");
+        let run: serde_json::Value = serde_json::from_str(&run).unwrap();
+        let of = |key: &str| run["summary"]["bodies"][0][key].as_f64().unwrap().abs();
+        ["mean_deceleration_g", "secondary_impact_m_per_s", "occupant_load_g"].map(of)
+    };
+    let (low, high) = (at(-1), at(1));
+    let middle = [0, 1, 2].map(|k| format!("{:.4}", 0.5 * (low[k] + high[k])));
+    let within = verdicts("40km/h", [&middle[0], &middle[1], &middle[2]]);
+    assert!(of(&within).iter().filter(|class| *class == "kept").count() == 0, "{within:?}");
+    let open = within.iter().filter(|(_, text)| text.contains("lies within what the curves"));
+    assert_eq!(open.count(), 3, "{within:?}");
+    let beyond = verdicts("71km/h", ["30", "30", "60"]);
+    assert_eq!(of(&beyond), ["unknown"; 3], "{beyond:?}");
+    assert!(
+        beyond.iter().all(|(_, text)| text.contains("goes beyond the data of its curve")),
+        "{beyond:?}"
+    );
+}
+
 /// What a scenario states besides the sources of its curves is on its page.
 #[test]
 fn what_a_scenario_states_is_on_the_page() {

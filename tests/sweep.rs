@@ -249,6 +249,11 @@ fn what_has_no_effect_is_refused() {
         &String::from_utf8(said.stderr).unwrap(),
         "the gap of curve \"nose\" is varied, but has no effect in rows with soft in its place",
     );
+    // A curve that has a place of its own, whatever it is chosen for elsewhere.
+    let own = "what = \"force\", curve = \"nose\", values = [1, 2] }, { what = \"curve\", curve = \"inner\", values = [\"inner\", \"nose\"]";
+    folder.put("s.toml", &format!("{SCENARIO}[sweep]\nvary = [ {{ {own} }} ]\n"));
+    let said = crumple_in(folder.0.path(), "sweep s.toml --dry-run");
+    assert!(!String::from_utf8(said.stderr).unwrap().contains("has no effect"));
     assert_eq!(folder.names(), Vec::<String>::new());
 }
 

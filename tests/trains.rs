@@ -130,6 +130,26 @@ fn couplings_pull() {
     let slack = format!("{}{pull}", inner(", tension = \"pull\"")).replace("10mm", "60mm");
     let slack = long(scenario(&slack, vehicles, "[wall]"));
     assert!(pulls(&slack) && !pulls(&free), "{}", slack["summary"]["sequence"]);
+    // Also where the slack of 10 mm takes less time than a rattle.
+    assert!(pulls(&coupled), "{}", coupled["summary"]["sequence"]);
+    // The error of a tension curve that ends names that curve, and not the one that it belongs to.
+    let short = "pull = { stages = [ { stroke = \"1mm\", from = \"0kN\", to = \"5kN\" } ], law = \"elastic\", gap = \"10mm\", end = \"error\" }";
+    let text = scenario(
+        &format!("{}{short}", inner(", end = \"hold\", tension = \"pull\"")),
+        vehicles,
+        "[wall]",
+    );
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("s.toml"), text.replace("300ms", "600ms")).unwrap();
+    let error = crumple_fails(folder.path(), 1, "simulate s.toml");
+    says(
+        &error,
+        "s, beyond the end of its tension curve's data (0.0010 m): give a longer tension curve, or end = \"hold\" in that",
+    );
+    let marked = error.lines().find(|line| line.contains("tension = \"pull\"")).unwrap();
+    let place = marked.find("tension = \"pull\"").unwrap() + "tension = ".len();
+    let caret = error.lines().find(|line| line.trim_start_matches(['|', ' ']).starts_with('^'));
+    assert_eq!(caret.unwrap().find('^'), Some(place), "{error}");
     let apart = |run: &Value| {
         let last = |name: &str| *column(run, name).last().unwrap();
         last("x_m[A1]") - last("x_m[A2]")
@@ -705,9 +725,9 @@ fn a_heavy_vehicle_bottoms_where_a_light_one_does() {
     // The table of a curve that reaches so far by itself rises there, too.
     crumple_ok(here, "predict lead.model --speed 100km/h --extrapolate -o far.json");
     let table = crumple_ok(here, "export far.json --to csv -q");
-    let rows = table.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit()));
+    let mut rows = table.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit()));
     let last: Vec<f64> =
-        rows.last().unwrap().split(',').map(|field| field.parse().unwrap()).collect();
+        rows.next_back().unwrap().split(',').map(|field| field.parse().unwrap()).collect();
     assert!((1.02..1.15).contains(&(last[0] / crush_m)) && last[1] > 15e6, "{last:?}");
 }
 

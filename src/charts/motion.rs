@@ -576,3 +576,34 @@ pub fn train_speeds(title: &str, comparison: &TrainComparison) -> Chart {
     });
     Chart::row(title, panels.collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_slack_of_a_coupling_has_no_force_and_a_flight_is_left_out() {
+        let of = |pairs: &[(f64, f64)]| {
+            let (deflection_m, force_n) = pairs.iter().copied().unzip();
+            let (name, taken_j) = (String::new(), Vec::new());
+            let interface = InterfaceMotion {
+                name,
+                deflection_m,
+                force_n,
+                taken_j,
+                data_end_m: 1.0,
+                is_usual: true,
+            };
+            let [(_, d, f)] = &crush(&interface)[..] else { panic!() };
+            d.iter().copied().zip(f.iter().copied()).collect::<Vec<(f64, f64)>>()
+        };
+        let pushed = [(-0.1, 0.0), (0.1, 5e5), (0.05, 0.0)];
+        let pulled = [(-0.02, 0.0), (-0.06, -4e5), (-0.02, 0.0), (0.1, 4e5)];
+        let drawn = [&[(0.0, 0.0)], &pushed[1..], &pulled].concat();
+        assert_eq!(of(&[&pushed[..], &pulled].concat()), drawn);
+        // Without tension it flies apart and comes back.
+        let again = [(-0.3, 0.0), (-2.0, 0.0), (0.2, 6e5)];
+        let drawn = [&[(0.0, 0.0)], &pushed[1..], &again[2..]].concat();
+        assert_eq!(of(&[&pushed[..], &again].concat()), drawn);
+    }
+}

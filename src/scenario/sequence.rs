@@ -196,6 +196,24 @@ pub(super) fn common_speed_time_s(prepared: &Prepared, run: &Run) -> Option<f64>
 mod tests {
     use super::*;
 
+    /// A damper pushes and pulls wherever it closes or opens; short stretches are rattle.
+    #[test]
+    fn a_coupling_pulls_beyond_its_length_whatever_its_damper_does() {
+        let time_s: Vec<f64> = (0..100).map(|k| f64::from(k) * 1e-3).collect();
+        let of = |k: u32| match k {
+            0..5 => (-0.001, 0.0),
+            5..30 => (0.010, 2e5),
+            30..33 => (-0.005, 0.0),
+            33..60 => (-0.020, if k % 2 == 0 { 1e4 } else { -3e4 }),
+            _ => (-0.005, 0.0),
+        };
+        let (deflection_m, force_n) = (0..100).map(of).unzip();
+        let history = InterfaceHistory { deflection_m, force_n, ..InterfaceHistory::default() };
+        let events: Vec<Happening> =
+            contacts(&time_s, &history).into_iter().map(|(_, what)| what).collect();
+        assert_eq!(events, [Happening::Pull, Happening::Slack]);
+    }
+
     /// A force that rises evenly begins where its line does, one that jumps at the output before.
     #[test]
     fn a_contact_begins_again_between_outputs() {
