@@ -108,6 +108,11 @@ fn csv_columns_in_any_order_with_decimal_commas_or_without_units() {
         assert_eq!(curve.units, UnitSystem::parse("mm-t-s").ok());
         assert!(curve.notes[0].contains("in units mm-t-s as given"), "{:?}", curve.notes);
     }
+    // Each column has a sign of its own, and neither separates thousands.
+    let mixed =
+        "t_s;d_mm;F_kN\n0,0010;0.0;0.0\n0,0020;5.125;990.5\n0,0030;10.5;1012.25\n0,0040;12.5;0.0\n";
+    let (curve, _) = read_bytes("a.csv", mixed.as_bytes(), &given(None)).unwrap();
+    assert_eq!(curve.force_n, [0.0, 990.5e3, 1012.25e3, 0.0]);
     let facts = "# force_kind: body\n# speed_m_per_s: 10\n# speed_kind: wall\n# mass_kg: 24000\n# unloading_stiffness_N_per_m: 8e7\n";
     let text = format!("{facts}time [ms],d_m,force_N\n0,0,0\n1,0.01,1e6\n2,0.02,2e6\n3,0.01,0\n");
     let (curve, _) = read_bytes("a.csv", text.as_bytes(), &given(None)).unwrap();

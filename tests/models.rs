@@ -2062,7 +2062,10 @@ fn a_comparison_leaves_out_what_nearly_repeats_a_speed() {
     assert!(best["force_l1"].as_f64().unwrap() > 0.2, "{best}");
     assert!(best["curve"].to_string().contains("on 4 speeds"), "{best}");
     let error = crumple_fails(here, 1, "compare all.h5 --speed 36km/h --fixed-speed 36.3km/h");
-    says(&error, "the fixed curve is that of 36.3 km/h, the speed that is left out");
+    says(
+        &error,
+        "the fixed curve is that of 36.3 km/h, which is left out with 36 km/h, since it nearly repeats it",
+    );
     let drawn = |database: &str| {
         crumple_ok(here, &format!("plot {database} --left-out 36km/h -o c.svg --overwrite"));
         fs::read_to_string(here.join("c.svg")).unwrap()

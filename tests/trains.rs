@@ -729,6 +729,10 @@ fn a_heavy_vehicle_bottoms_where_a_light_one_does() {
     let last: Vec<f64> =
         rows.next_back().unwrap().split(',').map(|field| field.parse().unwrap()).collect();
     assert!((1.02..1.15).contains(&(last[0] / crush_m)) && last[1] > 15e6, "{last:?}");
+    // One whose own maximum crush lies beyond goes to that at least, and says so.
+    crumple_ok(here, "predict lead.model --speed 140km/h --extrapolate -o far.json --overwrite");
+    let table = crumple_ok(here, "export far.json --to csv -q");
+    says(&table, "# tail: from max_deflection_m on, which is beyond 1.5 times data_end_m");
 }
 
 /// A limit is held against the contact that changes the speed most, too, whatever small one comes first.

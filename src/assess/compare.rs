@@ -177,9 +177,16 @@ pub(crate) fn compare(
     if let Some(asked) = settings.fixed_speed_m_per_s
         && is_within(asked, nearly_same(&set.speeds_m_per_s(), left_out.own.speed_m_per_s))
     {
+        let own = left_out.own.speed_m_per_s;
+        let which = match is_same_speed(asked, own) {
+            true => "the speed that is left out".into(),
+            false => {
+                format!("which is left out with {}, since it nearly repeats it", km_per_h(own))
+            }
+        };
         return Err(error!(
             Comparison,
-            "the fixed curve is that of {asked}, the speed that is left out: choose another one",
+            "the fixed curve is that of {asked}, {which}: choose another one",
             asked = km_per_h(asked)
         ));
     }

@@ -396,7 +396,12 @@ fn paths(path: &Path, format: &Format, exported: &Exported) -> Result<Vec<PathBu
 pub(super) fn warn_of_other_channels(written: &[PathBuf], options: GlobalOptions) {
     let Some(folder) = written.last().and_then(|file| file.parent()) else { return };
     let found = fs::read_dir(folder).into_iter().flatten().flatten();
-    let others = found.filter(|entry| !written.contains(&entry.path())).count();
+    let is_channel = |path: &Path| {
+        let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+        ending == "chn" || ending.len() == 3 && ending.bytes().all(|b| b.is_ascii_digit())
+    };
+    let others = found.map(|entry| entry.path());
+    let others = others.filter(|path| is_channel(path) && !written.contains(path)).count();
     if others > 0 {
         options.warn(&format!(
             "{}: holds {} that {} not written now: remove what is of an earlier record, since some tools read all channels of a folder",

@@ -302,7 +302,7 @@ fn say(
                 true => "; of a choice of curves, which have no order, the correlation ratio of the ranks (0 to 1)",
                 false => "",
             };
-            writeln!(out, "rank corr.: Spearman's rank correlation{chosen}{chance}")?;
+            writeln!(out, "rank corr.: Spearman's rank correlation{chance}{chosen}")?;
         } else if !report.sensitivities.is_empty() {
             writeln!(
                 out,

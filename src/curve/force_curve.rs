@@ -246,7 +246,7 @@ pub enum Tail {
 }
 
 /// Deflection at which the structure is fully crushed, as a multiple of the maximum crush.
-const FULLY_CRUSHED: f64 = 1.5;
+pub(crate) const FULLY_CRUSHED: f64 = 1.5;
 /// Over this share of the maximum crush the force goes to its mean over the last tenth.
 const JOIN: f64 = 0.05;
 /// The bottoming ends at so many times the largest force.

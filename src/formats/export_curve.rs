@@ -3,7 +3,7 @@
 use super::Options;
 use super::text::nine_digits;
 use super::thin::{Softened, from_origin, softened};
-use crate::curve::force_curve::with_tail;
+use crate::curve::force_curve::{FULLY_CRUSHED, with_tail};
 use crate::curve::{Envelope, ForceCurve, ForceKind, Tail};
 use crate::dataset::{MASS, OTHER_MASS};
 use crate::error::{Error, error};
@@ -373,6 +373,13 @@ impl ExportCurve {
         let curve = &self.predicted;
         let kind = curve.provenance.force_kind;
         let steepest = self.loading.max_slope();
+        let is_far = self.max_crush_m() > FULLY_CRUSHED * curve.data_end_m();
+        let tail = match self.tail {
+            Tail::Bottom if is_far => {
+                "from max_deflection_m on, which is beyond 1.5 times data_end_m, the force rises with the unloading stiffness; runs of crumple let it rise from 1.5 times data_end_m on"
+            }
+            tail => tail.rule(self.follows_faster_runs),
+        };
         let mut facts = vec![
             ("curve", self.headline()),
             ("force_kind", kind.name().into()),
@@ -383,7 +390,7 @@ impl ExportCurve {
             ("impact", self.impact()),
             ("energy_J", nine_digits(curve.energy_j)),
             ("max_deflection_m", nine_digits(self.max_crush_m())),
-            ("tail", self.tail.rule(self.follows_faster_runs).into()),
+            ("tail", tail.into()),
             ("unloading_stiffness_N_per_m", nine_digits(self.stiffness_n_per_m())),
             ("unloading", self.unloading(steepest)),
             ("steepest_rise_N_per_m", nine_digits(steepest)),

@@ -111,43 +111,57 @@ enum State {
     Pulls,
 }
 
-/// Where the force ends for longer than a rattle, and where it then begins again; of a coupling, where it begins to pull. The first
-/// push is left out.
+/// Where the force ends for longer than a rattle, and where it then begins again; of a coupling, where it begins to pull and to push.
+/// The contact that the run knows is left out.
 fn contacts(time_s: &[f64], history: &InterfaceHistory) -> Vec<(f64, Happening)> {
     let state = |k: usize| match history.force_n[k] {
         0.0 => State::Open,
         _ if history.deflection_m.get(k).is_some_and(|d| *d < -LEAST_M) => State::Pulls,
         _ => State::Pushes,
     };
-    // Begin of each stretch; those shorter than a rattle go on as what was before.
-    let mut stretches: Vec<(usize, State)> = vec![(0, State::Open)];
-    let mut at = 0;
-    while at < time_s.len() {
-        let now = state(at);
-        let next = (at..time_s.len()).find(|k| state(*k) != now);
-        let lasts_s = time_s[next.unwrap_or(time_s.len() - 1)] - time_s[at];
-        let before = stretches[stretches.len() - 1].1;
-        // The first contact is short in a light collision.
-        let is_first = stretches.len() == 1 && now != State::Open;
-        if now != before && (lasts_s >= OPEN_S || is_first) {
-            stretches.push((at, now));
-        }
-        at = next.unwrap_or(time_s.len());
-    }
-    let event = |pair: &[(usize, State)]| {
-        let [(_, before), (k, now)] = *pair else { return None };
-        Some(match (before, now) {
-            (State::Pulls, State::Open) => {
-                (opened_s(time_s, &history.force_n, k), Happening::Slack)
-            }
-            (_, State::Open) => (opened_s(time_s, &history.force_n, k), Happening::Opened),
-            (_, State::Pulls) => (begun_s(time_s, &history.force_n, k), Happening::Pull),
-            (_, State::Pushes) => (begun_s(time_s, &history.force_n, k), Happening::ContactAgain),
-        })
+    let count = time_s.len();
+    let lasts = |from: usize, to: usize| time_s[to.min(count - 1)] - time_s[from] >= OPEN_S;
+    let next = |from: usize, is_open: bool| {
+        (from..count).find(|k| (state(*k) == State::Open) == is_open).unwrap_or(count)
     };
-    let pushes = stretches.iter().position(|(_, state)| *state == State::Pushes);
-    let events = stretches.windows(2).enumerate();
-    events.filter(|(i, _)| Some(i + 1) != pushes).filter_map(|(_, pair)| event(pair)).collect()
+    let mut events = Vec::new();
+    let mut begin = next(0, false);
+    while begin < count {
+        // Up to where it is open for longer.
+        let mut end = next(begin, true);
+        while end < count && next(end, false) < count && !lasts(end, next(end, false)) {
+            end = next(next(end, false), true);
+        }
+        if end < count && !lasts(end, next(end, false)) {
+            end = count;
+        }
+        // Pushes and pulls in it, of which the first may be short.
+        let mut stretches: Vec<(usize, State)> = Vec::new();
+        let mut from = begin;
+        while from < end {
+            let now = state(from);
+            let differs = |k: &usize| state(*k) != now && state(*k) != State::Open;
+            let to = (from..end).find(differs).unwrap_or(end);
+            let is_new = stretches.last().is_none_or(|(_, before)| *before != now);
+            if is_new && (stretches.is_empty() || lasts(from, to)) {
+                stretches.push((from, now));
+            }
+            from = to;
+        }
+        for (k, now) in &stretches {
+            let what = if *now == State::Pulls { Happening::Pull } else { Happening::ContactAgain };
+            events.push((begun_s(time_s, &history.force_n, *k), what));
+        }
+        if end < count {
+            let pulled = stretches.last().is_some_and(|(_, last)| *last == State::Pulls);
+            let what = if pulled { Happening::Slack } else { Happening::Opened };
+            events.push((opened_s(time_s, &history.force_n, end), what));
+        }
+        begin = next(end, false);
+    }
+    let first = events.iter().position(|(_, what)| *what == Happening::ContactAgain);
+    first.into_iter().for_each(|first| drop(events.remove(first)));
+    events
 }
 
 /// When a force that is 0 at output `open` and was not before ended: along the line through its last two values.
@@ -204,7 +218,7 @@ mod tests {
             0..5 => (-0.001, 0.0),
             5..30 => (0.010, 2e5),
             30..33 => (-0.005, 0.0),
-            33..60 => (-0.020, if k % 2 == 0 { 1e4 } else { -3e4 }),
+            33..60 => (-0.020, if k.is_multiple_of(2) { 1e4 } else { -3e4 }),
             _ => (-0.005, 0.0),
         };
         let (deflection_m, force_n) = (0..100).map(of).unzip();
@@ -212,6 +226,17 @@ mod tests {
         let events: Vec<Happening> =
             contacts(&time_s, &history).into_iter().map(|(_, what)| what).collect();
         assert_eq!(events, [Happening::Pull, Happening::Slack]);
+        // What chatters is in contact, however short each touch is.
+        let of = |k: u32| match k {
+            0..5 | 40..=99 if k % 8 < 5 => (0.01, 2e5),
+            _ => (-0.001, 0.0),
+        };
+        let (deflection_m, force_n) = (0..130).map(of).unzip();
+        let time_s: Vec<f64> = (0..130).map(|k| f64::from(k) * 1e-3).collect();
+        let history = InterfaceHistory { deflection_m, force_n, ..InterfaceHistory::default() };
+        let events: Vec<Happening> =
+            contacts(&time_s, &history).into_iter().map(|(_, what)| what).collect();
+        assert_eq!(events, [Happening::Opened, Happening::ContactAgain, Happening::Opened]);
     }
 
     /// A force that rises evenly begins where its line does, one that jumps at the output before.

@@ -177,7 +177,7 @@ impl Start {
                 if step_m(most_s) > FIRST_SHARE * crush_m =>
             {
                 remarks.warn(format!(
-                    "contact: it lies in the first interval and is taken at the first state; the crush may be up to {:.2} mm ({:.1} %) too large (contact_time or gap in the run sets it)",
+                    "contact: it may lie anywhere in the first interval and is taken at the first state; the crush may be up to {:.2} mm ({:.1} %) too large (contact_time or gap in the run sets it)",
                     step_m(most_s) * 1e3,
                     100.0 * step_m(most_s) / crush_m
                 ));

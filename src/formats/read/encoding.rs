@@ -14,7 +14,9 @@ const BEGINNING: usize = 64;
 /// The bytes as text; invalid bytes are replaced, and so are carriage returns where nothing else ends a line.
 pub(super) fn decoded(bytes: &[u8]) -> Decoded<'_> {
     let of = of_encoding(bytes);
-    match of.text.contains('\r') && !of.text.contains('\n') {
+    // The last line may end in both.
+    let inside = of.text.trim_end_matches(['\r', '\n']);
+    match inside.contains('\r') && !inside.contains('\n') {
         true => Decoded {
             text: of.text.replace('\r', "\n").into(),
             note: of.note.or(Some("text: lines end in carriage returns")),
@@ -121,6 +123,7 @@ mod tests {
         let plain: Vec<u8> = "d_m;F_N\n".encode_utf16().flat_map(u16::to_le_bytes).collect();
         assert_eq!(decoded(&plain).text, "d_m;F_N\n");
         assert_eq!(decoded(b"d_m;F_N\r0;1\r").text, "d_m;F_N\n0;1\n");
+        assert_eq!(decoded(b"d_m;F_N\r0;1\n").text, "d_m;F_N\n0;1\n");
         assert_eq!(decoded(b"d_m;F_N\r\n0;1\r\n").text, "d_m;F_N\r\n0;1\r\n");
         assert_eq!(decoded(&[0xFF, 0xFE, b'a', 0, b'b']).text, "a?");
     }

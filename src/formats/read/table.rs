@@ -364,24 +364,10 @@ impl<'a> Table<'a> {
         mut take: impl FnMut(&Row) -> Result<(), Error>,
     ) -> Result<(), Error> {
         let mut rows = 0;
-        let mut decimal: Option<(char, u64, &str)> = None;
+        let mut signs = vec![Signs::default(); used.len()];
         for row in self.rows() {
-            for (&column, text) in used.iter().map(|column| (column, row.field(*column))) {
-                let Some(sign) = self.separator.decimal(text) else { continue };
-                let is_number = || self.separator.is_number(text);
-                match decimal {
-                    None if is_number() => decimal = Some((sign, row.line, text)),
-                    Some((other, line, first)) if other != sign && is_number() => {
-                        return Err(error!(
-                            CurveFile,
-                            "{place}: \"{text}\" has the sign \"{sign}\", and \"{first}\" in line {line} the sign \"{other}\": only one of them can be decimal; write numbers without separators of thousands",
-                            place = Place::Field { line: row.line, field: column + 1 },
-                            text = shown(text),
-                            first = shown(first)
-                        ));
-                    }
-                    _ => {}
-                }
+            for (&column, signs) in used.iter().zip(&mut signs) {
+                signs.see(self.separator, &row, column)?;
             }
             let found = row.fields.len();
             if self.has_axes() && found != 2 {
@@ -408,6 +394,13 @@ impl<'a> Table<'a> {
             take(&row)?;
             rows += 1;
         }
+        let separates = signs.iter().filter(|of| of.separates_thousands());
+        for of in separates.filter_map(|of| of.first.as_ref()) {
+            let others = signs.iter().filter_map(|other| other.first.as_ref());
+            if let Some(other) = others.into_iter().find(|other| other.sign != of.sign) {
+                return Err(of.differs_from(other));
+            }
+        }
         match &self.declared {
             Some((line, declared)) if declared.parse() != Ok(rows) => Err(miscounted(
                 Place::Line(*line),
@@ -418,6 +411,73 @@ impl<'a> Table<'a> {
             )),
             _ => Ok(()),
         }
+    }
+}
+
+/// The first number of a column that has a sign that may be decimal.
+#[derive(Clone)]
+struct Signed {
+    sign: char,
+    place: (u64, usize),
+    text: String,
+}
+
+impl Signed {
+    fn differs_from(&self, other: &Self) -> Error {
+        error!(
+            CurveFile,
+            "{place}: \"{text}\" has the sign \"{sign}\", and \"{other}\" in line {line} the sign \"{another}\": only one of them can be decimal; write numbers without separators of thousands",
+            place = Place::Field { line: self.place.0, field: self.place.1 + 1 },
+            text = shown(&self.text),
+            sign = self.sign,
+            other = shown(&other.text),
+            line = other.place.0,
+            another = other.sign
+        )
+    }
+}
+
+/// The signs of a column that may be decimal.
+#[derive(Clone, Default)]
+struct Signs {
+    first: Option<Signed>,
+    /// A number without one, other than 0.
+    has_whole: bool,
+    /// One with other than three digits behind it, or with more than three before.
+    has_other: bool,
+}
+
+impl Signs {
+    fn see(&mut self, separator: Separator, row: &Row, column: usize) -> Result<(), Error> {
+        let text = row.field(column);
+        let Some(sign) = separator.decimal(text) else {
+            self.has_whole |= text.bytes().any(|b| (b'1'..=b'9').contains(&b));
+            return Ok(());
+        };
+        if self.first.as_ref().is_none_or(|first| first.sign != sign) {
+            if !separator.is_number(text) {
+                return Ok(());
+            }
+            let now = Signed { sign, place: (row.line, column), text: text.into() };
+            match &self.first {
+                Some(first) => return Err(now.differs_from(first)),
+                None => self.first = Some(now),
+            }
+        }
+        let (before, behind) = text.split_once(sign).unwrap_or_default();
+        let is_digits = |digits: &str| digits.bytes().all(|b| b.is_ascii_digit());
+        let before = before.trim_start_matches(['+', '-']);
+        let is_thousands = is_digits(behind)
+            && behind.len() == 3
+            && is_digits(before)
+            && (1..=3).contains(&before.len());
+        self.has_other |= !is_thousands;
+        Ok(())
+    }
+
+    /// Whether all signs stand where thousands end, beside numbers that have none.
+    fn separates_thousands(&self) -> bool {
+        self.first.is_some() && self.has_whole && !self.has_other
     }
 }
 
