@@ -356,8 +356,8 @@ impl<'a> Table<'a> {
         rows.map(move |(line, text)| row(before + line, text, separator))
     }
 
-    /// Gives each row to `take`, and refuses rows that have other columns than the table, and numbers in the columns `used` of which some
-    /// have a decimal point and some a decimal comma.
+    /// Gives each row to `take`, and refuses rows that have other columns than the table, and points beside commas in the numbers of the
+    /// columns `used` if one of them separates thousands.
     pub(super) fn each_row(
         &self,
         used: &[usize],
