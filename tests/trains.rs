@@ -132,6 +132,15 @@ fn couplings_pull() {
     assert!(pulls(&slack) && !pulls(&free), "{}", slack["summary"]["sequence"]);
     // Also where the slack of 10 mm takes less time than a rattle.
     assert!(pulls(&coupled), "{}", coupled["summary"]["sequence"]);
+    // Pulled beyond its data, a coupling leaves no limit known either.
+    let short = pull.replace("500mm", "1mm").replace("5MN", "5kN");
+    let short = format!(
+        "{}{short}\n[limits]\nstandard = \"X\"\nedition = \"1\"\nmean_deceleration_g = 5.0",
+        inner(", tension = \"pull\"")
+    );
+    let limits = &long(scenario(&short, vehicles, "[wall]"))["summary"]["limits"];
+    assert_eq!(limits["beyond_data"], json!(["A1|A2"]), "{limits}");
+    assert!(!limits["unknown"].as_array().unwrap().is_empty(), "{limits}");
     // The error of a tension curve that ends names that curve, and not the one that it belongs to.
     let short = "pull = { stages = [ { stroke = \"1mm\", from = \"0kN\", to = \"5kN\" } ], law = \"elastic\", gap = \"10mm\", end = \"error\" }";
     let text = scenario(

@@ -53,6 +53,8 @@ pub fn simulate(chain: &Chain, settings: &RunSettings) -> Result<Run, Error> {
     let mut run = Run::new(chain, &grid, settings.record);
     for (history, interface) in run.interfaces.iter_mut().zip(chain.interfaces()) {
         history.data_end_m = interface.law.end_m();
+        let tension = interface.tension.as_ref();
+        history.tension_end_m = tension.map_or(f64::INFINITY, |tension| tension.law.end_m());
     }
     run.warnings.extend(shortened_step(chain, settings, grid.step_s));
     match settings.method {
@@ -116,10 +118,9 @@ fn shortened_step(chain: &Chain, settings: &RunSettings, used_s: f64) -> Option<
 fn beyond_ends(chain: &Chain, run: &Run) -> Vec<String> {
     let mut warnings = Vec::new();
     for (interface, history) in chain.interfaces().iter().zip(&run.interfaces) {
-        let tension_end_m = interface.tension.as_ref().map_or(f64::INFINITY, |t| t.law.end_m());
         let reached = [
-            ("crushed", history.max_deflection_m, interface.law.end_m()),
-            ("pulled apart by", history.max_extension_m, tension_end_m),
+            ("crushed", history.max_deflection_m, history.data_end_m),
+            ("pulled apart by", history.max_extension_m, history.tension_end_m),
         ];
         for (what, deflection_m, end_m) in reached {
             if is_beyond(deflection_m, end_m) {

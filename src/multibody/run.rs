@@ -185,6 +185,9 @@ pub struct InterfaceHistory {
     pub max_deflection_m: f64,
     /// Deflection up to which the curve has data, in m: beyond it the force is an assumption.
     pub data_end_m: f64,
+    /// The same of the tension curve's extension; infinite without one.
+    #[serde(skip)]
+    pub(crate) tension_end_m: f64,
     /// Time of the maximum deflection in s.
     pub max_deflection_time_s: f64,
     /// When both sides first had the same velocity, in s.
@@ -198,9 +201,10 @@ pub struct InterfaceHistory {
 }
 
 impl InterfaceHistory {
-    /// Whether it was crushed beyond the data of its curve, by more than another unloading or step explains.
+    /// Whether it was crushed, or pulled, beyond the data of its curve, by more than another unloading or step explains.
     pub(crate) fn is_beyond_data(&self) -> bool {
         is_beyond(self.max_deflection_m, self.data_end_m)
+            || is_beyond(self.max_extension_m, self.tension_end_m)
     }
 
     pub(crate) fn has_touched(&self) -> bool {
@@ -344,7 +348,7 @@ impl Run {
         run
     }
 
-    /// Interfaces, counted from back to front, that were crushed beyond the data of their curves.
+    /// Interfaces, counted from back to front, that were crushed or pulled beyond the data of their curves.
     pub fn beyond_data(&self) -> impl Iterator<Item = usize> {
         self.interfaces.iter().enumerate().filter(|(_, i)| i.is_beyond_data()).map(|(k, _)| k)
     }
