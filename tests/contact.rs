@@ -449,7 +449,7 @@ fn histories_that_contradict_each_other_are_said() {
         run.force.time = run.force.time.iter().map(|&t| at(t)).collect();
     }
     #[rustfmt::skip]
-    let damages: [(&str, Damage, &str); 14] = [
+    let damages: [(&str, Damage, &str); 15] = [
         ("a state of the force that is wrong", |run| run.force.values[30] *= 4.0, "force: the peak of "),
         ("force 10 ms early", |run| clock(run, |t| t - 0.010), "times: the force starts at -10 ms"),
         ("force 5 ms early", |run| clock(run, |t| t - 0.005), "times: the force starts at -5 ms"),
@@ -502,6 +502,16 @@ fn histories_that_contradict_each_other_are_said() {
                 }
             },
             "sampling: the record has 21 states up to the maximum crush",
+        ),
+        (
+            "the motion each 7.5 ms",
+            |run| {
+                for history in [&mut run.displacement, &mut run.velocity] {
+                    history.time = history.time.iter().copied().step_by(10).collect();
+                    history.values = history.values.iter().copied().step_by(10).collect();
+                }
+            },
+            "sampling: the motion has 17 states up to the maximum crush, one every 7.500 ms, and the force 170",
         ),
         (
             "a fall",

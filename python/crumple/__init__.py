@@ -71,13 +71,23 @@ def _key(entity):
     """An id as it is looked up: 900001, 900001.0 (as pandas has it), "900001" and NumPy's numbers are one."""
     if entity is None or isinstance(entity, str):
         return _id(entity)
-    return int(entity) if entity == int(entity) else entity
+    # NaN is no entity's id.
+    return int(entity) if entity == entity and entity == int(entity) else entity
+
+
+def _locked(state):
+    """What an unpickled object is made of, with its arrays as they were: they cannot be written to."""
+    for values in state.values():
+        if isinstance(values, np.ndarray):
+            values.flags.writeable = False
+    return state
 
 
 def _listed(of):
     """One item or several, as a list of texts; None stays."""
     if of is None:
         return None
+    of = of.tolist() if isinstance(of, np.ndarray) else of
     is_one = isinstance(of, (str, Number))
     return [str(_key(one)) for one in ([of] if is_one else of)]
 
@@ -102,6 +112,9 @@ class _Mapping(Mapping):
 
     def __len__(self):
         return len(self._items)
+
+    def __setstate__(self, state):
+        self.__dict__.update(_locked(state))
 
     # Two with equal arrays are not one, and arrays have no single truth value.
     __eq__ = object.__eq__
@@ -148,9 +161,8 @@ class Component(_Mapping):
         return {**self.__dict__, "_items": {entity: self[entity] for entity in self}}
 
     def __setstate__(self, state):
-        self.__dict__.update(state)
-        for values in self._items.values():
-            values.flags.writeable = False
+        _locked(state["_items"])
+        super().__setstate__(state)
 
     @property
     def ids(self):
@@ -350,9 +362,7 @@ class Case(_Table):
         self.__setattr__(name, None)
 
     def __setstate__(self, state):
-        self.__dict__.update(state)
-        for values in (self.time, self.deflection, self.force, self.body_force, self.closing_speed):
-            values.flags.writeable = False
+        self.__dict__.update(_locked(state))
 
     def to_pandas(self):
         """A DataFrame over time: deflection, force, body_force, closing_speed, in SI."""
@@ -511,6 +521,8 @@ class Curve:
         self.speed, self.max_deflection = document["speed_m_per_s"], document["max_deflection_m"]
         self.deflection, self.force = array("deflection_m"), array("force_N")
         self.body_force = array("body_force_N")
+        if any(of is not None and of.shape != self.deflection.shape for of in (self.force, self.body_force)):
+            raise Error(f"a curve has one force for each of its {len(self.deflection)} deflections")
         self.force_kind = document["provenance"]["force_kind"]
 
         def band(low, high):
@@ -560,15 +572,18 @@ class Curve:
         from crumple._commands import _options, _output
 
         with tempfile.TemporaryDirectory() as folder:
-            curve = Path(folder) / "curve.json"
-            curve.write_text(json.dumps(self.document), encoding="utf-8")
+            curve = self._written(folder)
             return run("export", *_output(output), *_options({"to": to, **options}), "--", curve)
 
     def _repr_svg_(self):
         with tempfile.TemporaryDirectory() as folder:
-            curve = Path(folder) / "curve.json"
-            curve.write_text(json.dumps(self.document), encoding="utf-8")
-            return _picture(curve)
+            return _picture(self._written(folder))
+
+    def _written(self, folder):
+        """A file of the document, in which arrays may stand for lists."""
+        curve = Path(folder) / "curve.json"
+        curve.write_text(json.dumps(self.document, default=np.ndarray.tolist), encoding="utf-8")
+        return curve
 
     def __repr__(self):
         return f"<Curve at {self.speed * 3.6:.4g} km/h up to {self.max_deflection:.3f} m>"

@@ -157,6 +157,8 @@ def run(*arguments, check=True):
     in the document; with `--strict` (`strict=True`) it is an error, as any warning is, and the document its attribute. With
     `check=False` nothing is raised.
     """
+    if any(a is None for a in arguments):
+        raise Error("an argument is None: expected a path or text")
     words = [os.fspath(a) if isinstance(a, os.PathLike) else str(a) for a in arguments]
     words = [*_program(), "--json", *words]
     environment = {**os.environ, "CRUMPLE_PROGRESS": "lines"}
@@ -194,7 +196,7 @@ def run(*arguments, check=True):
     return Document(document) if isinstance(document, dict) else document
 
 
-_SI = {"--mass": "kg", "--other-mass": "kg", "--speed": "m/s", "--crush": "m"}
+_SI = {"--mass": "kg", "--other-mass": "kg", "--speed": "m/s", "--crush": "m", "--unloading": "N/m"}
 
 
 def _options(options):
@@ -206,6 +208,8 @@ def _options(options):
         value = value.tolist() if hasattr(value, "tolist") else value
         for one in value if isinstance(value, (list, tuple)) else [value]:
             one = one.item() if hasattr(one, "item") else one
+            if one is True and option in _SI:
+                raise Error(f"{name}: expected a number in {_SI[option]}, or text with its unit, found True")
             if one is True:
                 words.append(option)
             elif one is not None and one is not False:

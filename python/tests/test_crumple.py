@@ -69,13 +69,17 @@ def test_measured_curves_are_added(tmp_path):
     database = tmp_path / "tests.h5"
     speeds = [np.float64(6.0), "8m/s"]
     with pytest.warns(crumple.Warned):
-        crumple.add(database, [tmp_path / "a b.csv", tmp_path / "b.csv"], group="tests", speed=speeds, mass=24e3, kind="wall", accept_energy=True)
+        crumple.add(database, [tmp_path / "a b.csv", tmp_path / "b.csv"], group="tests", speed=speeds, mass=24e3, kind="wall", unloading=80e6, accept_energy=True)
     cases = crumple.Database(database)["tests"]
     assert [(case.speed, case.mass, round(case.force.max(), -3)) for case in cases.values()] == [(6.0, 24e3, 1.3e6), (8.0, 24e3, 1.3e6)]
     with pytest.raises(crumple.Error, match="--speed|speed"):
         crumple.add(database, tmp_path / "b.csv", group="tests")
     with pytest.raises(crumple.Error, match="there are no files"):
         crumple.add(database, [])
+    with pytest.raises(crumple.Error, match="^speed: expected a number in m/s, or text with its unit, found True"):
+        crumple.add(database, tmp_path / "b.csv", group="tests", speed=True, mass=24e3)
+    with pytest.raises(crumple.Error, match="an argument is None"):
+        crumple.simulate(None)
 
 
 def test_numpy_takes_the_values_of_a_component():
@@ -148,11 +152,11 @@ def test_only_what_is_selected():
 
 def test_one_or_several_of_any_kind():
     whole = crumple.read(NODOUT).only()["x_velocity"][900001]
-    for ids in (900001, 900001.0, "900001", [np.int64(900001)], np.array([900001]), pd.Series([900001.0])):
+    for ids in (900001, 900001.0, "900001", [np.int64(900001)], np.array([900001]), pd.Series([900001.0]), np.array(900001)):
         for components in ("x_velocity", ["x_velocity"], np.array(["x_velocity"])):
             component = crumple.read(NODOUT, ids=ids, components=components).only()["x_velocity"]
             assert np.array_equal(component[np.int32(900001)], whole) and 900001.0 in component
-    assert "\u00b2" not in component and None not in component
+    assert "\u00b2" not in component and None not in component and np.nan not in component
     del component
     histories = crumple.read(NODOUT)
     view = histories.only()["x_velocity"][900001]
@@ -160,9 +164,12 @@ def test_one_or_several_of_any_kind():
     del histories
     assert np.array_equal(view, whole)
     assert np.array_equal(again.only()["x_velocity"][900001], whole)
+    for times in (again.only().time, again.only()["x_velocity"].time):
+        with pytest.raises(ValueError, match="read-only"):
+            times[0] = 1.0
 
 
-def test_what_is_exported_cannot_be_changed_by_its_arrays():
+def test_what_is_exported_cannot_be_changed_by_its_arrays(tmp_path):
     curve = crumple.Model(DEMO / "lead.model").predict(10.0)
     for values in (curve.force, curve.deflection, curve.body_force, *curve.band):
         with pytest.raises(ValueError, match="read-only"):
@@ -179,6 +186,12 @@ def test_what_is_exported_cannot_be_changed_by_its_arrays():
             copied.body_force[:] *= 2.0
     worse = crumple.Curve({**curve.document, "force_N": list(1.2 * curve.force)})
     assert np.array_equal(pickle.loads(pickle.dumps(worse)).force, 1.2 * curve.force)
+    by_array = crumple.Curve({**curve.document, "force_N": 1.2 * curve.force})
+    for of in (worse, by_array):
+        of.export(tmp_path / "worse.json", overwrite=True)
+        assert json.loads((tmp_path / "worse.json").read_text())["force_N"] == worse.document["force_N"]
+    with pytest.raises(crumple.Error, match="one force for each of its"):
+        crumple.Curve({**curve.document, "force_N": [0.0, 1.0]})
 
 
 def test_a_model_is_copied_from_another_folder(tmp_path, monkeypatch):

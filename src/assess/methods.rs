@@ -43,12 +43,12 @@ impl Default for Times {
     }
 }
 
-/// By its name too where more than speed may tell it from others.
+/// What a method took from a run: by its name too where more than speed may tell it from others.
 fn fe_at(case: &Case) -> String {
-    let speed = km_per_h(case.conditions.speed.m_per_s);
+    let (of, speed) = (case.origin(), km_per_h(case.conditions.speed.m_per_s));
     match case.conditions.parameters.is_empty() {
-        true => format!("FE at {speed}"),
-        false => format!("FE at {speed} ({})", case.id.name),
+        true => format!("{of} at {speed}"),
+        false => format!("{of} at {speed} ({})", case.id.name),
     }
 }
 

@@ -149,7 +149,10 @@ pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Error
 /// it, hence no band, and ends of the range are not left out.
 pub(super) fn choose_and_fit(group: &str, cases: &[Case], seed: u64) -> Result<Model, Error> {
     let set = TrainingSet::new(group, cases)?;
-    let (fitting, _) = fittable(&set, &ModelKind::all(seed));
+    let (mut fitting, _) = fittable(&set, &ModelKind::all(seed));
+    if set.cases.len() > MOST_SPEEDS {
+        fitting = fitting.into_iter().map(ModelKind::judged).collect();
+    }
     let (mut left_out, _) = left_out_cases(&set, MOST_SPEEDS).unwrap_or_default();
     left_out.retain(|case| case.inner);
     let trials = trials(&fitting, &left_out);
@@ -278,7 +281,16 @@ pub(crate) fn validate_speeds(
 /// FE's own curves at the speeds that are left out, and why some have none.
 fn floors_of(left_out: &[LeftOutCase<'_>]) -> (Vec<Floor>, Vec<String>) {
     let (mut floors, mut notes) = (Vec::new(), Vec::new());
-    for case in left_out {
+    let (made, recorded): (Vec<_>, Vec<_>) =
+        left_out.iter().partition(|left_out| left_out.case.moves_by_its_force());
+    if !made.is_empty() {
+        notes.push(format!(
+            "{} of {} curves have no times: their motion is made of their force, and errors of velocity and acceleration are against that motion",
+            made.len(),
+            left_out.len()
+        ));
+    }
+    for case in recorded {
         match case.floors() {
             Ok(own) => floors.extend(own),
             Err(error) => notes.push(format!("FE's own curves of \"{}\": {error}", case.own.name)),

@@ -54,23 +54,35 @@ fn names(cases: &[Case]) -> Vec<String> {
         cases.iter().map(|case| speed(case.conditions.speed.m_per_s)).collect();
     let is_alone = |k: usize| speeds.iter().filter(|s| **s == speeds[k]).count() == 1;
     let name = |k: usize| {
+        let of = cases[k].origin();
         if is_alone(k) {
-            format!("FE at {}", speeds[k])
+            format!("{of} at {}", speeds[k])
         } else {
-            format!("FE at {} ({})", speeds[k], cases[k].id.name)
+            format!("{of} at {} ({})", speeds[k], cases[k].id.name)
         }
     };
     (0..cases.len()).map(name).collect()
 }
 
-/// Force over deflection of all runs of a group, loading and unloading.
+/// Curves of one group that a picture has; more cannot be told apart.
+const MOST_CURVES: usize = 20;
+
+/// Force over deflection of the runs of a group, loading and unloading: of many, some spread over their speeds.
 ///
 /// `force` is the recipe's force, or the body force; runs without that force are named in a note.
 pub fn group_curves(group: &str, cases: &[Case], force: ForceKind) -> Chart {
     let mut series = Vec::new();
     let mut missing = Vec::new();
     let mut top = 0.0;
-    for (k, (case, name)) in cases.iter().zip(names(cases)).enumerate() {
+    let speed_of = |k: &usize| cases[*k].conditions.speed.m_per_s;
+    let mut drawn: Vec<usize> = (0..cases.len()).collect();
+    if cases.len() > MOST_CURVES {
+        drawn.sort_by(|a, b| speed_of(a).total_cmp(&speed_of(b)));
+        let step = |k: usize| drawn[k * (cases.len() - 1) / (MOST_CURVES - 1)];
+        drawn = (0..MOST_CURVES).map(step).collect();
+    }
+    let names = names(cases);
+    for (k, (case, name)) in drawn.iter().map(|&k| (&cases[k], names[k].clone())).enumerate() {
         match both_ways(case, force) {
             Some((d, f)) => {
                 top = largest(&f).max(top);
@@ -88,6 +100,10 @@ pub fn group_curves(group: &str, cases: &[Case], force: ForceKind) -> Chart {
     let mut chart = Chart::of(&title, panel);
     if !missing.is_empty() {
         chart.notes.push(format!("Without a {} force: {}.", force.name(), missing.join(", ")));
+    }
+    if drawn.len() < cases.len() {
+        let [drawn, all] = [drawn.len(), cases.len()];
+        chart.notes.push(format!("{drawn} of {all} runs, spread over their speeds."));
     }
     chart
 }
@@ -231,7 +247,7 @@ pub(crate) fn left_out(of: LeftOutPrediction) -> Chart {
     let kind = curve.provenance.force_kind;
     let mut forces = axes(largest(&curve.force_n).max(case.peak_force_n()));
     forces.title = format!("{} force", kind.name());
-    let fe = format!("FE at {}{which}", speed(case.conditions.speed.m_per_s));
+    let fe = format!("{} at {}{which}", case.origin(), speed(case.conditions.speed.m_per_s));
     if let Some((d, f)) = both_ways(case, kind) {
         forces.series.push(Series::line(&fe, 0, d, f));
     }

@@ -505,26 +505,27 @@ fn energy(name: &str, run: &Motion, names: &[String], is_named: bool) -> Result<
     if is_named {
         panel.title = name.into();
     }
-    let last = |taken_j: &Vec<f64>| taken_j.last().copied().unwrap_or_default();
+    // What springs back is gone at the end.
+    let most = |taken_j: &[f64]| taken_j.iter().copied().fold(0.0, f64::max);
     // By place in the chain, so that runs of one train have the same colours.
     let (mut of, mut others): (Vec<_>, Vec<_>) =
         run.interfaces.iter().enumerate().partition(|(_, of)| names.contains(&of.name));
-    of.sort_by(|(_, a), (_, b)| last(&b.taken_j).total_cmp(&last(&a.taken_j)));
+    of.sort_by(|(_, a), (_, b)| most(&b.taken_j).total_cmp(&most(&a.taken_j)));
     others.extend(of.split_off(if of.len() > MOST_AREAS { MOST_AREAS - 1 } else { of.len() }));
     of.sort_by_key(|(place, _)| *place);
     let mut parts: Vec<(String, Vec<f64>)> =
         of.iter().map(|(_, of)| (of.name.clone(), of.taken_j.clone())).collect();
     let states = run.time_s.len();
-    others.retain(|(_, of)| last(&of.taken_j) > 1e-3 * start_j);
-    if !others.is_empty() {
-        let sum = |t: usize| others.iter().map(|(_, of)| of.taken_j[t]).sum();
-        let name = format!("{} further interfaces", others.len());
-        parts.push((name, (0..states).map(sum).collect()));
+    others.retain(|(_, of)| most(&of.taken_j) > 0.0);
+    let sum = |t: usize| others.iter().map(|(_, of)| of.taken_j[t]).sum();
+    let sums: Vec<f64> = (0..states).map(sum).collect();
+    if most(&sums) > 1e-3 * start_j {
+        parts.push((format!("{} further interfaces", others.len()), sums));
     }
     let all = |t: usize| run.interfaces.iter().map(|of| of.taken_j[t]).sum::<f64>();
     let lost: Vec<f64> = (0..states).map(|t| start_j - run.kinetic_j[t] - all(t)).collect();
     // Below this it is the method's own error.
-    if last(&lost) > 1e-3 * start_j {
+    if most(&lost) > 1e-3 * start_j {
         parts.push((run.rest.into(), lost));
     }
     parts.push(("kinetic".into(), run.kinetic_j.clone()));
@@ -605,5 +606,34 @@ mod tests {
         let again = [(-0.3, 0.0), (-2.0, 0.0), (0.2, 6e5)];
         let drawn = [&[(0.0, 0.0)], &pushed[1..], &again[2..]].concat();
         assert_eq!(of(&[&pushed[..], &again].concat()), drawn);
+    }
+
+    #[test]
+    fn energies_add_up_to_the_first_though_springs_give_theirs_back() {
+        let at = |k: usize| format!("I{k}");
+        let interfaces = (0..8).map(|k| InterfaceMotion {
+            name: at(k),
+            deflection_m: vec![0.0; 3],
+            force_n: vec![0.0; 3],
+            // The last ones give it back.
+            taken_j: vec![0.0, 10.0, if k < 4 { 10.0 } else { 0.0 }],
+            data_end_m: 1.0,
+            is_usual: true,
+        });
+        let run = Motion {
+            time_s: vec![0.0, 1.0, 2.0],
+            bodies: Vec::new(),
+            interfaces: interfaces.collect(),
+            kinetic_j: vec![100.0, 20.0, 60.0],
+            rest: "resistance",
+            notes: Vec::new(),
+        };
+        let names: Vec<String> = (0..8).map(at).collect();
+        let panel = energy("", &run, &names, false).unwrap();
+        let last = panel.bands.last().unwrap();
+        assert_eq!((last.name.as_str(), &last.high), ("kinetic", &vec![100.0; 3]));
+        let shown: Vec<&str> = panel.bands.iter().map(|band| band.name.as_str()).collect();
+        let expected = ["I0", "I1", "I2", "I3", "I4", "3 further interfaces", "kinetic"];
+        assert_eq!(shown, expected);
     }
 }

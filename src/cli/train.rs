@@ -137,6 +137,9 @@ impl Args {
     }
 }
 
+/// Speeds that are listed one by one.
+const MOST_LISTED: usize = 20;
+
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     if !(args.stop_threshold >= 0.0 && args.stop_threshold.is_finite()) {
         return usage(format!("--stop-threshold {} must be 0 or more", args.stop_threshold));
@@ -187,8 +190,13 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         validation: &model.leave_one_out,
     };
     options.show(&document, |out| {
-        let speeds: Vec<String> = speeds.iter().map(|speed| km_per_h(*speed)).collect();
-        writeln!(out, "{} on {}", model.name(), speeds.join(", "))?;
+        let on = match &speeds[..] {
+            [first, .., last] if speeds.len() > MOST_LISTED => {
+                format!("{} runs from {} to {}", speeds.len(), km_per_h(*first), km_per_h(*last))
+            }
+            all => all.iter().map(|speed| km_per_h(*speed)).collect::<Vec<_>>().join(", "),
+        };
+        writeln!(out, "{} on {on}", model.name())?;
         if let Some(oob) = out_of_bag {
             let r2 = oob.r2.map_or("-".into(), |r2| format!("{r2:.5}"));
             writeln!(out, "out-of-bag: rmse {}, r² {r2}", Shown::force(oob.rmse).text(oob.rmse))?;

@@ -48,7 +48,8 @@ in brackets) are those of a multi-body run of one mass, driven by the model's bo
 sum|p-r|/sum|r| to 30 ms after FE's maximum crush. The means are over inner speeds; the ends of the
 range are extrapolation and are listed separately. FE contact (floor) is FE's own contact force in
 that run: no prediction of that force can be expected to do better. FE body (check) is derived from
-FE's own speeds and only checks curve, force law and run. FE scatter (floor) is how far a run
+FE's own speeds, filtered as models take it (fe_body of crumple compare is not), and only checks
+curve, force law and run. Curves without times have neither. FE scatter (floor) is how far a run
 deviates from the mean of repeated runs at its speed: no model can remove this part of an error,
 though the mean over n runs has only its 1/sqrt(n). forest is the reference method (DDTCM, train
 --paper), nearest is FDRM. --nested adds auto: model and rule chosen without the left-out speed.

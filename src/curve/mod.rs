@@ -367,6 +367,11 @@ impl Case {
         recipe.is_some_and(|recipe| recipe["imported"][key] == true)
     }
 
+    /// How pictures and tables call it: a curve from a file may be a test's.
+    pub(crate) fn origin(&self) -> &'static str {
+        if self.id.study == from_table::IMPORTED { "recorded" } else { "FE" }
+    }
+
     /// Maximum deflection, in m.
     pub fn max_deflection_m(&self) -> f64 {
         self.curves.original.deflection_m[self.loading_end()]

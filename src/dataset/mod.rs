@@ -531,7 +531,7 @@ pub(crate) const STEPS: usize = 200;
 impl TrainingSet {
     /// The mass that is stopped at each deflection, of a group whose runs differ in speed alone and know a
     /// contact force on one body, or between two of the same mass. Its
-    /// `is_known` says whether the runs agree on one.
+    /// `is_known` says whether the runs agree on one. A motion that was made of its own force says nothing of it.
     pub(crate) fn stopped_mass(&self) -> Option<StoppedMass> {
         let is_even =
             self.masses.other_kg.is_none_or(|m| (m / self.masses.body_kg - 1.0).abs() <= EVEN);
@@ -539,8 +539,17 @@ impl TrainingSet {
         if !may_tell {
             return None;
         }
-        let runs: Option<Vec<LoadingRun>> = self.cases.par_iter().map(loading_run).collect();
-        StoppedMass::fit(&runs?, self.masses.effective_kg())
+        let fit = |cases: &[&Arc<TrainingCase>]| {
+            let runs: Option<Vec<LoadingRun>> = cases.par_iter().map(|c| loading_run(c)).collect();
+            StoppedMass::fit(&runs?, self.masses.effective_kg())
+        };
+        let moves = |case: &&Arc<TrainingCase>| !case.case.moves_by_its_force();
+        let own: Vec<_> = self.cases.iter().filter(moves).collect();
+        if own.len() < 2 {
+            let all: Vec<_> = self.cases.iter().collect();
+            return Some(fit(&all)?.without_any());
+        }
+        fit(&own)
     }
 }
 

@@ -196,7 +196,8 @@ pub struct InterfaceHistory {
     #[serde(skip)]
     pub contact_time_s: Option<f64>,
     /// Separation speed over speed of approach at the interface, when it first opens again.
-    /// `None` below 0.1 m/s of approach, above 1 (where contacts repeat or neighbours push), and at the plate of an end.
+    /// `None` below 0.1 m/s of approach, above 1 (where contacts repeat or neighbours push), where it is crushed further
+    /// later, and at the plate of an end.
     pub restitution: Option<f64>,
 }
 

@@ -39,11 +39,17 @@ pub(super) fn add(
             format!("g{number}-curves"),
             charts::group_curves(group, cases, own),
         )),
-        Part::table(format!("FE runs of {group}"), runs(cases)),
+        Part::table(format!("Runs of {group}"), runs(cases)),
     ];
     for (warning, names) in by_warning(cases) {
         let runs = match &names[..] {
             [one] => (*one).to_string(),
+            several if cases.len() > MOST_NAMED => {
+                let named = several[..several.len().min(MOST_NAMED)].join(", ");
+                let more = if several.len() > MOST_NAMED { ", …" } else { "" };
+                let count = several.len();
+                format!("{count} runs ({named}{more}; the numbers are those of the first)")
+            }
             several => format!("{} runs ({})", several.len(), several.join(", ")),
         };
         content.warn(ToDo::CheckRuns, &format!("{title}, {runs}"), warning.into());
@@ -80,12 +86,18 @@ pub(super) struct Design {
     pub curve: PredictedCurve,
 }
 
-/// Each warning of the runs once, with the names of the runs that have it.
+/// Runs that are named one by one, and most warnings that differ in numbers alone.
+const MOST_NAMED: usize = 10;
+
+/// Each warning of the runs once, with the names of the runs that have it; of many runs, once for all numbers.
 fn by_warning(cases: &[Case]) -> Vec<(&str, Vec<&str>)> {
     let mut all: Vec<(&str, Vec<&str>)> = Vec::new();
+    let words = |of: &str| of.replace(|c: char| c.is_ascii_digit() || c == '.', "");
+    let are_many = cases.len() > MOST_NAMED;
+    let is_same = |a: &str, b: &str| a == b || are_many && words(a) == words(b);
     for case in cases {
         for warning in &case.quality.warnings {
-            match all.iter_mut().find(|(known, _)| known == warning) {
+            match all.iter_mut().find(|(known, _)| is_same(known, warning)) {
                 Some((_, names)) => names.push(&case.id.name),
                 None => all.push((warning, vec![&case.id.name])),
             }

@@ -208,7 +208,7 @@ pub(crate) fn report(
     let groups = groups(databases, settings)?;
     let cases: usize = groups.iter().map(|(_, _, cases)| cases.len()).sum();
     if !databases.is_empty() {
-        content.figures.push(KeyFigure { value: cases.to_string(), name: "FE runs".into() });
+        content.figures.push(KeyFigure { value: cases.to_string(), name: "runs".into() });
     }
     let mut designs = Vec::new();
     for (title, group, cases) in &groups {

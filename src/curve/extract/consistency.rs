@@ -7,7 +7,7 @@ use super::start::FromContact;
 use super::{Measured, Notes};
 use crate::curve::contact::milliseconds;
 use crate::curve::energy::{IMPOSSIBLE_ALONG_TIME, ImpossibleRun, POSSIBLE};
-use crate::curve::{Curve, Masses, loading};
+use crate::curve::{Curve, Masses, body, loading};
 use crate::history::History;
 use crate::signal::{cfc, interpolate};
 use crate::unit::Shown;
@@ -362,6 +362,27 @@ pub(super) fn sampling(original: &Curve, sampled: &Curve) -> Notes {
         ));
     }
     remarks
+}
+
+/// Whether the motion, whose states are at `own_s` from contact on, is written often enough beside a force with more
+/// states: by the force that lies between them, without what the filter of the body force takes anyway.
+pub(super) fn coarse_motion(original: &Curve, own_s: &[f64]) -> Option<String> {
+    let (end, time_s) = (loading::loading_end(original), original.time_s());
+    let until_s = time_s[end];
+    let inner = own_s.iter().copied().filter(|&t| t > 0.0 && t < until_s);
+    let times: Vec<f64> = std::iter::once(0.0).chain(inner).chain([until_s]).collect();
+    let states = times.len() - 1;
+    if states >= STATES || states >= end {
+        return None;
+    }
+    let force_n = body::filtered(time_s, original.force_n().to_vec());
+    let curve = Curve::new(time_s.to_vec(), original.deflection_m().to_vec(), force_n).ok()?;
+    let off = off_at(&curve, &times).filter(|off| *off > SAMPLED_OFF)?;
+    Some(format!(
+        "sampling: the motion has {states} states up to the maximum crush, one every {:.3} ms, and the force {end}; what the force does between them, {:.1} % of its mean, is missing in the body force: write the nodes' histories at shorter intervals",
+        1e3 * until_s / states as f64,
+        off * 100.0
+    ))
 }
 
 /// Difference of a curve and of its states at other times, joined by lines, over the loading

@@ -91,7 +91,7 @@ pub(crate) fn curve_of(
     let (along_time, mass) = (motion.momentum(), motion.mass(&record));
     let is_slowed = contact.time_s <= record.time_s[0] && record.slowed_over_m.is_some();
     let before = (!is_slowed).then_some(contact.before);
-    let FromContact { curve: original, closing_m_per_s: closing, .. } = contact;
+    let FromContact { curve: original, closing_m_per_s: closing, time_s: contact_s, .. } = contact;
     let ImpactSpeed { speed, by, recorded_m_per_s } =
         remarks.take(ImpactSpeed::of(setup, &record, before)?);
     let claim = energy::StatedConditions {
@@ -125,6 +125,10 @@ pub(crate) fn curve_of(
     remarks.append(accepted(mass)?);
     let (sampled, closing_speed_m_per_s) = remarks.take(sample(&original, &closing, setup)?);
     remarks.append(consistency::sampling(&original, &sampled));
+    if let Some(time_s) = &record.motion_time_s {
+        let from_contact: Vec<f64> = time_s.iter().map(|t| t - contact_s).collect();
+        remarks.warnings.extend(consistency::coarse_motion(&original, &from_contact));
+    }
     remarks.append(audited(&original, record.force_kind, balance));
     Ok(Extracted {
         speed,
@@ -194,7 +198,7 @@ fn audited(curve: &Curve, kind: ForceKind, balance: energy::EnergyBalance) -> No
     }
     if is_truncated {
         remarks.warn(
-            "truncated: the maximum deflection is at the last state, so the run ended while loading",
+            "truncated: the maximum deflection is at the last state, so the record ends while loading",
         );
     }
     if let Ok(branch) = loading::loading_branch(curve)

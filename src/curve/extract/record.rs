@@ -32,6 +32,8 @@ pub(crate) struct Record {
     pub force_n: Vec<f64>,
     /// Rate of the first state of the motion, before any cut.
     pub first_rate_m_per_s: f64,
+    /// Of a motion with fewer states than the force: their times.
+    pub motion_time_s: Option<Vec<f64>>,
     /// If the force begins after the motion: how far the bodies have moved until then since they had that rate.
     pub slowed_over_m: Option<f64>,
     /// Name of the velocity that the files do not have: the rate is then a derivative.
@@ -112,6 +114,7 @@ impl Record {
         let mut record = Self {
             first_rate_m_per_s: motion.rate_m_per_s[0],
             slowed_over_m: None,
+            motion_time_s: None,
             time_s: motion.time_s,
             deflection_m: motion.deflection_m,
             rate_m_per_s: motion.rate_m_per_s,
@@ -165,7 +168,9 @@ impl Record {
         let is_slower = record.rate_m_per_s[0].abs() < record.first_rate_m_per_s.abs();
         record.slowed_over_m =
             free_m.filter(|_| is_slower).map(|free_m| (record.deflection_m[0] - free_m).abs());
-        (record.time_s, record.force_n) = (time_s, force_n);
+        let own_s = std::mem::replace(&mut record.time_s, time_s);
+        record.motion_time_s = (own_s.len() < record.time_s.len()).then_some(own_s);
+        record.force_n = force_n;
         Ok((record, remarks))
     }
 

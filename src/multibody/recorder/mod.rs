@@ -250,6 +250,8 @@ pub(super) fn moving_mean(speeds: &[f64], interval_s: f64) -> Option<f64> {
 
 /// No restitution of what meets more slowly, in m/s: it would be a ratio to nothing.
 const SLOWEST_APPROACH_M_PER_S: f64 = 0.1;
+/// Crushed further than so many times its crush at the first separation, an interface has that of another contact.
+const AS_FAR: f64 = 1.01;
 
 /// What is known about an interface over all steps.
 #[derive(Clone, Debug, Default)]
@@ -264,7 +266,8 @@ pub(in self::super) struct Extremes {
     /// When contact began for the first time, with the rate of deflection, and that when it ended.
     contact_s: Option<f64>,
     approach_m_per_s: Option<f64>,
-    separation_m_per_s: Option<f64>,
+    /// With the largest deflection until then.
+    separation: Option<(f64, f64)>,
 }
 
 impl Extremes {
@@ -275,7 +278,7 @@ impl Extremes {
 
     pub(crate) fn released(&mut self, separation_m_per_s: f64) {
         if separation_m_per_s > 0.0 {
-            self.separation_m_per_s = self.separation_m_per_s.or(Some(separation_m_per_s));
+            self.separation = self.separation.or(Some((separation_m_per_s, self.max_deflection_m)));
         }
     }
 
@@ -311,8 +314,9 @@ impl Extremes {
         history.contact_time_s = self.contact_s;
         history.peak_tension_n = self.peak_tension_n;
         history.max_extension_m = self.max_extension_m;
-        history.restitution = match (self.approach_m_per_s, self.separation_m_per_s) {
-            (Some(approach), Some(separation)) if approach >= SLOWEST_APPROACH_M_PER_S => {
+        let separation = self.separation.filter(|(_, m)| self.max_deflection_m <= AS_FAR * m);
+        history.restitution = match (self.approach_m_per_s, separation) {
+            (Some(approach), Some((separation, _))) if approach >= SLOWEST_APPROACH_M_PER_S => {
                 Some(separation / approach)
             }
             _ => None,

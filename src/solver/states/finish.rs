@@ -16,6 +16,7 @@ impl StateReader<'_> {
         match (pending.time, self.missing(&pending, at_end)) {
             (Some(time), None) if self.skip > 0 => {
                 self.skip -= 1;
+                self.left_out += 1;
                 let message = format!(
                     "the state at time {time:?} has other entities than the states below it; it is left out"
                 );
@@ -31,8 +32,11 @@ impl StateReader<'_> {
                 let missing = missing.unwrap_or_else(|| "its time is missing".into());
                 let at = time.map_or(String::new(), |t| format!(" at time {t:?}"));
                 let states = self.time.len();
-                let message =
-                    format!("state {}{at} is not complete and is left out: {missing}", states + 1);
+                self.left_out += 1;
+                let message = format!(
+                    "state {}{at} is not complete and is left out: {missing}",
+                    states + self.left_out
+                );
                 self.problems.add(ProblemCode::IncompleteState, Some(pending.place), message);
                 // Labels that only dropped states had must not become components.
                 self.scalars.retain(|s| s.absent < states);
