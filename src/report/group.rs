@@ -192,19 +192,19 @@ impl Validated<'_> {
             content.verdict(Verdict::known(
                 title,
                 format!(
-                    "errors of curves predicted by {}: {} in force, {} in velocity, {} in maximum crush (means over {}, each left out in turn)",
+                    "errors of curves predicted by {}: {} in force, {} in velocity, {} in maximum crush ({})",
                     means.model,
                     percent(means.force_l1),
                     percent(means.velocity_l1),
                     percent(means.max_crush_error),
-                    validation.inner_speeds(means)
+                    in_turn(&validation.inner_speeds(means))
                 ),
             ));
         }
         if let Some(first) = validation.means.first() {
-            let left_out = validation.inner_speeds(first);
+            let left_out = in_turn(&validation.inner_speeds(first));
             let caption = format!(
-                "{group}: errors against FE, means over {left_out}, each left out in turn (Σ|p − r|/Σ|r|; the body force drives one mass)"
+                "{group}: errors against FE, {left_out} (Σ|p − r|/Σ|r|; the body force drives one mass)"
             );
             parts.push(Part::table(caption, self.models()));
         }
@@ -414,12 +414,17 @@ impl Validated<'_> {
     }
 }
 
+fn in_turn(left_out: &str) -> String {
+    match left_out.starts_with("1 ") {
+        true => format!("with {left_out} left out"),
+        false => format!("means over {left_out}, each left out in turn"),
+    }
+}
+
 fn left_out_cases(comparisons: &[Comparison]) -> String {
     match comparisons {
         [one] => format!("with {} left out ({})", km_per_h(one.speed_m_per_s), one.case),
-        several => {
-            format!("means over {}, each left out in turn", counted(several.len(), "inner case"))
-        }
+        several => in_turn(&counted(several.len(), "inner case")),
     }
 }
 

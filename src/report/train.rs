@@ -435,7 +435,7 @@ fn vehicles(summary: &Summary<'_>) -> impl Into<Table> {
             format!("{:.2} to {:.2} m/s", body.initial_v_m_per_s, body.final_v_m_per_s)
         })
         .column("peak (CFC 60)", |body| body.peak_text().unwrap_or_else(missing))
-        .column("mean deceleration", |body| body.mean_text())
+        .column("mean deceleration", |body| body.mean_text().replace('-', "−"))
         .column("120 ms mean", |body| {
             body.moving_mean_deceleration_g.map_or_else(missing, |a| format!("{a:.2} g"))
         })
