@@ -111,9 +111,18 @@ impl Storage {
 
     /// Appends the bytes of values.
     fn append(self, values: &[f64], bytes: &mut Vec<u8>) {
+        let start = bytes.len();
+        bytes.resize(start + self.size() * values.len(), 0);
+        let place = &mut bytes[start..];
         match self.single {
-            false => bytes.extend(values.iter().flat_map(|value| value.to_le_bytes())),
-            true => bytes.extend(values.iter().flat_map(|v| (*v as f32).to_le_bytes())),
+            false => {
+                let each = place.as_chunks_mut().0.iter_mut().zip(values);
+                each.for_each(|(to, value)| *to = value.to_le_bytes());
+            }
+            true => {
+                let each = place.as_chunks_mut().0.iter_mut().zip(values);
+                each.for_each(|(to, value)| *to = (*value as f32).to_le_bytes());
+            }
         }
     }
 

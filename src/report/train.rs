@@ -283,7 +283,7 @@ fn add_limits(
         .bodies
         .iter()
         .filter(|body| limits.over.contains(&body.name))
-        .map(|body| format!("{} ({})", body.name, body.mean_text()))
+        .map(|body| format!("{} ({})", body.name, body.mean_text().replace('-', "−")))
         .collect();
     // A value of a vehicle that a limit lies so close to that it may be on either side.
     let found = Numbers::of(summary);
