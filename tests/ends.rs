@@ -254,6 +254,22 @@ fn fes_contact_force_gives_fes_velocity() {
     assert_eq!(held, 7 + 7);
 }
 
+/// Where the runs agree on no stopped mass, an end would move its whole vehicle by the contact force.
+#[test]
+fn an_end_without_stopped_mass_is_said() {
+    let trains = |curve: &str| {
+        let train = |name: &str, speed: &str| {
+            format!(
+                "[[train]]\nname = \"{name}\"\nspeed = \"{speed}\"\nvehicles = [{{ name = \"{name}1\", mass = \"24t\", front = {{ curve = \"{curve}\" }} }}]\n"
+            )
+        };
+        format!("{HEAD}{}{}[contact]\n", train("A", "36km/h"), train("B", "0km/h"))
+    };
+    let said = |curve: &str| simulate_text("stopped.toml", &trains(curve))["warnings"].to_string();
+    says(&said("noses"), "its runs agree on no stopped mass, so the contact force moves the whole");
+    assert!(!said("end").contains("stopped mass"));
+}
+
 /// Two identical vehicles that meet at twice the speed each load as one does on a wall.
 #[test]
 fn a_mirrored_train_is_one_against_a_wall() {

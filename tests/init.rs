@@ -1271,7 +1271,8 @@ fn scenarios_run_as_they_are_written() {
         (&["pair.model"], 2),
         // Each vehicle with its ends, but for the last one's rear.
         (&["lead.model", "vehicle.model"], 8),
-        (&["pair.model", "vehicle.model"], 16),
+        // The runs of this nose agree on no stopped mass.
+        (&["pair.model", "vehicle.model"], 6),
         (&["lead.model", "vehicle.model", "--one-mass"], 4),
         (&["pair.model", "vehicle.model", "--one-mass"], 6),
     ] {

@@ -409,7 +409,12 @@ fn jumps_of_the_force_are_taken_and_said() {
         "d_mm,force_kN\n0,0\n0,1000\n400,1000\n400,2000\n700,2000\n700,2000\n700,1000\n900,1000\n";
     let folder = file(text, "jump.csv");
     let here = folder.path();
-    let said = added(here, "jump.csv", &[&WALL[..], &["--speed", "10m/s"]].concat());
+    let plain =
+        [&["db", "add", "new.h5", "jump.csv", "--group", "g", "--speed", "10m/s"][..], &WALL];
+    let error = crumple_fails(here, 1, &plain.concat());
+    says(&error, "the curve rises by jumps alone, so its unloading stiffness must be given");
+    let impact = [&WALL[..], &["--speed", "10m/s", "--unloading", "80MN/m"]].concat();
+    let said = added(here, "jump.csv", &impact);
     let case = &said["cases"][0];
     let ratio = case["work_over_energy"].as_f64().unwrap();
     assert!((ratio - 1.0).abs() < 1e-3, "{ratio}");

@@ -1,6 +1,6 @@
 //! `crumple build`: from a study manifest to a curve database.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -199,7 +199,9 @@ fn print(out: &mut dyn Write, report: &BuildReport, database: &str) -> io::Resul
             "note: group {group} was built from an earlier version of this manifest and is kept: crumple db rm removes it"
         )?;
     }
-    writeln!(out, "wrote {database} (group {})", report.group)
+    // A group that was renamed in the database keeps its name there.
+    let groups: BTreeSet<&str> = report.runs.iter().map(|run| &*run.case.group).collect();
+    writeln!(out, "wrote {database} (group {})", Vec::from_iter(groups).join(", "))
 }
 
 /// Says what has moved: a whole group in one line.

@@ -378,6 +378,11 @@ mod tests {
         let mut impact = impact(10.0, 24e3);
         let error = from_table(&table, &impact).unwrap_err().to_string();
         assert!(error.contains("never rises, so its unloading stiffness must be given"), "{error}");
+        // How steep a jump is depends on the width that it was given.
+        let jump =
+            Table { deflection_m: &[0.0, 5e-5, 0.4, 0.5], force_n: &[0.0, 2e6, 2e6, 2e6], ..table };
+        let error = from_table(&jump, &impact).unwrap_err().to_string();
+        assert!(error.contains("the curve rises by jumps alone, so its unloading"), "{error}");
         impact.unloading_stiffness_n_per_m = Some(1e8);
         let (curves, quality) = from_table(&table, &impact).unwrap();
         let end = loading::loading_end(&curves.original);

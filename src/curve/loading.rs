@@ -52,6 +52,12 @@ const MOST_AT_ONE: usize = 3;
 
 /// Steepest rise of a loading branch, in N/m: jumps, whose width is ours, count only if it rises nowhere else.
 pub(crate) fn steepest_rise(deflection_m: &[f64], force_n: &[f64]) -> f64 {
+    let [rise, of_jumps] = steepest_rises(deflection_m, force_n);
+    if rise > 0.0 { rise } else { of_jumps }
+}
+
+/// The steepest rise that is no jump, and that of jumps, in N/m; 0 if there is none.
+pub(super) fn steepest_rises(deflection_m: &[f64], force_n: &[f64]) -> [f64; 2] {
     let step_m = |i: &usize| deflection_m[*i] - deflection_m[i - 1];
     let jump_m = STEP_WIDTH_SHARE * (1.0 + 1e-6) * deflection_m.last().copied().unwrap_or(0.0);
     let is_narrow = |i: &usize| step_m(i) <= jump_m;
@@ -61,8 +67,7 @@ pub(crate) fn steepest_rise(deflection_m: &[f64], force_n: &[f64]) -> f64 {
         alike.partition(|run| is_narrow(&run[0]) && run.len() <= MOST_AT_ONE);
     let slope = |i: &usize| (force_n[*i] - force_n[i - 1]) / step_m(i);
     let steepest = |of: Vec<&[usize]>| of.into_iter().flatten().map(slope).fold(0.0, f64::max);
-    let rise = steepest(others);
-    if rise > 0.0 { rise } else { steepest(jumps) }
+    [steepest(others), steepest(jumps)]
 }
 
 /// Secant of the unloading branch between 90 % and 10 % of the force at the maximum

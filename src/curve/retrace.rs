@@ -4,7 +4,7 @@
 //! are sums of `2 Δd/(v + v')` over short steps, exact for a constant force, also where the body
 //! is at rest.
 
-use super::loading::steepest_rise;
+use super::loading::steepest_rises;
 use super::{ForceKind, Masses};
 use crate::error::{Error, error};
 use crate::unit::{Shown, Speed, UnitSystem};
@@ -245,11 +245,13 @@ impl MotionBuilder {
                 stiffness
             }
             None => {
-                let steepest = steepest_rise(d, f);
+                // Where only jumps rise, how steep is a matter of the width that a reader gave them.
+                let [steepest, of_jumps] = steepest_rises(d, f);
                 if steepest <= 0.0 {
+                    let how = if of_jumps > 0.0 { "rises by jumps alone" } else { "never rises" };
                     return Err(error!(
                         Other,
-                        "the curve never rises, so its unloading stiffness must be given: --unloading 80MN/m"
+                        "the curve {how}, so its unloading stiffness must be given: --unloading 80MN/m"
                     ));
                 }
                 self.motion.warnings.push(format!(

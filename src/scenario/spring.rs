@@ -368,6 +368,11 @@ pub(super) fn crush_end(
     };
     let unloading = CurveUnloading::of(stiffness.map(of_end));
     let mut warnings = warnings(model, speed_m_per_s);
+    if model.has_body_force() && !model.knows_stopped_mass() {
+        warnings.push(
+            "its runs agree on no stopped mass, so the contact force moves the whole vehicle: a vehicle of one mass, which the body force moves, follows these runs more closely".into(),
+        );
+    }
     if model.speed_kind == SpeedKind::Wall && end.at != Role::Wall {
         warnings.push(
             "its runs hit a wall: between two vehicles each end is taken to load as against a wall at half their closing speed".into(),

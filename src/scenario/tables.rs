@@ -160,7 +160,8 @@ pub(crate) struct CurveTable {
     #[serde(default)]
     pub(crate) parameters: BTreeMap<String, Parameter>,
     /// Of a model, predicted curve or database case: the force that is taken; if absent the
-    /// one that the vehicles need (body force for one mass, contact force for split ones). Of a CSV file that does not state it: the force that it holds.
+    /// one that the vehicles need (body force for one mass, contact force for split ones). Of a CSV file that does not state it: the force that it
+    /// holds; if absent the body force, with a warning.
     pub(crate) force: Option<ForceKind>,
     /// Of a model or predicted curve: member of the band of the force that is taken, from −1
     /// (lower edge) through 0 (the curve) to 1 (upper edge).

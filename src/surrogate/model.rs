@@ -310,6 +310,11 @@ impl Model {
         })
     }
 
+    /// Whether it has a crush law on whose stopped mass its runs agree.
+    pub(crate) fn knows_stopped_mass(&self) -> bool {
+        self.crush_law.as_ref().is_some_and(|law| law.stopped.is_known())
+    }
+
     /// Makes its crush law one without stopped mass, in which the contact force itself has the rate.
     pub(crate) fn without_stopped_mass(&mut self) {
         if let Some(law) = &self.crush_law {

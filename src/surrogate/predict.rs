@@ -6,7 +6,7 @@
 //!
 //! A model has two forces. The **declared** one is the recipe's: it is exported and compared along FE's crush. The
 //! **body force**, −m dv/dt of the recorded closing speed with CFC 60 (`curve/body`), drives a body of one mass. FE's own
-//! contact force in a one-mass model misses FE's velocity by 1.6 to 2.9 % on average over a group, because the crush zone
+//! contact force in a one-mass model misses FE's velocity by some per cent, because the crush zone
 //! stops part of the mass early.
 //!
 //! Unloading: FE curves begin with a rise far steeper than the line of the rebound. One stiffness for both would have

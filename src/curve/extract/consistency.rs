@@ -34,6 +34,8 @@ const OTHER_FILES: &str = "likely files of two runs, the wrong node or wall, or 
 const SPIKE: (f64, f64) = (2.5, 1.2);
 /// Masses of two bodies whose ratio differs from that of their changes of velocity by more are doubtful.
 const RATIO: f64 = 0.25;
+/// Those whose inverse ratio differs by no more are swapped.
+const SWAPPED: f64 = 0.1;
 /// Gravity changes half of the speed in half of a flight; what has changed less than this share of it begins later.
 const SUDDEN: f64 = 0.2;
 /// Neither gravity nor brakes change a speed faster, in m/s².
@@ -119,9 +121,9 @@ pub(super) fn masses(measured: &Measured<'_>, masses: Masses) -> Option<String> 
     let sum = |of: &dyn Fn(usize) -> f64| -> f64 { (0..states).map(of).sum() };
     let found = -sum(&|i| own[i] * other[i]) / sum(&|i| other[i] * other[i]);
     let stated = masses.other_kg? / masses.body_kg;
-    let is_off = |stated: f64| (found / stated - 1.0).abs() > RATIO;
-    (found.is_finite() && found > 0.0 && is_off(stated)).then(|| {
-        let what_to_do = match is_off(1.0 / stated) {
+    let off = |stated: f64| (found / stated).max(stated / found) - 1.0;
+    (found.is_finite() && found > 0.0 && off(stated) > RATIO).then(|| {
+        let what_to_do = match off(1.0 / stated) > SWAPPED {
             true => "one of them is wrong, the node of another body, or brakes act on one",
             false => "they are swapped",
         };
