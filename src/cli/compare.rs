@@ -35,7 +35,8 @@ fdrm is FE's curve at one other speed; nsdm is the spring and damper fitted to t
 reference method's random forest and spline; best is the model chosen by leaving speeds out,
 without this one, driven by its body force. Errors are sum|p-r|/sum|r| from contact to 30 ms after
 FE's maximum crush; accelerations are filtered with CFC 60, unfiltered in brackets. --json has
-every measure; those of velocity and acceleration are evaluated at 10 kHz, as by crumple rate.
+every measure, with --speed as a document, else in its list comparisons; those of velocity and
+acceleration are evaluated at 10 kHz, as by crumple rate.
 With --train, a scenario whose curves are database cases is run with the curves of each method, and
 the vehicles' speeds are compared with the FE run in its [reference]. rate_live lets the crush
 force follow the closing speeds of the run; split_ends gives each vehicle two ends with the mass

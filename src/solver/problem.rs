@@ -6,8 +6,9 @@ use serde::Serialize;
 
 use crate::history::time_gaps;
 
-/// Problems kept per file; further ones are counted only.
+/// Problems kept per file, and of one kind; further ones are counted only.
 const MAX_KEPT: usize = 200;
+const MOST_ALIKE: usize = 20;
 
 /// Kinds of damage. The names in snake case are the codes in JSON.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -170,7 +171,9 @@ impl Diagnostics {
     }
 
     pub(crate) fn push(&mut self, problem: Problem) {
-        if self.kept.len() < MAX_KEPT {
+        // What every state has must not hide what one has.
+        let alike = self.kept.iter().filter(|kept| kept.code == problem.code).count();
+        if self.kept.len() < MAX_KEPT && alike < MOST_ALIKE {
             self.kept.push(problem);
         } else {
             self.dropped += 1;
@@ -183,9 +186,8 @@ impl Diagnostics {
 
     /// Adds the problems of another list after these.
     pub(crate) fn append(&mut self, other: Self) {
-        let room = MAX_KEPT - self.kept.len();
-        self.dropped += other.dropped + other.kept.len().saturating_sub(room);
-        self.kept.extend(other.kept.into_iter().take(room));
+        self.dropped += other.dropped;
+        self.extend(other.kept);
     }
 
     pub(crate) fn into_list(mut self) -> Vec<Problem> {
