@@ -437,6 +437,10 @@ fn a_renamed_group_takes_its_cases_along() {
         ok(here, "build lead-car-wall.toml -o curves.h5")
     };
     says(&text, "note: group nose: renamed since it was built, 7 cases moved to front\n");
+    // Renamed in the database it keeps that name, which is the one that a build names.
+    ok(here, "db rename curves.h5 --group front --to mine");
+    let text = ok(here, "build lead-car-wall.toml -o curves.h5");
+    says(&text, "wrote curves.h5 (group mine)\n");
     assert!(ok(here, "db check curves.h5").contains("7 cases checked, 0 findings"));
 }
 

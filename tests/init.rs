@@ -490,6 +490,15 @@ fn pairs_have_both_bodies() {
     let said = warned(&here, "build exchanged.toml -o exchanged.h5");
     says(&said, "mass: by the velocity changes of the two bodies, the other one has 1.6");
     says(&said, "they are swapped");
+    // A quarter too light or too heavy is the same to it, and not swapped.
+    for (factor, name) in [(1.3, "heavy"), (1.0 / 1.3, "light")] {
+        let text = fs::read_to_string(here.join("study.toml")).unwrap();
+        let off = format!("\"{}t\"", factor * number(&run["other_mass"], "t"));
+        let text = text.replace(&format!("\"{other}\""), &off);
+        fs::write(here.join("off.toml"), text).unwrap();
+        let said = warned(&here, &format!("build off.toml -o {name}.h5"));
+        says(&said, "one of them is wrong, the node of another body");
+    }
     // What a model says of them has both masses, too.
     crumple_ok(&here, "train curves.h5 --model nearest -o pair.model -q");
     crumple_ok(&here, "predict pair.model --speed 57.6km/h -o pair.csv -q");

@@ -8,7 +8,7 @@ use crumple::formats::{ReadOptions, read};
 use serde_json::Value;
 
 use crate::common::{
-    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, read_json, says,
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, json, read_json, says,
 };
 use crate::import::{POINTS, channel, given, is_points, read_bytes, rows, speed};
 
@@ -784,10 +784,53 @@ fn curves_without_times_have_no_stopped_mass() {
     assert!(!crumple_ok(here, "db ls c.h5").contains("crush law"));
     let output = crumple_in(here, "validate c.h5 -v");
     let said = crate::common::said(&output);
-    says(&said, "4 of 4 curves have no times: their motion is made of their force");
+    says(&said, "curves without times, 4 of 4: their motion is made of their force");
     assert!(!said.contains("FE contact (floor)") && !said.contains("crush-law  "), "{said}");
     crumple_ok(here, "plot c.h5 -o c.svg");
     says(&fs::read_to_string(here.join("c.svg")).unwrap(), "recorded at 25.2 km/h");
+}
+
+/// Of many curves a picture draws some, a report names each warning once, and the best model is chosen as in training.
+#[test]
+fn many_curves_stay_legible() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let names: Vec<String> = (0..25).map(|k| format!("c{k}.csv")).collect();
+    let speeds: Vec<String> = (0..25).map(|k| format!("{}m/s", 5 + k)).collect();
+    for (k, name) in names.iter().enumerate() {
+        let v = 5.0 + k as f64;
+        let level_n = 2e6 * (1.0 + 0.02 * v);
+        let crush_m = 0.5 * 24e3 * v * v / level_n + 0.025;
+        let points = [0.0, 0.05, 0.5 * (0.05 + crush_m), crush_m];
+        let rows: String =
+            points.iter().map(|d| format!("{d},{}\n", level_n * (d / 0.05).min(1.0))).collect();
+        fs::write(here.join(name), format!("d_m,F_N\n{rows}")).unwrap();
+    }
+    let speeds = speeds.join(",");
+    let add = [
+        "db", "add", "c.h5", "--speed", &speeds, "--kind", "wall", "--mass", "24t", "--group", "g",
+    ];
+    let files: Vec<&str> = names.iter().map(String::as_str).collect();
+    crumple_ok(here, &[&add[..], &files].concat());
+    crumple_ok(here, "plot c.h5 -o c.svg");
+    let drawn = fs::read_to_string(here.join("c.svg")).unwrap();
+    says(&drawn, "20 of 25 runs, taken evenly in order of speed.");
+    assert!(drawn.contains("recorded at 18 km/h") && drawn.contains("recorded at 104.4 km/h"));
+    let chosen = crumple_ok(here, "train c.h5 -o m.model");
+    let chosen = chosen.lines().next().unwrap();
+    says(chosen, " on 25 cases from 18 km/h to 104.4 km/h");
+    let compared = json(&crumple_ok(here, "compare c.h5 --speed 15m/s --nsdm-seeds 0 --json -q"));
+    let rows = compared["rows"].as_array().unwrap();
+    let best = rows.iter().find(|row| row["method"] == "best").unwrap();
+    let made_from = format!("{} on 24 speeds", chosen.split(' ').next().unwrap());
+    assert_eq!(best["curve"].as_str(), Some(made_from.as_str()), "{best}");
+    assert!(rows.iter().all(|row| row["method"] != "fe" && row["method"] != "fe_body"));
+    crumple_ok(here, "report c.h5 -o r.html");
+    let page = fs::read_to_string(here.join("r.html")).unwrap();
+    says(
+        &page,
+        "25 runs (c0, c1, c2, c3, c4, c5, c6, c7, c8, c9, …; the numbers are those of the first)",
+    );
 }
 
 /// A legacy curve is exported without a database, with what its file does not say.

@@ -112,7 +112,7 @@ fn a_cut_run_is_used_as_far_as_it_goes() {
     let output = crumple_in(study.folder.path(), "build study.toml -o c.h5 --strict");
     assert_eq!(output.status.code(), Some(3));
     let error = String::from_utf8(output.stderr).unwrap();
-    says(&error, "state 400 at time 0.2992515");
+    says(&error, "the state at time 0.2992515 is not complete");
     says(&error, "is not complete and is left out");
 }
 

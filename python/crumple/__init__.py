@@ -23,6 +23,7 @@ a shell, or `python -m crumple build --help`, describes them. They return the do
 
 import importlib
 import json
+import math
 import os
 import re
 import tempfile
@@ -71,8 +72,8 @@ def _key(entity):
     """An id as it is looked up: 900001, 900001.0 (as pandas has it), "900001" and NumPy's numbers are one."""
     if entity is None or isinstance(entity, str):
         return _id(entity)
-    # NaN is no entity's id.
-    return int(entity) if entity == entity and entity == int(entity) else entity
+    # NaN and infinity are no entity's id.
+    return int(entity) if math.isfinite(entity) and entity == int(entity) else entity
 
 
 def _locked(state):
@@ -81,6 +82,13 @@ def _locked(state):
         if isinstance(values, np.ndarray):
             values.flags.writeable = False
     return state
+
+
+def _plain(of):
+    """An array, Series or NumPy number as JSON has it."""
+    if hasattr(of, "tolist"):
+        return of.tolist()
+    raise TypeError(f"{type(of).__name__} cannot be written as JSON")
 
 
 def _listed(of):
@@ -521,8 +529,6 @@ class Curve:
         self.speed, self.max_deflection = document["speed_m_per_s"], document["max_deflection_m"]
         self.deflection, self.force = array("deflection_m"), array("force_N")
         self.body_force = array("body_force_N")
-        if any(of is not None and of.shape != self.deflection.shape for of in (self.force, self.body_force)):
-            raise Error(f"a curve has one force for each of its {len(self.deflection)} deflections")
         self.force_kind = document["provenance"]["force_kind"]
 
         def band(low, high):
@@ -531,6 +537,9 @@ class Curve:
         self.band = band(array("force_low_N"), array("force_high_N"))
         self.body_band = band(array("body_force_low_N"), array("body_force_high_N"))
         of = document["provenance"].get("band")
+        forces = (self.force, self.body_force, *(self.band or ()), *(self.body_band or ()))
+        if self.deflection is None or any(of is not None and of.shape != self.deflection.shape for of in forces):
+            raise Error("a curve has deflections (deflection_m), and one force for each in every array")
         self.band_level = None if of is None else of["level"]
         self.warnings = document.get("warnings", [])
         self._of_document = frozenset(self.__dict__)
@@ -582,7 +591,7 @@ class Curve:
     def _written(self, folder):
         """A file of the document, in which arrays may stand for lists."""
         curve = Path(folder) / "curve.json"
-        curve.write_text(json.dumps(self.document, default=np.ndarray.tolist), encoding="utf-8")
+        curve.write_text(json.dumps(self.document, default=_plain), encoding="utf-8")
         return curve
 
     def __repr__(self):

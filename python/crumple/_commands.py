@@ -158,7 +158,7 @@ def run(*arguments, check=True):
     `check=False` nothing is raised.
     """
     if any(a is None for a in arguments):
-        raise Error("an argument is None: expected a path or text")
+        raise Error(f"crumple {arguments[0]}: an argument is None: expected a path or text")
     words = [os.fspath(a) if isinstance(a, os.PathLike) else str(a) for a in arguments]
     words = [*_program(), "--json", *words]
     environment = {**os.environ, "CRUMPLE_PROGRESS": "lines"}
@@ -236,7 +236,7 @@ def add(database, files, **options):
     """Add measured or legacy curves from files to a database, which is created if it is not there: CSV, MDF, ISO-MME, LS-DYNA, ...
 
     Options are those of `crumple db add`: `group="tests"`, `speed="36km/h"` (or in m/s; a list for several files), `mass="24t"`,
-    `kind="wall"`, `force="body"`, `units="mm-t-s"`.
+    `kind="wall"`, `force="body"`, `units="mm-t-s"`, `unloading="80MN/m"` (or in N/m).
     """
     files = [files] if isinstance(files, (str, os.PathLike)) else list(files)
     if not files:

@@ -52,9 +52,12 @@ fn fe_at(case: &Case) -> String {
     }
 }
 
-/// FE's own curves: of the recipe's force, and of the body's motion where that is another.
+/// FE's own curves: of the recipe's force, and of the body's motion where that is another; none if the motion was made of the force.
 pub(super) fn of_fe(left_out: &LeftOutCase<'_>) -> Vec<Method> {
     let LeftOutCase { own, case, .. } = left_out;
+    if case.moves_by_its_force() {
+        return Vec::new();
+    }
     let method = |name, curve, truth: &Envelope| Method {
         name,
         made_from: fe_at(case),

@@ -285,7 +285,7 @@ fn floors_of(left_out: &[LeftOutCase<'_>]) -> (Vec<Floor>, Vec<String>) {
         left_out.iter().partition(|left_out| left_out.case.moves_by_its_force());
     if !made.is_empty() {
         notes.push(format!(
-            "{} of {} curves have no times: their motion is made of their force, and errors of velocity and acceleration are against that motion",
+            "curves without times, {} of {}: their motion is made of their force, and errors of velocity and acceleration are against that motion",
             made.len(),
             left_out.len()
         ));

@@ -89,6 +89,12 @@ pub struct BuildReport {
 }
 
 impl BuildReport {
+    /// Where the database has the runs' cases: a group that was renamed there keeps its name.
+    pub(crate) fn groups(&self) -> BTreeSet<&str> {
+        let known = self.runs.iter().filter(|run| self.case(run).is_some());
+        known.map(|run| &*run.case.group).collect()
+    }
+
     pub(crate) fn case(&self, run: &BuiltRun) -> Option<&Case> {
         self.database.cases(&run.case.group).get(*self.places.get(&run.case)?)
     }

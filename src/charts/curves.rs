@@ -103,7 +103,7 @@ pub fn group_curves(group: &str, cases: &[Case], force: ForceKind) -> Chart {
     }
     if drawn.len() < cases.len() {
         let [drawn, all] = [drawn.len(), cases.len()];
-        chart.notes.push(format!("{drawn} of {all} runs, spread over their speeds."));
+        chart.notes.push(format!("{drawn} of {all} runs, taken evenly in order of speed."));
     }
     chart
 }

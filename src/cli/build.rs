@@ -1,6 +1,6 @@
 //! `crumple build`: from a study manifest to a curve database.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -99,9 +99,11 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         warnings.extend(own.map(|warning| format!("{}: {warning}", run.name)));
     }
     // What is unusual in a run compared with its group.
-    let of_group = siblings::remarks(report.database.cases(&report.group));
-    let of_group: Vec<String> =
-        of_group.into_iter().map(|(case, _, words)| format!("{case}: {words}")).collect();
+    let of_groups = report.groups().into_iter().map(|group| report.database.cases(group));
+    let of_group: Vec<String> = of_groups
+        .flat_map(siblings::remarks)
+        .map(|(case, _, words)| format!("{case}: {words}"))
+        .collect();
     let of_others = |what: String, other: &String| {
         format!(
             "{what}, built from {other}: both studies have one name and group; with another name in [study] of one of them a database keeps both"
@@ -199,9 +201,12 @@ fn print(out: &mut dyn Write, report: &BuildReport, database: &str) -> io::Resul
             "note: group {group} was built from an earlier version of this manifest and is kept: crumple db rm removes it"
         )?;
     }
-    // A group that was renamed in the database keeps its name there.
-    let groups: BTreeSet<&str> = report.runs.iter().map(|run| &*run.case.group).collect();
-    writeln!(out, "wrote {database} (group {})", Vec::from_iter(groups).join(", "))
+    let mut groups = Vec::from_iter(report.groups());
+    if groups.is_empty() {
+        groups.push(&report.group);
+    }
+    let word = if groups.len() > 1 { "groups" } else { "group" };
+    writeln!(out, "wrote {database} ({word} {})", groups.join(", "))
 }
 
 /// Says what has moved: a whole group in one line.

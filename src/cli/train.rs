@@ -192,7 +192,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     options.show(&document, |out| {
         let on = match &speeds[..] {
             [first, .., last] if speeds.len() > MOST_LISTED => {
-                format!("{} runs from {} to {}", speeds.len(), km_per_h(*first), km_per_h(*last))
+                format!("{} cases from {} to {}", speeds.len(), km_per_h(*first), km_per_h(*last))
             }
             all => all.iter().map(|speed| km_per_h(*speed)).collect::<Vec<_>>().join(", "),
         };

@@ -36,40 +36,45 @@ pub(crate) fn rebound_stiffness_n_per_m(
     (stiffness > 0.0 && stiffness.is_finite()).then_some(stiffness)
 }
 
-/// The body force `−m dv/dt` of the closing speed `v` at the sampled times, in N, with the case's
-/// effective mass; of a table without times its own force.
-///
-/// It is filtered with the lowest class that keeps the energy of the impact within 0.5 %; if the sampling allows no such class, with the one
-/// that changes the energy least; and if it allows none, or none that keeps nine tenths of it, not at all. A factor makes up for the rest, so that a body that this force stops
-/// loses the energy that it loses in FE.
+/// The body force of a case at the sampled times, in N; of a table without times its own force.
 pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
-    let time_s = case.curves.sampled.time_s();
     // A motion computed from a force adds nothing to the force itself.
     if case.moves_by_its_force() {
         return case.curves.sampled.force_n().to_vec();
     }
-    let mass = case.conditions.masses.effective_kg();
-    let speeds = &case.curves.closing_speed_m_per_s;
+    let mass_kg = case.conditions.masses.effective_kg();
+    body_force_of(&case.curves.sampled, &case.curves.closing_speed_m_per_s, mass_kg).0
+}
+
+/// The body force `−m dv/dt` of the closing speed `v` at the sampled times, in N, for the effective mass, and the class of
+/// its filter.
+///
+/// It is filtered with the lowest class that keeps the energy of the impact within 0.5 %; if the sampling allows no such class, with the one
+/// that changes the energy least; and if it allows none, or none that keeps nine tenths of it, not at all. A factor makes up for the rest, so that a body that this force stops
+/// loses the energy that it loses in FE.
+pub(super) fn body_force_of(sampled: &Curve, speeds: &[f64], mass: f64) -> (Vec<f64>, Option<u32>) {
+    let time_s = sampled.time_s();
     let accelerations = derivative(time_s, speeds);
     let raw: Vec<f64> = accelerations.into_iter().map(|a| -mass * a).collect();
-    let end = loading_end(&case.curves.sampled);
+    let end = loading_end(sampled);
     let lost_j = 0.5 * mass * (speeds[0] * speeds[0] - speeds[end] * speeds[end]);
     // The work over the energy that the body lost.
     let share = |force_n: &[f64]| {
-        let work_j = over_deflection(case, force_n.to_vec())?.pushing().work();
+        let work_j = over_deflection(sampled, force_n.to_vec())?.pushing().work();
         let share = work_j / lost_j;
         (share > 0.0 && share.is_finite()).then_some(share)
     };
     // The contact has not reached the body before the first state.
-    let from_rest = |mut force_n: Vec<f64>| {
+    let from_rest = |(mut force_n, class): (Vec<f64>, Option<u32>)| {
         force_n[0] = 0.0;
         let share = share(&force_n)?;
-        Some((force_n, share))
+        Some((force_n, share, class))
     };
-    let of_class = |&class: &u32| Some(cfc::filter(class, time_s, &raw).ok()?.values);
+    let of_class =
+        |&class: &u32| Some((cfc::filter(class, time_s, &raw).ok()?.values, Some(class)));
     let by_class = CLASSES.iter().filter_map(of_class).filter_map(from_rest);
-    let mut best: Option<(Vec<f64>, f64)> = None;
-    let changes = |of: &(Vec<f64>, f64)| (of.1 - 1.0).abs();
+    let mut best: Option<(Vec<f64>, f64, Option<u32>)> = None;
+    let changes = |of: &(Vec<f64>, f64, Option<u32>)| (of.1 - 1.0).abs();
     for next in by_class {
         if best.as_ref().is_none_or(|best| changes(&next) < changes(best)) {
             best = Some(next);
@@ -80,28 +85,27 @@ pub(crate) fn body_force_n(case: &Case) -> Vec<f64> {
     }
     // A crush too short for every class.
     if best.as_ref().is_none_or(|best| changes(best) > MADE_UP) {
-        let unfiltered = from_rest(raw.clone());
+        let unfiltered = from_rest((raw.clone(), None));
         best = unfiltered.filter(|of| best.is_none() || changes(of) <= MADE_UP).or(best);
     }
     match best {
-        Some((mut force_n, share)) => {
+        Some((mut force_n, share, class)) => {
             // Further off, mass, speeds and deflection contradict each other, which no factor mends.
             if (share - 1.0).abs() <= MADE_UP {
                 force_n.iter_mut().for_each(|f| *f /= share);
             }
-            force_n
+            (force_n, class)
         }
         None => {
             let mut force_n = filtered(time_s, raw);
             force_n[0] = 0.0;
-            force_n
+            (force_n, None)
         }
     }
 }
 
 /// Values at the sampled times over the deflection of the loading branch.
-fn over_deflection(case: &Case, values: Vec<f64>) -> Option<Envelope> {
-    let sampled = &case.curves.sampled;
+fn over_deflection(sampled: &Curve, values: Vec<f64>) -> Option<Envelope> {
     let curve =
         Curve::new(sampled.time_s().to_vec(), sampled.deflection_m().to_vec(), values).ok()?;
     Some(loading_branch(&curve).ok()?.envelope)
@@ -121,10 +125,10 @@ pub(crate) fn body_motion(case: &Case) -> Option<BodyMotion> {
         .map(|i| separation_m_per_s(sampled.time_s(), speeds, i));
     let force = match case.moves_by_its_force() {
         true => case.loading().ok()?.envelope,
-        false => over_deflection(case, force_n)?.pushing(),
+        false => over_deflection(sampled, force_n)?.pushing(),
     };
     Some(BodyMotion {
-        closing_speed: over_deflection(case, speeds.clone())?,
+        closing_speed: over_deflection(sampled, speeds.clone())?,
         force,
         rebound_speed_m_per_s: rebound.filter(|&v| v > 0.0),
     })

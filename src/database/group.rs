@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 
+use crate::curve::from_table::IMPORTED;
 use crate::curve::{Case, ForceKind, StoppedMass};
 use crate::dataset::TrainingSet;
 use crate::hdf5::AttrValue;
@@ -73,6 +74,10 @@ pub(super) fn stored_stopped_mass(
     let [residual_kg] = of(RESIDUAL)?[..] else { return None };
     let is_of_these = found.get(CASES)?.as_strings()?.iter().eq(cases.iter().map(|c| &c.id.name));
     let is_whole = deflection_m.len() == stopped_kg.len();
+    // Earlier programs took one from motions that were made of their force.
+    if cases.iter().any(|case| case.id.study == IMPORTED && case.moves_by_its_force()) {
+        return None;
+    }
     let stored = StoppedMass { deflection_m, stopped_kg, residual_kg };
     (is_of_these && is_whole && stored.is_known()).then_some(stored)
 }

@@ -26,7 +26,7 @@ pub enum Method {
     /// resistance, nor for rates.
     FourthOrder,
     /// Extrapolation with adaptive order and step: slow, for checks. Its extremes are those of its
-    /// steps and its contacts those of the outputs; it gives no restitution, and no energy of single interfaces.
+    /// steps and its contacts those of the outputs; it gives no restitution, and no energy of single interfaces in its summary.
     Reference,
 }
 

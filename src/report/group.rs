@@ -41,16 +41,13 @@ pub(super) fn add(
         )),
         Part::table(format!("Runs of {group}"), runs(cases)),
     ];
-    for (warning, names) in by_warning(cases) {
+    for (warning, names, is_one_text) in by_warning(cases) {
+        let named = names[..names.len().min(MOST_NAMED)].join(", ");
+        let more = if names.len() > MOST_NAMED { ", …" } else { "" };
+        let of_first = if is_one_text { "" } else { "; the numbers are those of the first" };
         let runs = match &names[..] {
             [one] => (*one).to_string(),
-            several if cases.len() > MOST_NAMED => {
-                let named = several[..several.len().min(MOST_NAMED)].join(", ");
-                let more = if several.len() > MOST_NAMED { ", …" } else { "" };
-                let count = several.len();
-                format!("{count} runs ({named}{more}; the numbers are those of the first)")
-            }
-            several => format!("{} runs ({})", several.len(), several.join(", ")),
+            several => format!("{} runs ({named}{more}{of_first})", several.len()),
         };
         content.warn(ToDo::CheckRuns, &format!("{title}, {runs}"), warning.into());
     }
@@ -89,17 +86,26 @@ pub(super) struct Design {
 /// Runs that are named one by one, and most warnings that differ in numbers alone.
 const MOST_NAMED: usize = 10;
 
-/// Each warning of the runs once, with the names of the runs that have it; of many runs, once for all numbers.
-fn by_warning(cases: &[Case]) -> Vec<(&str, Vec<&str>)> {
-    let mut all: Vec<(&str, Vec<&str>)> = Vec::new();
+/// Each warning of the runs once, with the names of the runs that have it, and whether these have one text: of many runs, once for
+/// all numbers.
+fn by_warning(cases: &[Case]) -> Vec<(&str, Vec<&str>, bool)> {
+    let mut all: Vec<(&str, Vec<&str>, bool)> = Vec::new();
     let words = |of: &str| of.replace(|c: char| c.is_ascii_digit() || c == '.', "");
     let are_many = cases.len() > MOST_NAMED;
-    let is_same = |a: &str, b: &str| a == b || are_many && words(a) == words(b);
     for case in cases {
+        let name = &*case.id.name;
         for warning in &case.quality.warnings {
-            match all.iter_mut().find(|(known, _)| is_same(known, warning)) {
-                Some((_, names)) => names.push(&case.id.name),
-                None => all.push((warning, vec![&case.id.name])),
+            // Two of one run are two.
+            let is_same = |(known, names, _): &&mut (&str, Vec<&str>, bool)| {
+                *known == warning
+                    || are_many && names.last() != Some(&name) && words(known) == words(warning)
+            };
+            match all.iter_mut().find(is_same) {
+                Some((known, names, is_one_text)) => {
+                    *is_one_text &= *known == warning;
+                    names.push(name);
+                }
+                None => all.push((warning, vec![name], true)),
             }
         }
     }

@@ -36,7 +36,7 @@ pub(super) struct Numbers {
     pub vehicles: Vec<(String, [Option<f64>; 5])>,
     /// By interface: largest crush in m and energy in J.
     pub interfaces: Vec<(String, [Option<f64>; 2])>,
-    /// Interfaces that were crushed beyond the data of their curves.
+    /// Interfaces that went beyond the data of their curves.
     pub beyond_data: Vec<String>,
 }
 
@@ -260,7 +260,7 @@ fn add_verdicts(
     let beyond: Vec<&str> = beyond.map(|of| of.name).collect();
     if !beyond.is_empty() {
         let text = format!(
-            "crushed beyond the data of its curve, where the force is an assumption: {}",
+            "beyond the data of its curve, where the force is an assumption: {}",
             beyond.join(", ")
         );
         content.verdict(Verdict { state: "unknown", about: name.into(), text });

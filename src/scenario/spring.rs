@@ -368,7 +368,7 @@ pub(super) fn crush_end(
     };
     let unloading = CurveUnloading::of(stiffness.map(of_end));
     let mut warnings = warnings(model, speed_m_per_s);
-    if model.has_body_force() && !model.knows_stopped_mass() {
+    if model.has_own_body_forces() && !model.knows_stopped_mass() {
         warnings.push(
             "its runs agree on no stopped mass, so the contact force moves the whole vehicle: a vehicle of one mass, which the body force moves, follows these runs more closely".into(),
         );

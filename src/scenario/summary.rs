@@ -137,7 +137,7 @@ pub(crate) struct Limits<'a> {
     pub(crate) unknown: Vec<&'a str>,
     /// Limits on what occupants meet.
     pub(crate) occupants: Vec<OccupantLimit<'a>>,
-    /// Interfaces that were crushed beyond the data of their curves: then nothing here is a verdict.
+    /// Interfaces that went beyond the data of their curves: then nothing here is a verdict.
     pub(crate) beyond_data: Vec<&'a str>,
     pub(crate) statement: String,
 }

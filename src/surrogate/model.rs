@@ -293,6 +293,12 @@ impl Model {
         }
     }
 
+    /// Whether the body forces of its runs are others than the declared ones: those of curves without times are not.
+    pub(crate) fn has_own_body_forces(&self) -> bool {
+        let Curves { declared, body, .. } = &self.curves;
+        declared.iter().zip(body).any(|(declared, body)| declared != body)
+    }
+
     /// Whether declared force and body force are two.
     pub fn has_body_force(&self) -> bool {
         self.fitted_body.is_some()

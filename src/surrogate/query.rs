@@ -88,7 +88,7 @@ impl<'a> ResolvedQuery<'a> {
         if !query.extrapolate && is_far_outside(v, low, high) {
             return Err(error!(
                 Prediction,
-                "{outside}: more than a third of the range outside, where the error of a curve is unknown: run FE near this speed, or predict it anyway with --extrapolate (in Python extrapolate=True)",
+                "{outside}: more than a third of the range outside, where the error of a curve is unknown: run FE near this speed, or predict it anyway with --extrapolate of crumple predict or export (in Python extrapolate=True)",
                 outside = outside_of(v, low, high)
             ));
         }

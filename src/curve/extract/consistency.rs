@@ -9,7 +9,7 @@ use crate::curve::contact::milliseconds;
 use crate::curve::energy::{IMPOSSIBLE_ALONG_TIME, ImpossibleRun, POSSIBLE};
 use crate::curve::{Curve, Masses, body, loading};
 use crate::history::History;
-use crate::signal::{cfc, interpolate};
+use crate::signal::{cfc, derivative, interpolate};
 use crate::unit::Shown;
 
 /// Impulse and lost momentum of clean FE runs differ by 1 to 4 % of the impact's momentum at any
@@ -367,24 +367,41 @@ pub(super) fn sampling(original: &Curve, sampled: &Curve) -> Notes {
 }
 
 /// Whether the motion, whose states are at `own_s` from contact on, is written often enough beside a force with more
-/// states: by the force that lies between them, without what the filter of the body force takes anyway.
-pub(super) fn coarse_motion(original: &Curve, own_s: &[f64]) -> Option<String> {
-    let (end, time_s) = (loading::loading_end(original), original.time_s());
-    let until_s = time_s[end];
-    let inner = own_s.iter().copied().filter(|&t| t > 0.0 && t < until_s);
-    let times: Vec<f64> = std::iter::once(0.0).chain(inner).chain([until_s]).collect();
-    let states = times.len() - 1;
+/// states: by the body force that this force would give, with the velocities known at these times alone.
+pub(super) fn coarse_motion(
+    original: &Curve,
+    (sampled, closing_m_per_s): (&Curve, &[f64]),
+    masses: Masses,
+    own_s: &[f64],
+) -> Option<String> {
+    let (at, times) = (original.time_s(), sampled.time_s());
+    let (end, last_s) = (loading::loading_end(original), times[times.len() - 1]);
+    let inner = |until_s: f64| own_s.iter().copied().filter(move |&t| t > 0.0 && t < until_s);
+    let states = inner(at[end]).count() + 1;
     if states >= STATES || states >= end {
         return None;
     }
-    let force_n = body::filtered(time_s, original.force_n().to_vec());
-    let curve = Curve::new(time_s.to_vec(), original.deflection_m().to_vec(), force_n).ok()?;
-    let off = off_at(&curve, &times).filter(|off| *off > SAMPLED_OFF)?;
-    Some(format!(
-        "sampling: the motion has {states} states up to the maximum crush, one every {:.3} ms, and the force {end}; what the force does between them, {:.1} % of its mean, is missing in the body force: write the nodes' histories at shorter intervals",
-        1e3 * until_s / states as f64,
-        off * 100.0
-    ))
+    let impulse = integral(at, original.force_n());
+    let known_s: Vec<f64> = std::iter::once(0.0).chain(inner(last_s)).chain([last_s]).collect();
+    let whole = interpolate(at, &impulse, times).ok()?;
+    let known = interpolate(at, &impulse, &known_s).ok()?;
+    let known = interpolate(&known_s, &known, times).ok()?;
+    let (_, class) = body::body_force_of(sampled, closing_m_per_s, masses.effective_kg());
+    let force = |impulse: &[f64]| {
+        let raw = derivative(times, impulse);
+        class.map_or(Some(raw.clone()), |class| Some(cfc::filter(class, times, &raw).ok()?.values))
+    };
+    let (whole, known) = (force(&whole)?, force(&known)?);
+    let loading = 0..=loading::loading_end(sampled);
+    let sum = |of: &dyn Fn(usize) -> f64| loading.clone().map(|i| of(i).abs()).sum::<f64>();
+    let off = sum(&|i| known[i] - whole[i]) / sum(&|i| whole[i]);
+    (off > SAMPLED_OFF).then(|| {
+        format!(
+            "sampling: the motion has {states} states up to the maximum crush, one every {:.3} ms, and the force {end}: without what lies between them the body force is off by about {:.1} % of its mean; write the nodes' histories at shorter intervals",
+            1e3 * at[end] / states as f64,
+            off * 100.0
+        )
+    })
 }
 
 /// Difference of a curve and of its states at other times, joined by lines, over the loading

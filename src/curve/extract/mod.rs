@@ -127,7 +127,12 @@ pub(crate) fn curve_of(
     remarks.append(consistency::sampling(&original, &sampled));
     if let Some(time_s) = &record.motion_time_s {
         let from_contact: Vec<f64> = time_s.iter().map(|t| t - contact_s).collect();
-        remarks.warnings.extend(consistency::coarse_motion(&original, &from_contact));
+        remarks.warnings.extend(consistency::coarse_motion(
+            &original,
+            (&sampled, &closing_speed_m_per_s),
+            setup.masses,
+            &from_contact,
+        ));
     }
     remarks.append(audited(&original, record.force_kind, balance));
     Ok(Extracted {

@@ -32,7 +32,7 @@ pub(crate) struct Record {
     pub force_n: Vec<f64>,
     /// Rate of the first state of the motion, before any cut.
     pub first_rate_m_per_s: f64,
-    /// Of a motion with fewer states than the force: their times.
+    /// Of a motion at other times than the force: its own ones.
     pub motion_time_s: Option<Vec<f64>>,
     /// If the force begins after the motion: how far the bodies have moved until then since they had that rate.
     pub slowed_over_m: Option<f64>,
@@ -168,8 +168,7 @@ impl Record {
         let is_slower = record.rate_m_per_s[0].abs() < record.first_rate_m_per_s.abs();
         record.slowed_over_m =
             free_m.filter(|_| is_slower).map(|free_m| (record.deflection_m[0] - free_m).abs());
-        let own_s = std::mem::replace(&mut record.time_s, time_s);
-        record.motion_time_s = (own_s.len() < record.time_s.len()).then_some(own_s);
+        record.motion_time_s = Some(std::mem::replace(&mut record.time_s, time_s));
         record.force_n = force_n;
         Ok((record, remarks))
     }

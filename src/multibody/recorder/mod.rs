@@ -323,3 +323,27 @@ impl Extremes {
         };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_restitution_of_what_is_crushed_further_is_not_known() {
+        let mut extremes = Extremes::default();
+        let restitution = |extremes: &Extremes| {
+            let mut history = InterfaceHistory::default();
+            extremes.clone().close(&mut history);
+            history.restitution
+        };
+        extremes.contact_began(0.0, 5.0);
+        extremes.turned(0.1, 0.01);
+        extremes.released(1.0);
+        assert_eq!(restitution(&extremes), Some(0.2));
+        // It only touches again, or is crushed anew.
+        extremes.turned(0.1005, 0.2);
+        assert_eq!(restitution(&extremes), Some(0.2));
+        extremes.turned(0.3, 0.4);
+        assert_eq!(restitution(&extremes), None);
+    }
+}

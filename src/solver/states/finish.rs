@@ -16,7 +16,6 @@ impl StateReader<'_> {
         match (pending.time, self.missing(&pending, at_end)) {
             (Some(time), None) if self.skip > 0 => {
                 self.skip -= 1;
-                self.left_out += 1;
                 let message = format!(
                     "the state at time {time:?} has other entities than the states below it; it is left out"
                 );
@@ -30,13 +29,11 @@ impl StateReader<'_> {
             (time, missing) => {
                 self.disagreeing += usize::from(pending.disagrees);
                 let missing = missing.unwrap_or_else(|| "its time is missing".into());
-                let at = time.map_or(String::new(), |t| format!(" at time {t:?}"));
                 let states = self.time.len();
-                self.left_out += 1;
-                let message = format!(
-                    "state {}{at} is not complete and is left out: {missing}",
-                    states + self.left_out
-                );
+                // Counted by those that are kept it would have the number of the next one.
+                let which =
+                    time.map_or("a state".into(), |time| format!("the state at time {time:?}"));
+                let message = format!("{which} is not complete and is left out: {missing}");
                 self.problems.add(ProblemCode::IncompleteState, Some(pending.place), message);
                 // Labels that only dropped states had must not become components.
                 self.scalars.retain(|s| s.absent < states);

@@ -61,8 +61,6 @@ pub(crate) struct StateReader<'a> {
     sealed: bool,
     /// Whole states to leave out before the first that is kept.
     pub skip: usize,
-    /// States left out so far.
-    left_out: usize,
     /// States left out because their rows are not those of the first complete state.
     disagreeing: usize,
     /// Whether a state without rows is complete.
@@ -132,7 +130,6 @@ impl<'a> StateReader<'a> {
             pending: None,
             sealed: false,
             skip: 0,
-            left_out: 0,
             disagreeing: 0,
             allow_empty_states: false,
             present_cells: 0,
