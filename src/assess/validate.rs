@@ -229,6 +229,8 @@ pub(crate) fn validate_speeds(
         left_out_cases(&set, most_speeds).unwrap_or_else(|too_few| (Vec::new(), vec![too_few]));
     if set.cases.len() > most_speeds {
         fitting = fitting.into_iter().map(ModelKind::judged).collect();
+    }
+    if set.cases.len() > most_speeds && !left_out.is_empty() {
         notes.push(format!(
             "{most_speeds} of {} cases, spread over the range, are left out in turn, and forests judged with at most 50 trees and 8 000 rows: crumple validate --thorough leaves out every speed",
             set.cases.len()
