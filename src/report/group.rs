@@ -83,7 +83,7 @@ pub(super) struct Design {
     pub curve: PredictedCurve,
 }
 
-/// Runs that are named one by one, and most warnings that differ in numbers alone.
+/// Runs with a warning that are named. In groups of more runs warnings that differ in numbers alone are one.
 const MOST_NAMED: usize = 10;
 
 /// Each warning of the runs once, with the names of the runs that have it, and whether these have one text: of many runs, once for
@@ -103,7 +103,9 @@ fn by_warning(cases: &[Case]) -> Vec<(&str, Vec<&str>, bool)> {
             match all.iter_mut().find(is_same) {
                 Some((known, names, is_one_text)) => {
                     *is_one_text &= *known == warning;
-                    names.push(name);
+                    if names.last() != Some(&name) {
+                        names.push(name);
+                    }
                 }
                 None => all.push((warning, vec![name], true)),
             }
