@@ -760,8 +760,8 @@ fn a_table_without_times_is_exported_as_it_is() {
     }
 }
 
-/// A motion that was made of its own force holds no momentum to take a stopped mass from, and is no run of FE to be
-/// compared with: forces 4 % too large would be 4 t that came to rest.
+/// A motion that was made of its own force holds no momentum to take a stopped mass from, and is not a run of FE to
+/// compare with: forces 4 % too large would be tonnes that came to rest.
 #[test]
 fn curves_without_times_have_no_stopped_mass() {
     let folder = tempfile::tempdir().unwrap();

@@ -682,7 +682,7 @@ fn a_vehicle_that_is_still_to_be_hit_is_not_judged() {
     }
 }
 
-/// A second contact that may become the larger one is no verdict, before and while it acts.
+/// A second contact that may become the larger one leaves the verdict open, before and while it acts.
 #[test]
 fn a_vehicle_that_is_being_hit_again_is_not_judged() {
     let laws = "nose = { stages = [ { stroke = \"3m\", from = \"0N\", to = \"15MN\" } ], law = \"elastic\" }\n\

@@ -64,7 +64,7 @@ fn names(cases: &[Case]) -> Vec<String> {
     (0..cases.len()).map(name).collect()
 }
 
-/// Curves of one group that a picture has; more cannot be told apart.
+/// Curves of one group that a picture has; more cannot be distinguished.
 const MOST_CURVES: usize = 20;
 
 /// Force over deflection of the runs of a group, loading and unloading: of many, some spread over their speeds.

@@ -31,8 +31,8 @@ use super::{CommandResult, GlobalOptions, Outcome, usage};
   crumple compare --train train-set.toml
 Rows: fe is FE's own contact force in the one-mass model, the floor for predictions of that force;
 fe_body is derived from FE's own speeds, unfiltered, and checks that curve, force law and run agree;
-fdrm is FE's curve at one other speed; nsdm is the spring and damper fitted to that run; ddtcm is the
-reference method's random forest and spline; best is the model chosen by leaving speeds out,
+fdrm is FE's curve at one other speed; nsdm is the spring and damper fitted to that run; ddtcm is
+the reference method's random forest and spline; best is the model chosen by leaving speeds out,
 without this one, driven by its body force. Errors are sum|p-r|/sum|r| from contact to 30 ms after
 FE's maximum crush; accelerations are filtered with CFC 60, unfiltered in brackets. --json has
 every measure, with --speed as a document, else in its list comparisons; those of velocity and
