@@ -165,6 +165,11 @@ pub(crate) fn time_gaps(time: &[f64]) -> Vec<TimeGap> {
     for (k, &(state, from, to)) in intervals.iter().enumerate() {
         let before = &intervals[k.saturating_sub(GAP_SIDE)..k];
         let behind = &intervals[k + 1..intervals.len().min(k + 1 + GAP_SIDE)];
+        // No median is below the smallest, which is cheap to find.
+        let shortest = before.iter().map(|(_, from, to)| to - from).reduce(f64::min);
+        if shortest.is_some_and(|shortest| (to - from) / shortest <= GAP_RATIO) {
+            continue;
+        }
         let interval = upper_median(before).max(upper_median(behind));
         let ratio = (to - from) / interval;
         if before.len() + behind.len() >= GAP_KNOWN && ratio > GAP_RATIO {

@@ -253,5 +253,8 @@ fn write_csv(out: &mut dyn Write, file: &SolverFile) -> io::Result<()> {
     let mut columns = vec![("time".to_string(), &*file.time)];
     columns.extend(file.histories.iter().map(|history| (history.label(), &*history.values)));
     let mut digits = zmij::Buffer::new();
-    output::csv(out, &columns, |out, number| out.write_all(digits.format(number).as_bytes()))
+    output::csv(out, &columns, |line, number| {
+        line.extend_from_slice(digits.format(number).as_bytes());
+        Ok(())
+    })
 }

@@ -229,20 +229,22 @@ fn table_within(out: &mut dyn Write, width: usize, table: &Table) -> io::Result<
 pub(super) fn csv(
     out: &mut dyn Write,
     columns: &[(String, &[f64])],
-    mut number: impl FnMut(&mut dyn Write, f64) -> io::Result<()>,
+    mut number: impl FnMut(&mut Vec<u8>, f64) -> io::Result<()>,
 ) -> io::Result<()> {
     let mut heading = csv::Writer::from_writer(&mut *out);
     heading.write_record(columns.iter().map(|(name, _)| name))?;
     heading.flush()?;
     drop(heading);
+    let mut line = Vec::new();
     for row in 0..columns.first().map_or(0, |(_, values)| values.len()) {
-        for (k, (_, values)) in columns.iter().enumerate() {
-            if k > 0 {
-                out.write_all(b",")?;
-            }
-            number(out, values[row])?;
+        line.clear();
+        for (_, values) in columns {
+            number(&mut line, values[row])?;
+            line.push(b',');
         }
-        writeln!(out)?;
+        line.pop();
+        line.push(b'\n');
+        out.write_all(&line)?;
     }
     Ok(())
 }

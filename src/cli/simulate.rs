@@ -123,7 +123,7 @@ fn further_columns<'a>(prepared: &Prepared, run: &'a Run) -> Vec<(String, &'a [f
 }
 
 fn write_csv(out: &mut dyn Write, columns: &[(String, &[f64])]) -> io::Result<()> {
-    output::csv(out, columns, |out, number| write!(out, "{number:?}"))
+    output::csv(out, columns, |line, number| write!(line, "{number:?}"))
 }
 
 /// A crush that is largest that close to the end of the run may still grow.

@@ -216,13 +216,14 @@ impl BufRead for Stream<'_> {
 pub(crate) struct Window<'a> {
     source: &'a dyn Source,
     buffer: Vec<u8>,
-    /// Range of the source that the buffer holds.
+    /// The first byte of the source that the buffer holds, and how many of them.
     start: u64,
+    held: usize,
 }
 
 impl<'a> Window<'a> {
     pub(crate) fn new(source: &'a dyn Source) -> Self {
-        Self { source, buffer: Vec::new(), start: 0 }
+        Self { source, buffer: Vec::new(), start: 0, held: 0 }
     }
 
     /// `length` bytes from `offset`, or `None` if the source ends before. Up to `ahead`
@@ -238,25 +239,22 @@ impl<'a> Window<'a> {
             let end = from.saturating_add(length);
             return Ok(bytes.get(from..end));
         }
-        let held = self.start..self.start + self.buffer.len() as u64;
+        let held = self.start..self.start + self.held as u64;
         if offset < held.start || offset + length as u64 > held.end {
             // What is held and wanted again moves to the front; the rest is read.
-            let keep = held.contains(&offset).then(|| (offset - held.start) as usize);
-            let kept = match keep {
-                Some(from) => {
-                    self.buffer.drain(..from);
-                    self.buffer.len()
-                }
-                None => 0,
-            };
-            self.buffer.resize(length + ahead, 0);
-            let read = fill_at(self.source, offset + kept as u64, &mut self.buffer[kept..]);
-            self.start = offset;
-            self.buffer.truncate(kept + *read.as_ref().unwrap_or(&0));
-            read?;
+            let first =
+                if held.contains(&offset) { (offset - held.start) as usize } else { self.held };
+            self.buffer.copy_within(first..self.held, 0);
+            let kept = self.held - first;
+            (self.start, self.held) = (offset, kept);
+            if self.buffer.len() < length + ahead {
+                self.buffer.resize(length + ahead, 0);
+            }
+            let rest = &mut self.buffer[kept..length + ahead];
+            self.held += fill_at(self.source, offset + kept as u64, rest)?;
         }
         let from = (offset - self.start) as usize;
-        Ok(self.buffer.get(from..from + length))
+        Ok(self.buffer[..self.held].get(from..from + length))
     }
 }
 

@@ -212,9 +212,16 @@ fn correlations<const N: usize>(distances: [f64; N]) -> [f64; N] {
 
 /// Logarithms of the scales with the largest marginal likelihood of all that are a step apart; the steps shrink.
 fn scales(at: &[[f64; 2]], centred_n: &[f64]) -> [f64; 3] {
-    let cost = |scales: [f64; 3]| match solved(at, centred_n, scales.map(libm::exp)) {
-        Some((cost, _)) => cost,
-        None => f64::INFINITY,
+    // A step back is where it came from.
+    let mut known: Vec<([f64; 3], f64)> = Vec::new();
+    let mut cost = |scales: [f64; 3]| {
+        if let Some((_, cost)) = known.iter().find(|(before, _)| *before == scales) {
+            return *cost;
+        }
+        let solved = solved(at, centred_n, scales.map(libm::exp));
+        let cost = solved.map_or(f64::INFINITY, |(cost, _)| cost);
+        known.push((scales, cost));
+        cost
     };
     let mut best = SCALES.map(|[_, first, _]| first);
     let mut least = cost(best);

@@ -76,6 +76,8 @@ struct Row {
 /// One state's bytes and their meaning.
 pub(crate) struct Layout {
     expected: Vec<u8>,
+    /// Per byte how it may differ, unless the state is long.
+    free: Vec<u8>,
     classes: Vec<Class>,
     rows: Vec<Row>,
     /// Indices of the values in the output, field by field.
@@ -96,6 +98,15 @@ pub(crate) struct Plan {
     /// Whether the wanted values are stored, and whether other fields are parsed as well.
     stores: bool,
     audit: bool,
+    /// The fields that are read once all bytes conform, where few lines are wanted.
+    looks: Option<Vec<Look>>,
+}
+
+/// A field of the line that begins at a byte of the state, and the index of its value.
+struct Look {
+    at: usize,
+    field: Field,
+    out: u32,
 }
 
 /// Time and cycle of a state.
@@ -116,6 +127,7 @@ impl Layout {
         let mut zones = zones.into_iter().peekable();
         let mut layout = Self {
             expected: bytes,
+            free: Vec::new(),
             classes: Vec::new(),
             rows: Vec::new(),
             outs: Vec::new(),
@@ -153,6 +165,9 @@ impl Layout {
             }
             if !is_wanted {
                 layout.outs.truncate(values);
+            }
+            if layout.expected.len() <= DENSE_READ {
+                layout.free.extend(&class.free);
             }
             class.is_of_e12 = !class.fields.is_empty()
                 && class.fields.iter().all(|f| f.kind == Kind::E12 && f.to - f.from <= 12)
@@ -210,18 +225,38 @@ impl Layout {
 
     /// Reads all lines. `audit`: parse the fields that are not wanted as well.
     pub(crate) fn all(&self, audit: bool) -> Plan {
-        Plan { reads: self.reads(0..self.rows.len()), is_dense: true, stores: true, audit }
+        self.plan(self.reads(0..self.rows.len()), (true, true, audit))
     }
 
     /// Verifies all lines.
     pub(crate) fn check(&self) -> Plan {
-        Plan { stores: false, ..self.all(true) }
+        self.plan(self.reads(0..self.rows.len()), (true, false, true))
     }
 
     /// Reads only the lines up to the time.
     pub(crate) fn head(&self) -> Plan {
         let is_dense = self.period() < DENSE_READ as u64 / 16;
-        Plan { reads: self.reads(0..self.head), is_dense, stores: false, audit: false }
+        self.plan(self.reads(0..self.head), (is_dense, false, false))
+    }
+
+    fn plan(
+        &self,
+        reads: Vec<Range<usize>>,
+        (is_dense, stores, audit): (bool, bool, bool),
+    ) -> Plan {
+        let stored = self.rows.iter().filter(|row| stores && row.values != NOWHERE).count();
+        let is_sweep = !self.free.is_empty() && 2 * stored < self.rows.len();
+        let looks = self.rows.iter().flat_map(|row| {
+            let (at, class) = (row.at as usize, &self.classes[row.class as usize]);
+            self.fields(row, class).map(move |(&field, out)| Look { at, field, out })
+        });
+        let is_read = |look: &Look| match look.field.kind {
+            Kind::Time | Kind::Cycle | Kind::Unread | Kind::Integer => true,
+            Kind::Real => audit || (stores && look.out != NOWHERE),
+            Kind::E12 | Kind::E11 => stores && look.out != NOWHERE,
+        };
+        let looks = is_sweep.then(|| looks.filter(is_read).collect());
+        Plan { reads, is_dense, stores, audit, looks }
     }
 
     /// Reads the wanted lines and those that are not rows, and the first and last of the rows between them,
@@ -238,7 +273,7 @@ impl Layout {
         let pages: usize = reads.iter().map(|read| self.bytes(read).len() + PAGE).sum();
         match 2 * pages > self.expected.len() {
             true => self.all(false),
-            false => Plan { reads, is_dense: false, stores: true, audit: false },
+            false => self.plan(reads, (false, true, false)),
         }
     }
 
@@ -296,7 +331,7 @@ impl Layout {
                 return Ok(None);
             }
         }
-        Ok(found.time.map(|(time, _)| (time, found.cycle)))
+        Ok(found.time.map(|time| (time, found.cycle)))
     }
 
     fn read(
@@ -308,6 +343,16 @@ impl Layout {
         out: &mut [f64],
     ) -> Option<()> {
         let start = self.from(lines.start);
+        if let Some(looks) = &plan.looks
+            && let whole = self.bytes(&lines)
+            && conforms(bytes, self.expected.get(whole.clone())?, self.free.get(whole.clone())?)
+        {
+            let first = looks.partition_point(|look| look.at < whole.start);
+            for look in looks[first..].iter().take_while(|look| look.at < whole.end) {
+                look.field.read(bytes.get(look.at - start..)?, look.out, plan, found, out)?;
+            }
+            return Some(());
+        }
         for row in &self.rows[lines] {
             let class = self.classes.get(row.class as usize)?;
             let (at, width) = (row.at as usize, class.free.len());
@@ -320,27 +365,26 @@ impl Layout {
             if !conforms(line, expected, &class.free) && !class.holds_numbers(line, expected) {
                 return None;
             }
-            let outs = outs.iter().copied().chain(std::iter::repeat(NOWHERE));
-            for (field, index) in class.fields.iter().zip(outs) {
-                match field.kind {
-                    Kind::Time | Kind::Cycle | Kind::Unread => found.note(field, line)?,
-                    _ if index != NOWHERE && plan.stores => {
-                        *out.get_mut(index as usize)? = field.number(line)?
-                    }
-                    Kind::Integer => field.is_integer(line).then_some(())?,
-                    Kind::Real if plan.audit => drop(field.number(line)?),
-                    _ => {}
-                }
+            for (field, index) in self.fields(row, class) {
+                field.read(line, index, plan, found, out)?;
             }
         }
         Some(())
+    }
+
+    /// The fields of a line with the indices of their values.
+    fn fields<'a>(&'a self, row: &Row, class: &'a Class) -> impl Iterator<Item = (&'a Field, u32)> {
+        let outs = self.outs.get(row.values as usize..).unwrap_or_default();
+        class.fields.iter().zip(outs.iter().copied().chain(std::iter::repeat(NOWHERE)))
     }
 }
 
 /// Time and cycle of a state, as far as it is read, with the printed time.
 #[derive(Default)]
 struct State {
-    time: Option<(f64, [u8; MAX_TIME])>,
+    time: Option<f64>,
+    printed: [u8; MAX_TIME],
+    columns: usize,
     cycle: Option<i64>,
 }
 
@@ -352,22 +396,25 @@ impl State {
     fn note(&mut self, field: &Field, line: &[u8]) -> Option<()> {
         let text = field.text(line);
         match field.kind {
+            Kind::Time if self.time.is_some() => {
+                (self.printed.get(..self.columns)? == text).then_some(())
+            }
             Kind::Time => {
-                let mut printed = [0; MAX_TIME];
-                printed.get_mut(..text.len())?.copy_from_slice(text);
-                match &self.time {
-                    Some((_, above)) => (*above == printed).then_some(()),
-                    None => {
-                        self.time = Some((real(text).number()?, printed));
-                        Some(())
-                    }
-                }
+                self.printed.get_mut(..text.len())?.copy_from_slice(text);
+                self.columns = text.len();
+                let quick = line.get(..field.to).and_then(|line| line.last_chunk::<12>());
+                let quick = quick.filter(|_| text.len() == 11).filter(|chunk| chunk[0] == b' ');
+                self.time = Some(quick.and_then(e12::parse).or_else(|| real(text).number())?);
+                Some(())
             }
             Kind::Cycle => {
                 let cycle = integer(text)?;
                 (*self.cycle.get_or_insert(cycle) == cycle).then_some(())
             }
-            _ => text.iter().all(|b| b.is_ascii_alphanumeric() || *b == b' ').then_some(()),
+            _ => {
+                let is_word = |b: &u8| b.is_ascii_alphanumeric() | (*b == b' ');
+                text.iter().fold(true, |words, b| words & is_word(b)).then_some(())
+            }
         }
     }
 }
@@ -377,41 +424,39 @@ const WIDE: usize = 16;
 
 /// Whether every byte differs from the expected one only as it may.
 fn conforms(line: &[u8], expected: &[u8], free: &[u8]) -> bool {
-    let mut found = false;
-    let mut from = 0;
-    while let (Some(line), Some(expected), Some(free)) = (
-        line.get(from..).and_then(|rest| rest.first_chunk::<WIDE>()),
-        expected.get(from..).and_then(|rest| rest.first_chunk::<WIDE>()),
-        free.get(from..).and_then(|rest| rest.first_chunk::<WIDE>()),
-    ) {
-        found |= differs(line, expected, free);
-        from += WIDE;
-    }
+    let mut differs = [0; WIDE];
+    let (lines, rest) = line.as_chunks();
+    let chunks = lines.iter().zip(expected.as_chunks().0).zip(free.as_chunks().0);
+    chunks.for_each(|((line, expected), free)| compare(&mut differs, line, expected, free));
     // The rest with what is above it, so that it is as wide.
-    let last =
-        (line.last_chunk::<WIDE>(), expected.last_chunk::<WIDE>(), free.last_chunk::<WIDE>());
-    match last {
-        _ if from == line.len() => {}
-        (Some(line), Some(expected), Some(free)) => found |= differs(line, expected, free),
+    match (line.last_chunk(), expected.last_chunk(), free.last_chunk()) {
+        _ if rest.is_empty() => {}
+        (Some(line), Some(expected), Some(free)) => compare(&mut differs, line, expected, free),
         _ => {
             for k in 0..line.len() {
-                found |= differs(&[line[k]], &[expected[k]], &[free[k]]);
+                let mut byte = [0];
+                compare(&mut byte, &[line[k]], &[expected[k]], &[free[k]]);
+                differs[k] |= byte[0];
             }
         }
     }
-    !found
+    differs == [0; WIDE]
 }
 
+/// Notes the bytes that differ in another way than they may.
 #[inline(always)]
-fn differs<const N: usize>(line: &[u8; N], expected: &[u8; N], free: &[u8; N]) -> bool {
-    let mut found = 0;
+fn compare<const N: usize>(
+    differs: &mut [u8; N],
+    line: &[u8; N],
+    expected: &[u8; N],
+    free: &[u8; N],
+) {
     for k in 0..N {
         let difference = line[k] ^ expected[k];
         let is_digit = (free[k] == DIGIT) & (difference < 10);
         let is_free = is_digit | (difference == SAME) | (difference == free[k]) | (free[k] == ANY);
-        found |= u8::from(!is_free);
+        differs[k] |= u8::from(!is_free);
     }
-    found != 0
 }
 
 impl Class {
@@ -425,7 +470,9 @@ impl Class {
         let mut from = 0;
         for (field, &index) in self.fields.iter().zip(outs) {
             let start = field.to - 12;
-            let between = from..start;
+            // With the beginning of the first number, so that it is as wide as a comparison.
+            let between =
+                from..if from == 0 && line.len() >= WIDE { start.max(WIDE) } else { start };
             from = field.to;
             if !between.is_empty()
                 && !conforms(
@@ -519,6 +566,28 @@ impl Field {
         }
         free_digits(&mut line[start..to], &mut free[start..to]);
         Some(Self { from, to, kind, is_fixed })
+    }
+
+    /// Reads the field of a line that conforms, a value into its place; `None` if it does not hold one.
+    #[inline(always)]
+    fn read(
+        &self,
+        line: &[u8],
+        out: u32,
+        plan: &Plan,
+        found: &mut State,
+        values: &mut [f64],
+    ) -> Option<()> {
+        match self.kind {
+            Kind::Time | Kind::Cycle | Kind::Unread => found.note(self, line)?,
+            _ if out != NOWHERE && plan.stores => {
+                *values.get_mut(out as usize)? = self.number(line)?
+            }
+            Kind::Integer => self.is_integer(line).then_some(())?,
+            Kind::Real if plan.audit => drop(self.number(line)?),
+            _ => {}
+        }
+        Some(())
     }
 
     fn text<'a>(&self, line: &'a [u8]) -> &'a [u8] {
@@ -625,6 +694,9 @@ mod tests {
             let (mut window, mut out) = (Window::new(&source), [0.0; 3]);
             let size = source.len() as u64;
             let found = layout.state(&mut window, (0, size), &layout.all(false), &mut out).unwrap();
+            // All bytes at once, as where no value of most lines is wanted.
+            let checked = layout.state(&mut window, (0, size), &layout.check(), &mut []).unwrap();
+            assert_eq!(checked, found, "{text}");
             found.map(|(time, _)| (time, out))
         };
         assert_eq!(read(shown), Some((1.0, [0.25, 3.0, 7.0])));
