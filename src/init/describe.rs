@@ -540,6 +540,12 @@ fn taken(kept: f64) -> String {
 fn doubts_of_speed(record: &Record, impact: &Impact) -> Vec<String> {
     let (run, first) = (&record.run, record.closing(impact.state.0));
     let mut notes = Vec::new();
+    if record.starts_in_contact() {
+        notes.push(
+            "the record starts in contact, so the speed of its first state is not that of the impact: write that one, or provide the earlier states"
+                .into(),
+        );
+    }
     if let Some(named) = speed_in(&run.name)
         && !is_near(named, impact.speed_m_per_s, SAME_SPEED)
     {

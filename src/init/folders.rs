@@ -7,11 +7,13 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::Serialize;
 
+use super::sources::{ENERGIES, FORCES, MOTION};
 use crate::error::{Error, error};
 use crate::file::folder_of;
 use crate::guess;
 use crate::solver::decks::{self, Search};
-use crate::solver::runs::{renamed_file, run_folders};
+use crate::solver::runs::{renamed_files, run_folders};
+use crate::solver::without_job_id;
 use crate::study::files::shown_name;
 use crate::unit::M_PER_S_PER_MPH;
 
@@ -118,14 +120,54 @@ fn is_there_instead(missing: &Path) -> Option<PathBuf> {
 /// Why a folder holds no run.
 fn without_files(folder: &Path) -> Reason {
     let is_empty = folder.read_dir().is_ok_and(|mut entries| entries.next().is_none());
-    if let Some((file, format)) = renamed_file(folder) {
-        return Reason::Renamed { file: shown_name(&file), format: format.into() };
+    let renamed = renamed_files(folder);
+    if !renamed.is_empty() {
+        let files = renamed.iter().map(|(file, format)| (shown_name(file), (*format).into()));
+        return Reason::Renamed { files: files.collect() };
     }
     match decks::find(folder) {
         _ if is_empty => Reason::Empty,
         Ok(Search::One(_) | Search::Several(_)) => Reason::OnlyDeck,
         Ok(Search::None) | Err(_) => Reason::NoSolverFiles,
     }
+}
+
+/// Ends of the names of packed files, and of those that hold pictures, tables and the like.
+const PACKED: [&str; 7] = [".gz", ".bz2", ".xz", ".zst", ".zip", ".7z", ".z"];
+const OTHERS: [&str; 10] =
+    [".png", ".jpg", ".svg", ".pdf", ".csv", ".h5", ".html", ".toml", ".json", ".py"];
+
+/// Files that are not read and may hold what a run lacks: those of a restart, such as `nodout01`, and those with nearly the
+/// name of a file that is not there, such as `rwforc.gz` and `RWFORC`; each with what to do.
+pub(super) fn unread_beside(folder: &Path) -> Vec<String> {
+    let entries = folder.read_dir().into_iter().flatten().filter_map(Result::ok);
+    let mut names: Vec<String> = entries.map(|entry| shown_name(&entry.path())).collect();
+    names.sort();
+    let mut found = Vec::new();
+    for kind in [MOTION].into_iter().chain(FORCES).chain(ENERGIES) {
+        let is_there = names.iter().any(|name| without_job_id(name) == kind);
+        for name in &names {
+            let lower = name.to_lowercase();
+            let rest = without_job_id(name).strip_prefix(kind);
+            let is_of_restart = is_there
+                && rest.is_some_and(|rest| {
+                    !rest.is_empty() && rest.bytes().all(|b| b.is_ascii_digit())
+                });
+            let is_nearly_so = !is_there
+                && lower.contains(kind)
+                && !OTHERS.iter().any(|end| lower.ends_with(end));
+            let what = match PACKED.iter().any(|end| lower.ends_with(end)) {
+                _ if is_of_restart => {
+                    "it is named like the file of a restart: append its states to the first file to have them read".into()
+                }
+                _ if !is_nearly_so => continue,
+                true => format!("if it is the {kind}, unpack it and name it {kind}"),
+                false => format!("if it is the {kind}, rename it accordingly"),
+            };
+            found.push(format!("{}: {what}", folder.join(name).display()));
+        }
+    }
+    found
 }
 
 fn real(path: &Path) -> PathBuf {
@@ -208,12 +250,19 @@ pub(crate) struct LeftOut {
 
 impl LeftOut {
     pub(super) fn new(path: PathBuf, reason: Reason) -> Self {
-        Self { path, message: reason.to_string(), reason, entry: None }
+        let mut message = reason.to_string();
+        // What the record lacks may stand beside it.
+        if !matches!(reason, Reason::NoMotion { .. } | Reason::Renamed { .. }) {
+            for why in unread_beside(&path) {
+                message.push_str(&format!(" (not read: {why})"));
+            }
+        }
+        Self { path, message, reason, entry: None }
     }
 }
 
 /// Bodies that close more slowly than this share of their first speed at a record's end may go on together.
-const MOVES_ON: f64 = 0.5;
+const MOVES_ON: f64 = 0.7;
 
 /// Why a run is left out.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
@@ -223,11 +272,12 @@ pub(crate) enum Reason {
     Empty,
     #[error("it holds no solver files")]
     NoSolverFiles,
-    /// A solver file has another name than the solver gave it.
+    /// Solver files have other names than the solver gave them; these, and which files they are.
     #[error(
-        "it holds no file with a solver's name, but {file} looks like a {format}: rename it accordingly"
+        "it holds no file with a solver's name, but by their contents {}: rename them accordingly",
+        files.iter().map(|(file, format)| format!("{file} is the {format}")).collect::<Vec<_>>().join(", ")
     )]
-    Renamed { file: String, format: String },
+    Renamed { files: Vec<(String, String)> },
     #[error("it holds a deck but no solver output: it has not been run")]
     OnlyDeck,
     #[error("{why}")]
@@ -243,7 +293,7 @@ pub(crate) enum Reason {
         damage: String,
     },
     #[error(
-        "it terminated early: the record ends at {end}, while the bodies still close at {} % of their first speed{}{damage}", (share * 100.0).round(), if *.share < MOVES_ON { " (an obstacle that keeps moving needs --kind pair --minus-node ID)" } else { "" }
+        "it terminated early: the record ends at {end}, while the bodies still close at {} % of their first speed{}{damage}", (share * 100.0).round(), if *.share < MOVES_ON { " (an obstacle that keeps moving needs --kind pair --minus-node ID, and its node among the histories)" } else { "" }
     )]
     EndsWhileLoading {
         /// Last time that motion and force share, with its unit if that is known.

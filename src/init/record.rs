@@ -24,6 +24,8 @@ pub(super) struct Run {
 
 /// A force below this share of its largest is none.
 const NO_FORCE: f64 = 0.01;
+/// A first displacement below this share of what follows is none.
+const MOVED: f64 = 0.01;
 /// A motion that goes on for more states than this goes on without its force.
 const FURTHER: usize = 3;
 /// A flight after the contact that is shorter than this, in states and as a share of the record,
@@ -194,6 +196,16 @@ impl Record {
         Some((self.force_time[first], self.force_time[last]))
     }
 
+    /// Whether the body had moved and the force acted before the motion's first state, so that its speed there is not that of
+    /// the impact.
+    pub(super) fn starts_in_contact(&self) -> bool {
+        let moved = self.travel.iter().map(|d| (d - self.travel[0]).abs()).fold(0.0, f64::max);
+        let acts = self.contact().is_some_and(|(first, last)| {
+            first <= self.time[0] && self.time[0] < last
+        });
+        acts && self.travel[0].abs() > MOVED * moved
+    }
+
     pub(super) fn damage(&self) -> String {
         bracketed(self.damage.first().map(String::as_str))
     }
@@ -318,8 +330,14 @@ impl Record {
     /// of two bodies is shared by the ratio of their changes of velocity.
     fn masses_by_energy(&self) -> Option<Vec<f64>> {
         let energy = self.run.sources.energy.as_ref()?.read(None, &["kinetic_energy"]).ok()?;
-        let of_parts = energy.histories.iter().map(|part| part.values.first());
-        let kinetic = of_parts.sum::<Option<f64>>()?;
+        // The energies may be recorded from an earlier time on than the motion.
+        let first = |part: &History| {
+            let states = rising(&part.time);
+            let (time, values) = (picked(&part.time, &states), picked(&part.values, &states));
+            let at = self.time[0].clamp(*time.first()?, *time.last()?);
+            interpolate(&time, &values, &[at]).ok()?.first().copied()
+        };
+        let kinetic = energy.histories.iter().map(first).sum::<Option<f64>>()?;
         let mut shares = vec![1.0];
         if self.velocities.len() > 1 {
             shares.push(self.mass_ratio()?);

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::folders::Reason;
+use super::folders::{Reason, unread_beside};
 use crate::curve::recipe::DisplacementComponent;
 use crate::history::{EntityId, History};
 use crate::signal::{derivative, integral, interpolate};
@@ -67,7 +67,7 @@ impl Sources {
                 Err(error) => unread.push(error.to_string()),
             }
         }
-        unread.extend(continued(folder));
+        unread.extend(unread_beside(folder));
         let deck = deck_of(folder);
         if let Some((_, deck)) = &deck {
             for section in listed.iter_mut().flat_map(|(_, sections)| sections) {
@@ -76,11 +76,9 @@ impl Sources {
         }
         let motion = Source::choose(folder, MOTION, &listed).ok_or_else(|| {
             let mut found: Vec<String> = files.iter().map(|path| shown_name(path)).collect();
-            let hint = misnamed(folder).map_or(String::new(), |name| {
-                format!("; if {name} is the {MOTION}, rename it accordingly")
-            });
-            found.extend(unread.iter().map(|why| format!("({why})")));
-            Reason::NoMotion { found: found.join(", ") + &hint }
+            let of_motion = unread.iter().find(|why| why.to_lowercase().contains(MOTION));
+            found.extend(of_motion.or(unread.first()).map(|why| format!("({why})")));
+            Reason::NoMotion { found: found.join(", ") }
         })?;
         let chosen = FORCES.iter().filter_map(|name| Source::choose(folder, name, &listed));
         // LS-DYNA's rigid bodies have motions, those of OpenRadioss forces.
@@ -90,6 +88,10 @@ impl Sources {
                 components.is_empty() || components.iter().any(|name| name.ends_with("_force"))
             })
             .collect();
+        if forces.iter().all(|source| source.states == 0) {
+            let empty = forces.iter().map(|source| source.path.display());
+            unread.extend(empty.map(|path| format!("{path}: it holds no complete state")));
+        }
         let mut parts = motion.parts();
         for part in forces.iter().flat_map(Source::parts) {
             if !parts.contains(&part) {
@@ -104,37 +106,6 @@ impl Sources {
     pub(super) fn force(&self, name: &str) -> Option<&Source> {
         self.forces.iter().find(|source| source.name == name)
     }
-}
-
-/// Files that a restart has written beside those of the first run, such as `nodout01`.
-fn continued(folder: &Path) -> Vec<String> {
-    let entries = folder.read_dir().into_iter().flatten().filter_map(Result::ok);
-    let mut names: Vec<String> = entries.map(|entry| shown_name(&entry.path())).collect();
-    names.sort();
-    let of_restart = |name: &&String| {
-        let own = without_job_id(name);
-        let first = own.trim_end_matches(|c: char| c.is_ascii_digit());
-        let is_known = FORCES.contains(&first) || ENERGIES.contains(&first) || first == MOTION;
-        first.len() < own.len() && is_known && names.iter().any(|n| without_job_id(n) == first)
-    };
-    let words = |name: &String| {
-        format!(
-            "{}: it is named like the file of a restart: append its states to the first file to have them read",
-            folder.join(name).display()
-        )
-    };
-    names.iter().filter(of_restart).map(words).collect()
-}
-
-/// A file of a folder without a nodout that is called nearly so, such as `nodout.txt`.
-fn misnamed(folder: &Path) -> Option<String> {
-    let entries = folder.read_dir().ok()?.filter_map(Result::ok);
-    let mut names: Vec<String> = entries
-        .map(|entry| shown_name(&entry.path()))
-        .filter(|name| name != MOTION && name.to_lowercase().contains(MOTION))
-        .collect();
-    names.sort();
-    names.into_iter().next()
 }
 
 impl Source {
@@ -280,7 +251,7 @@ pub(super) fn velocity(
     (time.len() > 1).then(|| derivative(&time, &picked(&displacement.values, states)))
 }
 
-/// Impulse of a force at other times, held before its first and after its last.
+/// Impulse of a force at other times, from the first of them on; held before its first and after its last.
 ///
 /// `None` if the force holds a value that is not a number, or has fewer than two states.
 pub(super) fn impulse(force: &History, times: &[f64]) -> Option<Vec<f64>> {
@@ -291,7 +262,10 @@ pub(super) fn impulse(force: &History, times: &[f64]) -> Option<Vec<f64>> {
     }
     let (first, last) = (time[0], time[time.len() - 1]);
     let within: Vec<f64> = times.iter().map(|t| t.clamp(first, last)).collect();
-    interpolate(&time, &integral(&time, &values), &within).ok()
+    let mut impulse = interpolate(&time, &integral(&time, &values), &within).ok()?;
+    let before = impulse.first().copied().unwrap_or_default();
+    impulse.iter_mut().for_each(|impulse| *impulse -= before);
+    Some(impulse)
 }
 
 /// Position of the value that is largest in magnitude; 0 without any.

@@ -46,6 +46,9 @@ const MASS_KG: Range = Range { low: 1.0, high: 5e6, usual: 15e3, spread: 8.0 };
 /// In [`UnitSystem::CUSTOMARY`] the numbers of a usual impact are those of a slow one in millimetres or metres. By so much
 /// more usual an impact has to be in each of these to put the metric system in doubt: a foot is not far from a metre.
 const DOUBT: [f64; 2] = [5.0, 2.0];
+/// Differs from SI by masses and forces alone; rare, so that a mass has to be by so much more usual in it.
+const TONNES: &str = "m-t-s";
+const DOUBT_OF_KG: f64 = 5.0;
 /// A name may round a speed to this share of it.
 const NAMED: f64 = 0.1;
 
@@ -241,15 +244,29 @@ fn guessed(
             speed(other)
         ));
     }
+    let in_tonnes = systems(&[TONNES]).into_iter().find(|tonnes| {
+        *units == UnitSystem::SI
+            && runs.iter().all(|run| run.impossible(tonnes).is_none())
+            && unusual(tonnes) + DOUBT_OF_KG * (runs.len() as f64) < unusual(units)
+    });
+    if let (Some(_), Some(mass)) = (in_tonnes, first.mass) {
+        warnings.push(format!(
+            "units: {units} is assumed, which gives a body of {}; if the model is in {TONNES} (forces in kN), which gives {}, use --units {TONNES}",
+            shown_mass(mass),
+            shown_mass(1e3 * mass)
+        ));
+    }
     let others = others.join(", ");
-    if less.is_empty() && customary.is_empty() {
+    if less.is_empty() && customary.is_empty() && in_tonnes.is_none() {
         let from = format!("the only usual system in which these impacts are possible: {others}");
         return Some((*units, Computed, from));
     }
     let less = less.iter().chain(&customary);
     let less = less.map(|units| format!("{units} ({})", first.unusual(units).1));
+    let mass = first.mass.map_or(String::new(), |mass| shown_mass(1e3 * mass));
+    let less = less.chain(in_tonnes.map(|units| format!("{units} (a body of {mass})")));
     let from = format!(
-        "the impacts are the most usual ones in it; also possible, but less usual: {}; impossible: {others}",
+        "of the usual systems the impacts are the most usual ones in it; also possible, but less usual or in rarer units: {}; impossible: {others}",
         less.collect::<Vec<_>>().join(", ")
     );
     Some((*units, Guessed, from))

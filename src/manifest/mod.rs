@@ -30,7 +30,10 @@ pub(crate) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, E
             Some(span) => Place::new(path, text, span),
             None => Place::new(path, text, 0..0),
         };
-        let message = format!("{message}{}", guess_of(&message));
+        // As a proposal marks what it could not determine.
+        let is_to_fill_in = message.starts_with("missing field") && text.contains("# fill in");
+        let hint = if is_to_fill_in { ": fill in the lines marked \"fill in\"" } else { "" };
+        let message = format!("{message}{}{hint}", guess_of(&message));
         error!(Toml, "{message}").placed(|_| place)
     })
 }

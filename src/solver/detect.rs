@@ -190,7 +190,7 @@ fn look_at(
         return Err(unknown("this is an HDF5 file"));
     }
     if let Some(what) = source::encoded(&head) {
-        return Err(unknown(what));
+        return Err(error!(SolverFile at "format", "{}: {what}", path.display()));
     }
     if let Some(format) = FORMATS.iter().find(|f| f.recognises(&head)) {
         return Ok((Some(format), false));

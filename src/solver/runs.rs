@@ -78,24 +78,23 @@ pub fn output_files(folder: &Path) -> io::Result<Vec<PathBuf>> {
 /// Files of a folder that are opened to see what they are.
 const MOST_OPENED: usize = 50;
 
-/// The first file of a folder that holds what a solver writes under another name, and that name:
-/// a run whose files were renamed.
-pub(crate) fn renamed_file(folder: &Path) -> Option<(PathBuf, &'static str)> {
-    let mut files: Vec<PathBuf> = folder
-        .read_dir()
-        .ok()?
+/// The files of a folder that hold what a solver writes under other names, and those names: a run whose files were renamed.
+pub(crate) fn renamed_files(folder: &Path) -> Vec<(PathBuf, &'static str)> {
+    let entries = folder.read_dir().into_iter().flatten();
+    let mut files: Vec<PathBuf> = entries
         .take(MOST_NAMES)
         .filter_map(Result::ok)
         .map(|entry| entry.path())
         .filter(|path| path.is_file())
         .collect();
     files.sort();
-    let mut opened = files.into_iter().take(MOST_OPENED);
-    opened.find_map(|path| {
+    let opened = files.into_iter().take(MOST_OPENED);
+    let renamed = opened.filter_map(|path| {
         let source = source::open(&path, Access::Plain).ok()?;
         let format = detect(&path, &*source).ok()?;
         Some((path, format.name))
-    })
+    });
+    renamed.collect()
 }
 
 struct Walk {
@@ -341,10 +340,10 @@ mod tests {
     fn renamed_files_are_known_by_what_they_hold() {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("notes"), "nothing\n").unwrap();
-        assert_eq!(renamed_file(folder.path()), None);
+        assert_eq!(renamed_files(folder.path()), []);
         let bytes = [8, 8, 8, 1, 1, 1, 0, 0];
         fs::write(folder.path().join("other"), bytes).unwrap();
-        assert_eq!(renamed_file(folder.path()), Some((folder.path().join("other"), "binout")));
+        assert_eq!(renamed_files(folder.path()), [(folder.path().join("other"), "binout")]);
     }
 
     #[cfg(unix)]

@@ -18,6 +18,8 @@ const FIRST_SHARE: f64 = 0.03;
 const MISSING_SHARE: f64 = 0.005;
 /// Impulse before the contact that the manifest states, as a share of the loading branch's, likewise.
 const EARLY_SHARE: f64 = 0.001;
+/// Over this share of the crush a body is slowed down.
+const SLOWING_SHARE: f64 = 0.1;
 /// A body slows down some milliseconds after the touch: a record that begins within these may not show it.
 const RESPONSE_S: f64 = 5e-3;
 /// Times that differ by less than this share are one: files print seven digits.
@@ -32,8 +34,9 @@ pub(super) struct Start {
 enum StartBy {
     /// The manifest's contact time or gap.
     Manifest,
-    /// The first state, which is in contact already; the crush before it, at least and at most.
-    FirstState { missing_m: (f64, f64), at_most_s: Option<f64> },
+    /// The first state, which is in contact already; the crush before it, at least and at most, and whether the run's speed is
+    /// that of this state.
+    FirstState { missing_m: (f64, f64), at_full_speed: bool, at_most_s: Option<f64> },
     /// A crossing within an output interval of this length.
     Crossing { interval_s: f64, at_most_s: Option<f64> },
     /// The deceleration of the body, which starts later: reported where it is found.
@@ -97,7 +100,9 @@ impl Start {
             Some(interval_s) => StartBy::Crossing { interval_s, at_most_s: onset.at_most_s },
             None => {
                 let missing_m = missing_m(record, setup);
-                StartBy::FirstState { missing_m, at_most_s: onset.at_most_s }
+                // Its displacement does not count from there, so it has been slowed down.
+                let at_full_speed = record.deflection_m[0] != 0.0 && !is_slowed(record, setup);
+                StartBy::FirstState { missing_m, at_full_speed, at_most_s: onset.at_most_s }
             }
         };
         Ok((Self { time_s: onset.time_s, by }, remarks))
@@ -148,7 +153,7 @@ impl Start {
                     shown_missing(missing_m)
                 ));
             }
-            StartBy::FirstState { missing_m, .. }
+            StartBy::FirstState { missing_m, at_full_speed, .. }
                 if missing_m.1 > MISSING_SHARE * crush_m && setup.stated.offset_m == 0.0 =>
             {
                 let (least_m, most_m) = missing_m;
@@ -164,11 +169,19 @@ impl Start {
                     ),
                     false => (
                         format!("{:.1} %", share(most_m)),
-                        format!("set offset = \"{:.1}mm\" in the run", most_m * 1e3),
+                        format!(
+                            "set offset = \"{:.1}mm\" in the run, less any gap that the body had to cross first",
+                            most_m * 1e3
+                        ),
                     ),
                 };
+                let speed = if at_full_speed && missing_m.1 > SLOWING_SHARE * crush_m {
+                    ", and the run's speed is that of its first state, by when it has been slowed down: state the impact speed"
+                } else {
+                    ""
+                };
                 remarks.warn(format!(
-                    "contact: the record starts at {}, in contact: the first {} of the crush ({shares}) are missing; {offset}, or provide the earlier states",
+                    "contact: the record starts at {}, in contact: the first {} of the crush ({shares}) are missing{speed}; {offset}, or provide the earlier states",
                     milliseconds(self.time_s),
                     shown_missing(missing_m)
                 ));
@@ -228,17 +241,21 @@ const FULL_SPEED: f64 = 1e-3;
 /// it at least; a nose is stopped before the body is. A body that still has the run's speed, in a record that counts its displacement
 /// from there, may have crushed nothing: its clock may not begin at the impact.
 fn missing_m(record: &Record, setup: &Setup<'_>) -> (f64, f64) {
-    let bodies = if setup.half_model { 2.0 } else { 1.0 };
-    let is_slowed = setup.manifest_speed_m_per_s.is_none_or(|speed_m_per_s| {
-        bodies * record.rate_m_per_s[0].abs() < (1.0 - FULL_SPEED) * speed_m_per_s
-    });
     let most_m = match record.deflection_m[0].abs() {
         0.0 => (record.rate_m_per_s[0] * record.time_s[0]).abs(),
         displacement_m => displacement_m,
     };
     let least_m = record.slowed_over_m.map_or(most_m, |slowed_m| slowed_m.min(most_m));
-    let is_open = !is_slowed && record.deflection_m[0] == 0.0;
+    let is_open = !is_slowed(record, setup) && record.deflection_m[0] == 0.0;
     (if is_open { 0.0 } else { least_m }, most_m)
+}
+
+/// Whether the body is slower than its run's speed in the first state.
+fn is_slowed(record: &Record, setup: &Setup<'_>) -> bool {
+    let bodies = if setup.half_model { 2.0 } else { 1.0 };
+    setup.manifest_speed_m_per_s.is_none_or(|speed_m_per_s| {
+        bodies * record.rate_m_per_s[0].abs() < (1.0 - FULL_SPEED) * speed_m_per_s
+    })
 }
 
 fn shown_missing((least_m, most_m): (f64, f64)) -> String {

@@ -165,7 +165,8 @@ fn general(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u32) {
     define_curve(lines, (id, &text), &points, units, resampling(&points));
     let highest = curve.loading.peak_force_n();
     let length = highest / curve.stiffness_n_per_m();
-    let unloading = [(-length, -highest), (0.0, 0.0), (length, 0.0)];
+    // Of the 100 points to which it is resampled, one lies at the origin.
+    let unloading = [(-length, -highest), (0.0, 0.0), (0.5 * length, 0.0)];
     define_curve(lines, (id + 1, &format!("{text} unloading")), &unloading, units, 0);
     let (text, unloading) = (title(&text, TITLE_WIDTH), id + 1);
     line!(lines, "*MAT_SPRING_GENERAL_NONLINEAR_TITLE\n{text}");
@@ -180,10 +181,12 @@ fn points(curve: &ExportCurve) -> Vec<(f64, f64)> {
     curve.deflection_m().iter().copied().zip(force).collect()
 }
 
-/// The same in tension's signs, rising, with a point beyond the origin that holds the force at 0.
+/// The same in tension's signs, rising, with a point beyond the origin that holds the force at 0. It lies a multiple of the smallest
+/// interval away, so that an even curve keeps its points when it is resampled.
 fn third_quadrant(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let reach = points[points.len() - 1].0;
-    let pulled = [(0.1 * reach, 0.0)];
+    let smallest = smallest_interval(points);
+    let pulled = [((0.1 * reach / smallest).ceil() * smallest, 0.0)];
     points.iter().rev().map(|&(d, f)| (-d, -f)).chain(pulled).collect()
 }
 
@@ -212,10 +215,13 @@ fn define_curve(
 /// Points to which LS-DYNA resamples a curve evenly, 100 by default: a curve with more would
 /// lose its peaks. The number that the smallest interval requires keeps every point of an even curve.
 fn resampling(points: &[(f64, f64)]) -> usize {
-    let smallest = points.windows(2).map(|w| w[1].0 - w[0].0).fold(f64::INFINITY, f64::min);
     let reach = points[points.len() - 1].0 - points[0].0;
-    let intervals = (reach / smallest - 1e-6).ceil();
+    let intervals = (reach / smallest_interval(points) - 1e-6).ceil();
     if intervals < 100.0 { 0 } else { (intervals as usize + 1).min(MOST_RESAMPLED) }
+}
+
+fn smallest_interval(points: &[(f64, f64)]) -> f64 {
+    points.windows(2).map(|w| w[1].0 - w[0].0).fold(f64::INFINITY, f64::min)
 }
 
 /// A number in a field of ten columns, with as many digits as fit.
@@ -324,6 +330,9 @@ mod tests {
         let even: Vec<(f64, f64)> = (0..=400).map(|i| (f64::from(i) * 0.003, 1.0)).collect();
         assert_eq!(resampling(&even), 401);
         assert_eq!(resampling(&even[..50]), 0);
+        let points = third_quadrant(&even);
+        let step = (points[points.len() - 1].0 - points[0].0) / (resampling(&points) - 1) as f64;
+        assert!((step / 0.003 - 1.0).abs() < 1e-12, "{step}");
         let mut uneven = even;
         uneven.insert(1, (1e-9, 1.0));
         assert_eq!(resampling(&uneven), MOST_RESAMPLED);
