@@ -964,11 +964,24 @@ fn the_targets_rebound_is_said() {
     let [theirs, ours] = restitutions(&own[0])[..] else { panic!("{own:?}") };
     assert_eq!(theirs, ours);
     assert!(soft.iter().any(|note| note.contains("the peak force changes from")), "{soft:?}");
+    assert!(soft.iter().any(|note| note.contains(" % of their mean on average")), "{soft:?}");
     // A change that would be too large is refused.
     let arguments =
         ["export", "curves.h5", "--group", "vehicle-pair", "--speed", "3km/h", "--to", "lsdyna"];
     let error = crumple_fails(here, 1, &[&arguments[..], &["--soften"]].concat());
+    says(&error, "error: vehicle-pair 3 km/h: no steep rise can be reduced to");
     says(&error, "without changing the curve's end");
+    // Nor is it recommended then.
+    let recommended = |group: &str, case: &str| {
+        let line = format!(
+            "export curves.h5 --group {group} --case {case} --to lsdyna -o n.k --overwrite"
+        );
+        let said = crate::common::said(&crumple_in(here, &line));
+        says(&said, "--material mat121 unloads with its own stiffness");
+        said.contains("--soften")
+    };
+    assert!(recommended("lead-car-wall", "48kmh"));
+    assert!(!recommended("lead-car-wall", "12kmh"));
     // The softened curve keeps the energy.
     let work = |file: &str| {
         let units = UnitSystem::parse("SI").unwrap();

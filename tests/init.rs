@@ -1799,3 +1799,89 @@ fn gravity_does_not_falsify_the_mass() {
     crumple_ok(here, "init drop --units mm-t-s -o with.toml");
     assert_eq!(study(here, "with.toml")["run"][0]["mass"].as_str(), Some("24t"));
 }
+
+/// Files whose names are nearly those of the missing ones, and empty ones, are named, also for runs that are left out; without
+/// them the run's force would silently be the body's mass times its acceleration.
+#[test]
+fn what_lies_unread_beside_a_run_is_named() {
+    let (_folder, here) = four_runs();
+    assert_eq!(warned(&here, "init -o whole.toml"), "");
+    let rename = |run: &str, from: &str, to: &str| {
+        fs::rename(here.join(run).join(from), here.join(run).join(to)).unwrap();
+    };
+    rename("36kmh", "rwforc", "rwforc.gz");
+    let document = json(&crumple_ok(&here, "init --json -o packed.toml"));
+    let [(run, why)] = &left_out(&document)[..] else { panic!("{document}") };
+    assert_eq!(run, "36kmh");
+    says(why, "(not read: 36kmh/rwforc.gz: if it is the rwforc, unpack it and name it rwforc)");
+    let said = warned(&here, "init 36kmh -o alone.toml");
+    says(&said, "warning: not read: 36kmh/rwforc.gz: if it is the rwforc, unpack it");
+    says(&fs::read_to_string(here.join("alone.toml")).unwrap(), "times = \"mass\"");
+    // A backup beside the file itself is none of the run's, nor is a picture.
+    rename("36kmh", "rwforc.gz", "rwforc");
+    for name in ["rwforc.bak", "nodout.png"] {
+        fs::write(here.join("36kmh").join(name), "").unwrap();
+    }
+    assert_eq!(warned(&here, "init -o backup.toml"), "");
+    for run in ["25kmh", "36kmh", "48kmh", "60kmh"] {
+        fs::write(here.join(run).join("rwforc"), "").unwrap();
+    }
+    let said = warned(&here, "init -o empty.toml");
+    assert_eq!(said.matches("rwforc: it holds no complete state").count(), 4, "{said}");
+    // All names in capital letters.
+    rename("48kmh", "rwforc", "RWFORC");
+    rename("48kmh", "nodout", "NODOUT");
+    copy_run(&fixture("fe/lead-car-wall/48kmh"), &here.join("48kmh/own"), &["rwforc"]);
+    fs::copy(here.join("48kmh/own/rwforc"), here.join("48kmh/RWFORC")).unwrap();
+    fs::remove_dir_all(here.join("48kmh/own")).unwrap();
+    let files: Vec<String> = entries(&here.join("48kmh"));
+    assert_eq!(files, ["NODOUT", "RWFORC"]);
+    let error = crumple_fails(&here, 1, "init 48kmh -o capital.toml");
+    says(&error, "by their contents NODOUT is the nodout, RWFORC is the rwforc: rename them");
+}
+
+/// A motion that starts late starts in contact: its first speed is not that of the impact, but its changes still give the mass.
+#[test]
+fn a_record_that_starts_in_contact_is_named() {
+    let (_folder, here) = four_runs();
+    let path = here.join("60kmh/nodout");
+    let text = fs::read_to_string(&path).unwrap();
+    let state = "\n\n\n n o d a l   p r i n t";
+    let at = |n: usize| text.match_indices(state).nth(n).unwrap().0;
+    fs::write(&path, format!("{}{}", &text[..at(0)], &text[at(40)..])).unwrap();
+    let said = warned(&here, "init 60kmh -o late.toml");
+    says(
+        &said,
+        "warning: run 60kmh: the record starts in contact, so the speed of its first state",
+    );
+    assert!(!said.contains("fill in"), "{said}");
+    let late = study(&here, "late.toml");
+    let mass = number(&late["run"][0]["mass"], "t");
+    // Its nose was stopped before.
+    assert!((mass / 24.0 - 1.0).abs() < 0.03, "{mass} t");
+    let said = warned(&here, "build late.toml -o late.h5");
+    says(&said, "are missing, and the run's speed is that of its first state, by when it has been");
+    says(&said, "less any gap that the body had to cross first, or provide the earlier states");
+}
+
+/// In tonnes and metres only the masses differ from SI: a train of some kilograms is doubted.
+#[test]
+fn tonnes_and_metres_are_considered() {
+    let history = Crash::default().run();
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    // A car of 1.2 t, whose numbers in tonnes and metres are those of 1.2 kg in SI.
+    let tonnes = crumple::unit::UnitSystem::parse("m-t-s").unwrap();
+    let tonnes = (tonnes.length_m, tonnes.mass_kg, tonnes.time_s);
+    for (name, units) in [("si", SI), ("tonnes", tonnes)] {
+        let layout = Layout { units, axis: 0, sign: 1.0 };
+        write_car(layout, &here.join(name).join("50kmh"), &history, &car_nodes());
+    }
+    let of = |name: &str| warned(here, &format!("init {name} -o {name}.toml"));
+    assert!(!of("si").contains("m-t-s"));
+    says(
+        &of("tonnes"),
+        "warning: units: SI is assumed, which gives a body of 1.2 kg; if the model is in m-t-s (forces in kN), which gives 1.2 t, use --units m-t-s",
+    );
+    assert!(!warned(here, "init tonnes --units m-t-s -o stated.toml").contains("units:"));
+}

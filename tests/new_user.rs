@@ -189,7 +189,10 @@ fn what_is_not_as_it_should_be_is_said_with_what_to_do() {
     fails(&["runs/36kmh/nodout"], "this is not a folder: give a run's folder, or one above runs");
     // A file with another name than the solver's.
     fs::rename(here.join("runs/48kmh/nodout"), here.join("runs/48kmh/Nodout.txt")).unwrap();
-    fails(&["runs/48kmh"], "it has rwforc, (runs/48kmh/Nodout.txt: if it is the nodout, rename it accordingly)");
+    fails(
+        &["runs/48kmh"],
+        "it has rwforc, (runs/48kmh/Nodout.txt: if it is the nodout, rename it accordingly)",
+    );
     // A folder without anything, beside one with a run.
     fs::remove_dir_all(here.join("runs/48kmh")).unwrap();
     fs::create_dir(here.join("runs/48kmh")).unwrap();

@@ -88,7 +88,8 @@ def build(client, study, output, shards):
     text = pathlib.Path(study).read_bytes()
     entries = tomllib.loads(text.decode())["run"]
     names = [_name(entry) for entry in entries]
-    chosen = [[word for name in names[k::shards] for word in ("--run", name)] for k in range(min(shards, len(names)))]
+    # With "=", since a name may begin with a hyphen.
+    chosen = [[f"--run={name}" for name in names[k::shards]] for k in range(min(shards, len(names)))]
     # Parts of another division, or of another study, hold other cases.
     name = f"of{len(chosen)}-{hashlib.sha256(text).hexdigest()[:12]}.h5"
     parts = [_folder(output) / f"part{k}{name}" for k in range(1, len(chosen) + 1)]

@@ -199,7 +199,16 @@ fn print(out: &mut dyn std::io::Write, proposal: &Proposal, output: &Path) -> st
     let runs = Table::of(&proposal.runs)
         .column("run", |run| &run.name)
         .column("speed", |run| known(run.speed_m_per_s.value().map(|v| km_per_h(*v))))
-        .column("mass", |run| known(run.mass_kg.value().map(|kg| Shown::one_mass(*kg))))
+        .column("mass", |run| {
+            let mass = |of: Option<&f64>| known(of.map(|kg| Shown::one_mass(*kg)));
+            let other = run.other_mass_kg.as_ref().map(|other| mass(other.value()));
+            // Two of one mass are shown once.
+            let own = mass(run.mass_kg.value());
+            match other.filter(|other| *other != own) {
+                Some(other) => format!("{own} on {other}"),
+                None => own,
+            }
+        })
         .column("max crush (m)", |run| known(run.crush_m.map(|m| format!("{m:.3}"))))
         .column("states", |run| run.states.to_string());
     output::table(out, runs)?;

@@ -31,6 +31,11 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
             _ => spline.view_command(&mut together),
         }
     }
+    if !["cmd", "adm", "spr"].contains(&extension) {
+        notes.push(format!(
+            ".{extension} is written as an Adams View command file (.cmd): name it .adm for Adams Solver, .spr for a property file"
+        ));
+    }
     if extension != "spr" {
         let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
         files.push((format!("{stem}.{extension}"), together.into_bytes()));

@@ -8,6 +8,7 @@ use crate::curve::{Envelope, ForceCurve, ForceKind, Tail};
 use crate::dataset::{MASS, OTHER_MASS};
 use crate::error::{Error, error};
 use crate::multibody::{EnvelopeEnd, ForceLaw};
+use crate::signal::l1_ratio;
 use crate::surrogate::PredictedCurve;
 use crate::surrogate::recorded::RECORDED;
 use crate::unit::{Shown, km_per_h};
@@ -28,8 +29,9 @@ pub struct ExportCurve {
     /// How the target continues beyond the maximum crush.
     pub tail: Tail,
     follows_faster_runs: bool,
-    /// Largest force before and after, in N, where a steep rise was made less steep.
-    pub softening: Option<(f64, f64)>,
+    /// Largest force before and after, in N, and the mean change of the forces over their mean, where a steep rise was made less
+    /// steep.
+    pub softening: Option<(f64, f64, f64)>,
     /// Ordinal among the curves of the same group and speed of one export, counted from 1.
     pub ordinal: usize,
 }
@@ -68,13 +70,21 @@ impl ExportCurve {
             match softened(&loading, stiffness, end) {
                 Softened::Nothing => {}
                 Softened::Curve(soft) => {
-                    softening = Some((own_peak_n, soft.peak_force_n()));
+                    let end_m = loading.deflection_m()[end];
+                    let even = |curve: &Envelope| -> Vec<f64> {
+                        (0..=1000).map(|k| curve.force_at(end_m * f64::from(k) / 1e3)).collect()
+                    };
+                    let changed = l1_ratio(&even(&loading), &even(&soft));
+                    softening = Some((own_peak_n, soft.peak_force_n(), changed));
                     loading = soft;
                 }
                 Softened::Impossible => {
                     return Err(error!(
                         Export,
-                        "no steep rise can be reduced to {} at equal energy without changing the curve's end, or forces by more than a quarter: remove --soften",
+                        "{} {}{}: no steep rise can be reduced to {} at equal energy without changing the curve's end, or raising other forces by more than a quarter: export it without --soften",
+                        predicted.provenance.group,
+                        km_per_h(predicted.speed_m_per_s),
+                        own_name(&predicted).map_or(String::new(), |name| format!(", {name}")),
                         Shown::one_stiffness(stiffness)
                     ));
                 }
@@ -158,13 +168,14 @@ impl ExportCurve {
 
     /// What softening has changed, in one line.
     pub(crate) fn softening_note(&self) -> Option<String> {
-        let (before, after) = self.softening?;
+        let (before, after, changed) = self.softening?;
         Some(format!(
-            "{}: rises steeper than {} have been made less steep, with the same energy up to the maximum crush; the peak force changes from {} to {}",
+            "{}: rises steeper than {} have been made less steep, with the same energy up to the maximum crush; the peak force changes from {} to {}, and forces by {:.1} % of their mean on average",
             self.headline(),
             Shown::one_stiffness(self.stiffness_n_per_m()),
             Shown::one_force(before),
-            Shown::one_force(after)
+            Shown::one_force(after),
+            100.0 * changed
         ))
     }
 
@@ -313,13 +324,27 @@ impl ExportCurve {
         let unloading = TargetUnloading::Line(own.max(steepest));
         let mut notes = vec![self.restitution_note(target, unloading)];
         if steepest > own * 1.01 {
+            let own_curve = self.predicted.envelope();
+            let is_softened = own_curve.is_ok_and(|curve| {
+                matches!(softened(&curve, own, curve.deflection_m().len() - 1), Softened::Curve(_))
+            });
+            let soften = "--soften makes the steep rise less steep at equal energy";
+            let ways = [is_softened.then_some(soften), (!other.is_empty()).then_some(other)];
+            let ways: Vec<&str> = ways.into_iter().flatten().collect();
             notes.push(format!(
-                "{target} unloads with the steepest rise, {}, which is more than the curve's own {}: --soften makes the steep rise less steep at equal energy{other}",
+                "{target} unloads with the steepest rise, {}, which is more than the curve's own {}{}{}",
                 Shown::one_stiffness(steepest),
-                Shown::one_stiffness(own)
+                Shown::one_stiffness(own),
+                if ways.is_empty() { "" } else { ": " },
+                ways.join(", ")
             ));
         }
         notes
+    }
+
+    /// What a deck of the curve moves, for titles.
+    pub(crate) fn bodies(&self) -> &'static str {
+        if self.other_mass_kg().is_some() { "two masses" } else { "one mass" }
     }
 
     /// Description of the curve in one line, for headers and titles.

@@ -56,7 +56,11 @@ fn begin(lines: &mut String, curve: &ExportCurve, units: InUnits, stem: &str) {
         let [mass, length, time] = unit_names(units.0);
         line!(lines, "{mass:>20}{length:>20}{time:>20}");
     }
-    line!(lines, "/TITLE\n{}", title(&format!("one mass on {}", curve.headline()), TITLE_WIDTH));
+    line!(
+        lines,
+        "/TITLE\n{}",
+        title(&format!("{} on {}", curve.bodies(), curve.headline()), TITLE_WIDTH)
+    );
 }
 
 /// Mass, length and time by the names that Radioss has for them, else by their size in SI.

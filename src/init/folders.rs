@@ -153,9 +153,8 @@ pub(super) fn unread_beside(folder: &Path) -> Vec<String> {
                 && rest.is_some_and(|rest| {
                     !rest.is_empty() && rest.bytes().all(|b| b.is_ascii_digit())
                 });
-            let is_nearly_so = !is_there
-                && lower.contains(kind)
-                && !OTHERS.iter().any(|end| lower.ends_with(end));
+            let is_nearly_so =
+                !is_there && lower.contains(kind) && !OTHERS.iter().any(|end| lower.ends_with(end));
             let what = match PACKED.iter().any(|end| lower.ends_with(end)) {
                 _ if is_of_restart => {
                     "it is named like the file of a restart: append its states to the first file to have them read".into()
@@ -217,11 +216,17 @@ pub(super) fn speed_in(name: &str) -> Option<f64> {
     let name = name.to_ascii_lowercase();
     for (at, _) in name.match_indices(|c: char| c.is_ascii_digit()) {
         let before = name[..at].chars().next_back();
-        if before.is_some_and(|c| c.is_ascii_digit() || c == '.') {
+        if before.is_some_and(|c| c.is_ascii_digit() || matches!(c, '.' | ',')) {
             continue;
         }
-        let end = name[at..].find(|c: char| !c.is_ascii_digit() && c != '.');
+        let end = name[at..].find(|c: char| !c.is_ascii_digit() && !matches!(c, '.' | ','));
         let (number, unit) = name[at..].split_at(end.unwrap_or(name.len() - at));
+        // "45_5kmh" may be 45.5 km/h, or 5 km/h of run 45.
+        let mut ahead = name[..at].chars().rev();
+        let joins = ahead.next().is_some_and(|c| matches!(c, '_' | '-' | 'p'));
+        if number.len() == 1 && joins && ahead.next().is_some_and(|c| c.is_ascii_digit()) {
+            continue;
+        }
         let unit: String = unit.chars().filter(|c| !matches!(c, '_' | '-' | ' ' | '/')).collect();
         let km_per_h = ["kmh", "kmph", "kph"].iter().any(|known| unit.starts_with(known));
         let factor = match () {
@@ -229,7 +234,12 @@ pub(super) fn speed_in(name: &str) -> Option<f64> {
             () if unit.starts_with("mph") => M_PER_S_PER_MPH,
             () => continue,
         };
-        return number.parse::<f64>().ok().filter(|v| *v > 0.0).map(|v| v * factor);
+        return number
+            .replace(',', ".")
+            .parse::<f64>()
+            .ok()
+            .filter(|v| *v > 0.0)
+            .map(|v| v * factor);
     }
     None
 }
@@ -364,6 +374,9 @@ mod tests {
         t("48thick", None);
         t("run_0010", None);
         t("25ms", None);
+        t("36,5 km_h", Some(36.5));
+        t("run2_48kmh", Some(48.0));
+        t("45_5kmh", None);
     }
 
     #[test]

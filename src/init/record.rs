@@ -200,9 +200,9 @@ impl Record {
     /// the impact.
     pub(super) fn starts_in_contact(&self) -> bool {
         let moved = self.travel.iter().map(|d| (d - self.travel[0]).abs()).fold(0.0, f64::max);
-        let acts = self.contact().is_some_and(|(first, last)| {
-            first <= self.time[0] && self.time[0] < last
-        });
+        let acts = self
+            .contact()
+            .is_some_and(|(first, last)| first <= self.time[0] && self.time[0] < last);
         acts && self.travel[0].abs() > MOVED * moved
     }
 

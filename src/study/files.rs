@@ -104,7 +104,7 @@ fn named_text(folder: &Path, name: &str, names: &[String]) -> Result<PathBuf, Er
     match of_jobs[..] {
         [first, second, ..] if !is_file(&exact)? => Err(error!(
             Run,
-            "the run's folder {} has {first} and {second}: write in the recipe which one is meant",
+            "the run's folder {} has {first} and {second}: write in the recipe which one is meant, or give each run a folder of its own",
             folder.display()
         )
         .at_key("file")),

@@ -89,7 +89,7 @@ fn note(curve: &ExportCurve, material: Material) -> Vec<String> {
     let own = TargetUnloading::Line(curve.line_stiffness_n_per_m());
     match material {
         Material::S08 => {
-            let other = ", --material mat121 unloads with its own stiffness";
+            let other = "--material mat121 unloads with its own stiffness";
             curve.steepest_notes("LS-DYNA's S08", other)
         }
         Material::Mat121 => vec![curve.restitution_note("LS-DYNA's MAT_121", own)],
@@ -243,7 +243,7 @@ pub(crate) fn write_deck(
     let length = 1.2 * curve.loading.end_m() / system.length_m;
     let end = run_time_s(curve) / system.time_s;
     let text = curve.headline();
-    line!(lines, "*TITLE\n{}", title(&format!("one mass on {text}"), TITLE_WIDTH));
+    line!(lines, "*TITLE\n{}", title(&format!("{} on {text}", curve.bodies()), TITLE_WIDTH));
     line!(lines, "*CONTROL_TERMINATION\n$#  endtim\n{:>10}", fixed(end));
     line!(lines, "*CONTROL_TIMESTEP\n$#  dtinit    tssfac\n       0.0       0.1");
     for file in ["NODOUT", "DEFORC", "GLSTAT"] {
