@@ -978,6 +978,15 @@ fn many_runs_cost_what_twenty_cost() {
     assert!(rate.force_l1 < 0.01 && rate.velocity_l1 < 0.01, "{rate:?}");
     let few = validate("made", &cases[..20], &ModelKind::all(0), best).unwrap();
     assert!(few.notes.iter().all(|note| !note.contains("spread over the range")));
+    // A forest that is judged with many runs learns from those near the speed, so that more runs make it better.
+    let speeds: Vec<f64> = (0..96).map(|k| 8.0 + 0.125 * f64::from(k)).collect();
+    let kinds = ["extra", "forest"].map(|name| ModelKind::named(name, 0).unwrap());
+    let many = validate("made", &family(&speeds), &kinds, best).unwrap();
+    for name in ["extra", "forest"] {
+        let errors = [&many, &few]
+            .map(|of| of.means.iter().find(|mean| mean.model == name).unwrap().force_l1);
+        assert!(errors[0] < 0.7 * errors[1], "{name}: {errors:?}");
+    }
 }
 
 #[test]

@@ -116,7 +116,7 @@ impl<'a> LeftOutCase<'a> {
 
     /// The model without the case's speed: the same for all cases that a set lacks.
     pub(super) fn fit(&self, kind: ModelKind) -> Result<Model, Error> {
-        Model::fit_curves(&self.rest, kind)
+        Model::fit_curves(&self.rest, kind.near(self.case.conditions.speed.m_per_s))
             .map_err(|error| error!(Validation, "without this speed: {}", error))
     }
 

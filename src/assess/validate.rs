@@ -232,7 +232,7 @@ pub(crate) fn validate_speeds(
     }
     if set.cases.len() > most_speeds && !left_out.is_empty() {
         notes.push(format!(
-            "{most_speeds} of {} cases, spread over the range, are left out in turn, and forests judged with at most 50 trees and 8 000 rows: crumple validate --thorough leaves out every speed",
+            "{most_speeds} of {} cases, spread over the range, are left out in turn, and forests judged with at most 50 trees and 4 000 rows, the nearest in speed: crumple validate --thorough leaves out every speed",
             set.cases.len()
         ));
     }

@@ -434,22 +434,41 @@ impl TrainingSet {
         self.table_of(kind, self.force_kind, None)
     }
 
-    /// The same table of the declared force or of the body's; with at most `most_rows` rows, evenly thinned in each case.
+    /// The same table of the declared force or of the body's; with at most so many rows, those of the cases nearest to a speed in
+    /// m/s, two at least. Where other features distinguish cases, all are thinned evenly.
     pub(crate) fn table_of(
         &self,
         kind: TableKind,
         force: ForceKind,
-        most_rows: Option<usize>,
+        most_rows: Option<(usize, f64)>,
     ) -> Dataset<f64, f64, ndarray::Ix1> {
         let columns = 2 + self.features.len();
         let mut records = Vec::new();
         let mut targets = Vec::new();
         let points: Vec<_> =
             self.cases.iter().map(|case| case.points(kind, force == self.force_kind)).collect();
-        let rows = points.iter().map(|(d, _)| d.len()).sum::<usize>();
-        let step = most_rows.map_or(1, |most| rows.div_ceil(most).max(1));
-        for (case, (deflection_m, force_n)) in self.cases.iter().zip(points) {
-            for (d, f) in deflection_m.into_iter().zip(force_n).step_by(step) {
+        let mut chosen: Vec<usize> = (0..points.len()).collect();
+        let mut step = 1;
+        if let (Some((most, _)), false) = (most_rows, self.features.is_empty()) {
+            let rows: usize = points.iter().map(|(d, _)| d.len()).sum();
+            // Those from all over the range are worth less.
+            step = rows.div_ceil(2 * most).max(1);
+        } else if let Some((most, near)) = most_rows {
+            let distance = |k: &usize| (self.cases[*k].speed_m_per_s - near).abs();
+            chosen.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+            let mut rows = 0;
+            let fits = |k: &&usize| {
+                rows += points[**k].0.len();
+                rows <= most
+            };
+            let count = chosen.iter().take_while(fits).count().max(2);
+            chosen.truncate(count);
+            chosen.sort_unstable();
+        }
+        for (case, (deflection_m, force_n)) in
+            chosen.into_iter().map(|k| (&self.cases[k], &points[k]))
+        {
+            for (&d, &f) in deflection_m.iter().zip(force_n).step_by(step) {
                 records.extend([case.speed_m_per_s, d]);
                 records.extend(&case.features);
                 targets.push(f);

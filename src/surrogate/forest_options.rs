@@ -27,9 +27,10 @@ pub struct ForestOptions {
     /// Whether the leaves keep their members, for quantiles.
     #[serde(default)]
     pub quantiles: bool,
-    /// Most rows that it learns from, evenly chosen; a forest that is only judged needs fewer.
+    /// Most rows that it learns from, those of the curves nearest to a speed in m/s: a forest that is judged at that speed needs
+    /// no others.
     #[serde(skip)]
-    pub most_rows: Option<usize>,
+    pub most_rows: Option<(usize, f64)>,
 }
 
 fn default_true() -> bool {

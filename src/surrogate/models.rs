@@ -24,8 +24,8 @@ pub(crate) const MODELS: &[ModelEntry] = &[
 /// Most trees of a forest that is judged with many runs.
 const CANDIDATE_TREES: usize = 50;
 
-/// Most rows of a forest that is judged with many runs: those of 20 curves of 400 points.
-const MOST_ROWS: usize = 8_000;
+/// Most rows of a forest that is judged with many runs: those of 10 curves of 400 points, five on either side of the speed.
+const MOST_ROWS: usize = 4_000;
 
 /// Which model, with its options.
 #[derive(Clone, Copy)]
@@ -50,11 +50,20 @@ impl ModelKind {
         MODELS.iter().map(|entry| Self::of(entry, seed)).collect()
     }
 
-    /// The same to be judged where there are many runs: a forest of at most 50 trees on at most 8 000 rows.
+    /// The same to be judged where there are many runs: a forest of at most 50 trees on at most 4 000 rows, those nearest to the
+    /// speed that it is judged at ([`ModelKind::near`]).
     pub(crate) fn judged(self) -> Self {
         self.with_forest(|f| ForestOptions {
             trees: f.trees.min(CANDIDATE_TREES),
-            most_rows: Some(MOST_ROWS),
+            most_rows: Some((MOST_ROWS, 0.0)),
+            ..f
+        })
+    }
+
+    /// The same to be judged at a speed in m/s.
+    pub(crate) fn near(self, speed_m_per_s: f64) -> Self {
+        self.with_forest(|f| ForestOptions {
+            most_rows: f.most_rows.map(|(most, _)| (most, speed_m_per_s)),
             ..f
         })
     }
