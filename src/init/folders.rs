@@ -138,14 +138,15 @@ const OTHERS: [&str; 10] =
     [".png", ".jpg", ".svg", ".pdf", ".csv", ".h5", ".html", ".toml", ".json", ".py"];
 
 /// Files that are not read and may hold what a run lacks: those of a restart, such as `nodout01`, and those with nearly the
-/// name of a file that is not there, such as `rwforc.gz` and `RWFORC`; each with what to do.
-pub(super) fn unread_beside(folder: &Path) -> Vec<String> {
+/// name of a file that is not there, such as `rwforc.gz` and `RWFORC`, unless a binary file has its histories; each with what to do.
+pub(super) fn unread_beside(folder: &Path, is_read: impl Fn(&str) -> bool) -> Vec<String> {
     let entries = folder.read_dir().into_iter().flatten().filter_map(Result::ok);
     let mut names: Vec<String> = entries.map(|entry| shown_name(&entry.path())).collect();
     names.sort();
     let mut found = Vec::new();
     for kind in [MOTION].into_iter().chain(FORCES).chain(ENERGIES) {
         let is_there = names.iter().any(|name| without_job_id(name) == kind);
+        let is_read = is_there || is_read(kind);
         for name in &names {
             let lower = name.to_lowercase();
             let rest = without_job_id(name).strip_prefix(kind);
@@ -154,7 +155,7 @@ pub(super) fn unread_beside(folder: &Path) -> Vec<String> {
                     !rest.is_empty() && rest.bytes().all(|b| b.is_ascii_digit())
                 });
             let is_nearly_so =
-                !is_there && lower.contains(kind) && !OTHERS.iter().any(|end| lower.ends_with(end));
+                !is_read && lower.contains(kind) && !OTHERS.iter().any(|end| lower.ends_with(end));
             let what = match PACKED.iter().any(|end| lower.ends_with(end)) {
                 _ if is_of_restart => {
                     "it is named like the file of a restart: append its states to the first file to have them read".into()
@@ -263,7 +264,7 @@ impl LeftOut {
         let mut message = reason.to_string();
         // What the record lacks may stand beside it.
         if !matches!(reason, Reason::NoMotion { .. } | Reason::Renamed { .. }) {
-            for why in unread_beside(&path) {
+            for why in unread_beside(&path, |_| false) {
                 message.push_str(&format!(" (not read: {why})"));
             }
         }

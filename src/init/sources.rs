@@ -67,13 +67,18 @@ impl Sources {
                 Err(error) => unread.push(error.to_string()),
             }
         }
-        unread.extend(unread_beside(folder));
         let deck = deck_of(folder);
         if let Some((_, deck)) = &deck {
             for section in listed.iter_mut().flat_map(|(_, sections)| sections) {
                 decks::fill_titles(section, deck);
             }
         }
+        let sections = listed.iter().flat_map(|(_, sections)| sections);
+        let is_read = |name: &str| {
+            let holds = |s: &SolverFile| is_section_of(&s.section, name) && !s.time.is_empty();
+            sections.clone().any(holds)
+        };
+        unread.extend(unread_beside(folder, is_read));
         let motion = Source::choose(folder, MOTION, &listed).ok_or_else(|| {
             let mut found: Vec<String> = files.iter().map(|path| shown_name(path)).collect();
             let of_motion = unread.iter().find(|why| why.to_lowercase().contains(MOTION));
