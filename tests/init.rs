@@ -10,7 +10,7 @@ use crumple::database::Database;
 use serde_json::Value;
 use toml::Table;
 
-use crate::common::containers::binout_of;
+use crate::common::containers::{binout_of, binout_with};
 use crate::common::crash::{Crash, Force, History, Layout, MM_KG_MS, MM_T_S, Motions, Node, SI};
 use crate::common::{
     crumple_fails, crumple_in, crumple_ok, demo_folder, entries, fixture, is_thorough,
@@ -1884,4 +1884,31 @@ fn tonnes_and_metres_are_considered() {
         "warning: units: SI is assumed, which gives a body of 1.2 kg; if the model is in m-t-s (forces in kN), which gives 1.2 t, use --units m-t-s",
     );
     assert!(!warned(here, "init tonnes --units m-t-s -o stated.toml").contains("units:"));
+}
+
+/// Of the motion one component is enough, and of that one the displacement.
+#[test]
+fn one_component_of_the_motion_is_enough() {
+    let (_folder, here) = four_runs();
+    let run = here.join("48kmh");
+    for (lacks, from) in [
+        (&["y_", "z_"][..], "# read: x_velocity of 900001 in the first state"),
+        (
+            &["y_", "z_", "x_v"],
+            "# computed: rate of the x_displacement of 900001 in the first state",
+        ),
+    ] {
+        let is_kept = |component: &str| {
+            component.ends_with("_force") || !lacks.iter().any(|lack| component.starts_with(lack))
+        };
+        let folder = here.join(format!("lacks{}", lacks.len()));
+        fs::create_dir(&folder).unwrap();
+        fs::write(folder.join("binout0000"), binout_with(&run, is_kept)).unwrap();
+        let name = folder.file_name().unwrap().to_str().unwrap().to_string();
+        let text = crumple_ok(&here, &["init", &name, "-o", "-"]);
+        says(&text, from);
+        let study: Table = text.parse().unwrap();
+        let speed = number(&study["run"][0]["speed"], "km/h");
+        assert!((speed / 48.0 - 1.0).abs() < 2e-3, "{speed}");
+    }
 }

@@ -1282,6 +1282,32 @@ fn a_curve_of_another_impact_is_said() {
     }
 }
 
+/// So is one that drives an interface inside a train, which closes more slowly than the trains; a model is not.
+#[test]
+fn a_curve_of_another_speed_inside_a_train_is_said() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let warnings = |inner: &str, interval: &str| -> String {
+        let curves =
+            format!("nose = {{ model = \"lead.model\" }}\ninner = {{ {inner}, gap = \"32mm\" }}");
+        let vehicle = |name, mass| format!("{{ name = \"{name}\", mass = \"{mass}t\" }}");
+        let vehicles = [vehicle("A1", "24"), vehicle("A2", "20.24"), vehicle("A3", "20.24")];
+        let vehicles = format!("inner = \"inner\"\nvehicles = [ {} ]", vehicles.join(", "));
+        let text = scenario(&curves, &vehicles, "[wall]");
+        std::fs::write(here.join("inner.toml"), text.replace("0.75ms", interval)).unwrap();
+        parsed(&crumple_ok(here, "simulate inner.toml --json -q"))["warnings"].to_string()
+    };
+    let case = |speed: &str| format!("database = \"curves.h5\", case = \"vehicle-pair/{speed}\"");
+    let fast = warnings(&case("72kmh"), "0.75ms");
+    says(&fast, "\\\"inner\\\": it is for 72 km/h, but what it drives closes at other speeds (A");
+    says(&fast, "A1|A2 at ");
+    let said = "closes at other speeds";
+    assert!(!warnings(&case("9kmh"), "0.75ms").contains(said));
+    assert!(!warnings("model = \"vehicle.model\"", "0.75ms").contains(said));
+    // Outputs that do not show how an interface begins to close say nothing.
+    assert!(!warnings(&case("72kmh"), "10ms").contains(said));
+}
+
 /// A1 is braked by 2 MN, A2 is not: their gap of 30 mm closes after √(2 · 0.03 m · 24 t / 2 MN), whatever the outputs.
 #[test]
 fn a_contact_has_its_own_time() {

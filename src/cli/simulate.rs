@@ -46,8 +46,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     }
     let prepared = scenario::load(&args.scenario)?;
     let run = prepared.run()?;
-    let mut warnings = prepared.warnings.clone();
-    warnings.extend(run.all_warnings());
+    let warnings = prepared.warnings_of(&run);
     let outcome = options.warn_all(&warnings);
     let columns = columns(&prepared, &run);
     let to_stdout = args.output.as_deref().is_some_and(is_stdout);

@@ -416,15 +416,20 @@ impl Facts<'_> {
             _ => format!("in the last state before the contact, at {:.3} ms", time_s * 1e3),
         };
         let unit = self.units.value().and_then(|units| SPEED.name_of(units.speed()));
+        let direction = self.recipe.direction;
+        let is_read = record.run.sources.motion.has(direction.velocity());
         let of = format!(
             "{} of {} {when}: {} {}",
-            self.recipe.direction.velocity(),
+            match is_read {
+                true => direction.velocity().into(),
+                false => format!("rate of the {}", direction.name()),
+            },
             nodes.join(" and "),
             values.join(" and "),
             unit.unwrap_or_default()
         );
         let (evidence, from) = match (values.len(), self.hints.half_model) {
-            (1, false) => (Read, of),
+            (1, false) => (if is_read { Read } else { Computed }, of),
             (1, true) => (Computed, format!("twice the {of}")),
             _ => (Computed, format!("difference of the {of}")),
         };

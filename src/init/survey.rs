@@ -98,11 +98,10 @@ impl Survey {
     /// Looks over a run. A recipe's force may be named, which is then kept however small it is; several are added.
     pub(super) fn of(sources: &Sources, named: &[Named]) -> Result<Self, Reason> {
         let source = &sources.motion;
-        let components = if source.has("x_velocity") {
-            DisplacementComponent::ALL.map(DisplacementComponent::velocity)
-        } else {
-            DisplacementComponent::ALL.map(DisplacementComponent::name)
-        };
+        let components = DisplacementComponent::ALL.map(|along| match along.velocity() {
+            velocity if source.has(velocity) => velocity,
+            _ => along.name(),
+        });
         let mut held = None;
         let mut each_node =
             |look: &mut dyn FnMut(&SolverFile)| each_batch(source, &components, &mut held, look);
@@ -216,8 +215,14 @@ fn starts(
         }
         for node in by_entity(&piece.histories) {
             let Some(entity) = node[0].entity else { continue };
-            let velocities = DisplacementComponent::ALL
-                .map(|along| velocity(node, along, &states).and_then(mended));
+            // What is not recorded across the motion is taken to be at rest.
+            let velocities = DisplacementComponent::ALL.map(|along| {
+                let is_recorded = source.has(along.velocity()) || source.has(along.name());
+                match is_recorded {
+                    true => velocity(node, along, &states).and_then(mended),
+                    false => Some(vec![0.0; states.len()]),
+                }
+            });
             let [Some(x), Some(y), Some(z)] = velocities else { continue };
             let velocities = [x, y, z];
             let change = |v: &Vec<f64>| v.iter().map(|v_i| (v_i - v[0]).abs()).fold(0.0, f64::max);

@@ -105,10 +105,7 @@ pub(super) fn add(
     let crush = run.interfaces.iter().map(|i| i.max_deflection_m).fold(0.0, f64::max);
     let key = KeyFigure { value: metres(crush), name: format!("maximum crush, {name}") };
     content.figures.push(key);
-    for warning in &prepared.warnings {
-        content.warn(ToDo::CheckScenario, &name, warning.clone());
-    }
-    for warning in run.all_warnings() {
+    for warning in prepared.warnings_of(&run) {
         content.warn(ToDo::CheckScenario, &name, warning);
     }
     if read.reference.is_some() && settings.methods != MethodSpeeds::None {

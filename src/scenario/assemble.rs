@@ -180,17 +180,19 @@ fn no_chain(
 /// of neighbouring runs differ by some per cent.
 const SAME_RUN: f64 = 0.05;
 
-/// A curve that is of one impact, and the interface where it drives the first of the train.
+/// A curve that is of one impact, and the first interface that it drives.
 #[derive(Clone, Debug)]
 pub(super) struct OfOneImpact {
-    curve: String,
+    pub curve: String,
     interface: String,
+    /// Whether the trains meet there; elsewhere bodies close as the run has it.
+    is_meeting: bool,
     speed_m_per_s: Option<f64>,
     mass_kg: Option<f64>,
 }
 
 impl OfOneImpact {
-    fn new(curve: &str, interface: &str, spring: &Spring, source: &CurveSource) -> Self {
+    fn new(curve: &str, slot: &Connection<'_>, spring: &Spring, source: &CurveSource) -> Self {
         let mass_kg = match source {
             CurveSource::Case(case) => Some(case.conditions.masses.equal_kg()),
             CurveSource::Predicted(curve) => {
@@ -200,7 +202,9 @@ impl OfOneImpact {
             _ => None,
         };
         let speed_m_per_s = spring.curve.speed_m_per_s;
-        Self { curve: curve.into(), interface: interface.into(), speed_m_per_s, mass_kg }
+        let is_meeting = matches!(slot.role, Role::Wall | Role::Noses);
+        let (curve, interface) = (curve.into(), slot.name.clone());
+        Self { curve, interface, is_meeting, speed_m_per_s, mass_kg }
     }
 
     /// Warns if it is of another speed or mass than the impact it drives, as a model does that is used
@@ -209,6 +213,9 @@ impl OfOneImpact {
         let differs = |a: f64, b: f64| (a / b - 1.0).abs() > SAME_RUN;
         let Self { curve, interface, .. } = self;
         let mut warnings = Vec::new();
+        if !self.is_meeting {
+            return warnings;
+        }
         if let Some(own) = self.speed_m_per_s.filter(|own| differs(*own, meeting_m_per_s)) {
             warnings.push(format!(
                 "curve \"{curve}\": it is for {}, but {interface} closes at {}: forces depend on the impact speed; give the curve of this speed, or a model (crumple train)",
@@ -478,8 +485,8 @@ impl<'a> Builder<'a> {
         self.check_kind(slot, curve, spring.curve.speed_kind)?;
         let speed_m_per_s = spring.curve.speed_m_per_s;
         let is_model = matches!(source, CurveSource::Model(_));
-        if !is_model && matches!(slot.role, Role::Wall | Role::Noses) {
-            self.of_one.push(OfOneImpact::new(curve, &slot.name, &spring, source));
+        if !is_model {
+            self.of_one.push(OfOneImpact::new(curve, slot, &spring, source));
         }
         let force = spring.curve.kind.map(super::super::curve::ForceKind::name);
         let (law, said) =

@@ -31,6 +31,8 @@ const RELAXATION: f64 = 0.5;
 const PROMINENCE: f64 = 0.1;
 /// States for the speeds, in s; forces rise within some milliseconds.
 const INTERVAL_S: f64 = 0.5e-3;
+/// Outputs further apart do not show how fast an interface closes at first, in s.
+const LONGEST_INTERVAL_S: f64 = 5e-3;
 /// What closes for the first time after this is not looked for, in s.
 const LONGEST_S: f64 = 5.0;
 /// No curve is requested below this speed, in m/s: an interface that hardly closes.
@@ -96,6 +98,50 @@ pub(crate) fn assemble(
     }
     prepared.warnings.extend(slow_interfaces(&prepared, sources));
     Ok(prepared)
+}
+
+/// Speeds of a curve and of an interface inside a train that differ by this factor are two: one curve drives many interfaces.
+const OTHER_SPEED: f64 = 1.5;
+/// A crush below this share of a curve's data says nothing of it.
+const HARDLY_CRUSHED: f64 = 0.1;
+/// Interfaces that a warning names.
+const NAMED: usize = 3;
+
+impl Prepared {
+    /// Warnings of a run and of its curves, with those of curves of one impact that drive interfaces inside a train which close at
+    /// another speed.
+    pub fn warnings_of(&self, run: &Run) -> Vec<String> {
+        let mut warnings = self.warnings.clone();
+        let interfaces = self.chain.interfaces().iter().zip(&run.interfaces).zip(&self.used);
+        let mut others: BTreeMap<&str, (f64, Vec<String>)> = BTreeMap::new();
+        for (k, ((interface, history), used)) in interfaces.enumerate() {
+            let is_of_one = self.of_one.0.iter().any(|of| of.curve == used.curve);
+            let is_crushed = history.max_deflection_m > HARDLY_CRUSHED * history.data_end_m;
+            let (true, true, Some(own), Some(closing)) = (
+                k != self.meeting && is_of_one && is_crushed,
+                self.settings.output_interval_s <= LONGEST_INTERVAL_S,
+                used.speed_m_per_s,
+                closing_speed(&self.chain, run, k),
+            ) else {
+                continue;
+            };
+            if (closing / own).max(own / closing) > OTHER_SPEED {
+                let (_, closes) = others.entry(&used.curve).or_insert((own, Vec::new()));
+                closes.push(format!("{} at {}", interface.name, km_per_h(closing)));
+            }
+        }
+        warnings.extend(others.into_iter().map(|(curve, (own, closes))| {
+            let more = closes.len().saturating_sub(NAMED);
+            let more = if more > 0 { format!(", and {more} more") } else { String::new() };
+            format!(
+                "curve \"{curve}\": it is for {}, but what it drives closes at other speeds ({}{more}): forces depend on the speed; a model (crumple train) gives each interface the curve of its own",
+                km_per_h(own),
+                closes.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ")
+            )
+        }));
+        warnings.extend(run.all_warnings());
+        warnings
+    }
 }
 
 /// Takes the closing speeds of a run for the interfaces with curves of their `own`, and the trains' for those that never

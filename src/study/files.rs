@@ -76,7 +76,10 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
             if let Some(damaged) = damaged {
                 found = format!("{found}; {damaged}");
             }
-            let hint = guess::hint(name, &found);
+            let hint = match names.iter().any(|there| there == name) {
+                true => ", of which this one is not a regular file".into(),
+                false => guess::hint(name, &found),
+            };
             return Err(error!(
                 Run,
                 "the run's folder {} has no file \"{name}\": it has {found}{hint}",

@@ -44,7 +44,7 @@ impl Written {
     }
 
     /// A section of one width with what its text says of itself, its entities and their values.
-    fn section(&mut self, section: &str, file: &SolverFile) {
+    fn section(&mut self, section: &str, file: &SolverFile, keeps: impl Fn(&str) -> bool) {
         const TITLE: usize = 80;
         let integers = |values: &[i64]| values.iter().flat_map(|v| v.to_le_bytes()).collect();
         let ids: Vec<i64> = file.entities.iter().map(|entity| entity.id.id).collect();
@@ -62,7 +62,7 @@ impl Written {
         for (state, &time) in file.time.iter().enumerate() {
             self.cd(&format!("/{section}/d{:06}", state + 1));
             self.reals("time", &[time]);
-            for component in &file.components {
+            for component in file.components.iter().filter(|component| keeps(component)) {
                 let of = |e: &Entity| Some(file.history(Some(e.id), component)?.values[state]);
                 let values: Option<Vec<f64>> = file.entities.iter().map(of).collect();
                 self.reals(component, &values.unwrap());
@@ -78,12 +78,17 @@ fn padded(text: &Option<String>, width: usize) -> String {
 
 /// The text histories of a run as one binout, with the titles of their entities.
 pub fn binout_of(run: &Path) -> Vec<u8> {
+    binout_with(run, |_| true)
+}
+
+/// The same with some of their components.
+pub fn binout_with(run: &Path, keeps: impl Fn(&str) -> bool) -> Vec<u8> {
     let mut out = Written::new();
     for (name, section) in [("nodout", "nodout"), ("rwforc", "rwforc/forces"), ("rcforc", "rcforc")]
     {
         let path = run.join(name);
         if path.exists() {
-            out.section(section, &read(&path, None, &Selection::all()).unwrap());
+            out.section(section, &read(&path, None, &Selection::all()).unwrap(), &keeps);
         }
     }
     out.bytes
