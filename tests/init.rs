@@ -1819,15 +1819,18 @@ fn what_lies_unread_beside_a_run_is_named() {
     says(&fs::read_to_string(here.join("alone.toml")).unwrap(), "times = \"mass\"");
     // A backup beside the file itself is none of the run's, nor is a picture.
     rename("36kmh", "rwforc.gz", "rwforc");
-    for name in ["rwforc.bak", "nodout.png"] {
+    // Nor are decks and folders that have the name of a force.
+    for name in ["rwforc.bak", "nodout.png", "database_spcforc.k", "secforc.inc", "plot_rcforc.gp"]
+    {
         fs::write(here.join("36kmh").join(name), "").unwrap();
     }
+    fs::create_dir(here.join("36kmh/rcforc_plots")).unwrap();
     assert_eq!(warned(&here, "init -o backup.toml"), "");
     for run in ["25kmh", "36kmh", "48kmh", "60kmh"] {
         fs::write(here.join(run).join("rwforc"), "").unwrap();
     }
     let said = warned(&here, "init -o empty.toml");
-    assert_eq!(said.matches("rwforc: it holds no complete state").count(), 4, "{said}");
+    assert_eq!(said.matches("rwforc: there is no complete state in it").count(), 4, "{said}");
     // All names in capital letters.
     rename("48kmh", "rwforc", "RWFORC");
     rename("48kmh", "nodout", "NODOUT");

@@ -191,7 +191,7 @@ fn what_is_not_as_it_should_be_is_said_with_what_to_do() {
     fs::rename(here.join("runs/48kmh/nodout"), here.join("runs/48kmh/Nodout.txt")).unwrap();
     fails(
         &["runs/48kmh"],
-        "it has rwforc, (runs/48kmh/Nodout.txt: if it is the nodout, rename it accordingly)",
+        "it has rwforc (runs/48kmh/Nodout.txt: if it is the nodout, rename it accordingly)",
     );
     // A folder without anything, beside one with a run.
     fs::remove_dir_all(here.join("runs/48kmh")).unwrap();

@@ -1302,8 +1302,23 @@ fn a_curve_of_another_speed_inside_a_train_is_said() {
     says(&fast, "\\\"inner\\\": it is for 72 km/h, but what it drives closes at other speeds (A");
     says(&fast, "A1|A2 at ");
     let said = "closes at other speeds";
-    assert!(!warnings(&case("9kmh"), "0.75ms").contains(said));
+    assert!(!warnings(&case("12kmh"), "0.75ms").contains(said));
     assert!(!warnings("model = \"vehicle.model\"", "0.75ms").contains(said));
+    // Where trains meet it is said of a curve that is also within them.
+    let both = format!(
+        "{}\n[[train]]\nname = \"B\"\nspeed = \"0km/h\"\nvehicles = [ {{ name = \"B1\", mass = \"24t\" }} ]\n[contact]\ncurve = \"nose\"\n",
+        scenario(
+            &format!("nose = {{ {} }}", case("72kmh")),
+            "inner = \"nose\"\nvehicles = [ { name = \"A1\", mass = \"24t\" }, { name = \"A2\", mass = \"24t\" } ]",
+            "",
+        )
+        .split("\n[contact]")
+        .next()
+        .unwrap()
+    );
+    std::fs::write(here.join("both.toml"), both).unwrap();
+    let both = parsed(&crumple_ok(here, "simulate both.toml --json -q"))["warnings"].to_string();
+    says(&both, "it is for 72 km/h, but A1|B1 closes at 36 km/h");
     // Outputs that do not show how an interface begins to close say nothing.
     assert!(!warnings(&case("72kmh"), "10ms").contains(said));
 }

@@ -185,7 +185,7 @@ pub(crate) fn compare(
             }
         };
         return Err(error!(
-            Usage,
+            Comparison,
             "the fixed curve is that of {asked}, {which}: choose another one",
             asked = km_per_h(asked)
         ));

@@ -231,8 +231,12 @@ pub(crate) fn validate_speeds(
         fitting = fitting.into_iter().map(ModelKind::judged).collect();
     }
     if set.cases.len() > most_speeds && !left_out.is_empty() {
+        let rows = match set.features.is_empty() {
+            true => "4 000 rows, the nearest in speed",
+            false => "8 000 rows",
+        };
         notes.push(format!(
-            "{most_speeds} of {} cases, spread over the range, are left out in turn, and forests judged with at most 50 trees and 4 000 rows, the nearest in speed: crumple validate --thorough leaves out every speed",
+            "{most_speeds} of {} cases, spread over the range, are left out in turn, and forests judged with at most 50 trees and {rows}: crumple validate --thorough leaves out every speed",
             set.cases.len()
         ));
     }

@@ -435,7 +435,7 @@ impl TrainingSet {
     }
 
     /// The same table of the declared force or of the body's; with at most so many rows, those of the cases nearest to a speed in
-    /// m/s, two at least. Where other features distinguish cases, all are thinned evenly.
+    /// m/s, half of them on either side if there are so many. Where other features distinguish cases, all are thinned evenly.
     pub(crate) fn table_of(
         &self,
         kind: TableKind,
@@ -454,16 +454,20 @@ impl TrainingSet {
             // Those from all over the range are worth less.
             step = rows.div_ceil(2 * most).max(1);
         } else if let Some((most, near)) = most_rows {
-            let distance = |k: &usize| (self.cases[*k].speed_m_per_s - near).abs();
-            chosen.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
-            let mut rows = 0;
-            let fits = |k: &&usize| {
-                rows += points[**k].0.len();
-                rows <= most
-            };
-            let count = chosen.iter().take_while(fits).count().max(2);
-            chosen.truncate(count);
-            chosen.sort_unstable();
+            // The nearest of the side that has fewer rows, in turn.
+            let faster = self.cases.partition_point(|case| case.speed_m_per_s <= near);
+            let (mut range, mut rows) = (faster..faster, [0, 0]);
+            loop {
+                let slower = (range.start > 0).then(|| (rows[0], 0, range.start - 1));
+                let faster = (range.end < points.len()).then(|| (rows[1], 1, range.end));
+                let Some((_, side, k)) = slower.into_iter().chain(faster).min() else { break };
+                rows[side] += points[k].0.len();
+                if rows[0] + rows[1] > most && !range.is_empty() {
+                    break;
+                }
+                range = range.start.min(k)..range.end.max(k + 1);
+            }
+            chosen = range.collect();
         }
         for (case, (deflection_m, force_n)) in
             chosen.into_iter().map(|k| (&self.cases[k], &points[k]))

@@ -545,14 +545,16 @@ fn taken(kept: f64) -> String {
 fn doubts_of_speed(record: &Record, impact: &Impact) -> Vec<String> {
     let (run, first) = (&record.run, record.closing(impact.state.0));
     let mut notes = Vec::new();
-    if record.starts_in_contact() {
+    let named = speed_in(&run.name);
+    let is_as_named = named.is_some_and(|named| is_near(named, impact.speed_m_per_s, SAME_SPEED));
+    if record.starts_in_contact() && !is_as_named {
         notes.push(
-            "the record starts in contact, so the speed of its first state is not that of the impact: write that one, or provide the earlier states"
+            "the record starts in contact, so the speed of its first state is not that of the impact: write the impact's speed, or provide the earlier states"
                 .into(),
         );
     }
-    if let Some(named) = speed_in(&run.name)
-        && !is_near(named, impact.speed_m_per_s, SAME_SPEED)
+    if let Some(named) = named
+        && !is_as_named
     {
         notes.push(format!(
             "the folder's name states {}, the record {}",

@@ -12,8 +12,8 @@ use crate::error::{Error, error};
 use crate::file::folder_of;
 use crate::guess;
 use crate::solver::decks::{self, Search};
-use crate::solver::runs::{renamed_files, run_folders};
-use crate::solver::without_job_id;
+use crate::solver::runs::{output_files, renamed_files, run_folders};
+use crate::solver::{is_named_like_binary, without_job_id};
 use crate::study::files::shown_name;
 use crate::unit::M_PER_S_PER_MPH;
 
@@ -132,35 +132,49 @@ fn without_files(folder: &Path) -> Reason {
     }
 }
 
-/// Ends of the names of packed files, and of those that hold pictures, tables and the like.
-const PACKED: [&str; 7] = [".gz", ".bz2", ".xz", ".zst", ".zip", ".7z", ".z"];
-const OTHERS: [&str; 10] =
-    [".png", ".jpg", ".svg", ".pdf", ".csv", ".h5", ".html", ".toml", ".json", ".py"];
+/// Ends of the names of packed files, of those that were put aside, and of those that hold pictures, tables, decks and the like.
+const PACKED: [&str; 7] = ["gz", "bz2", "xz", "zst", "zip", "7z", "z"];
+const ASIDE: [&str; 6] = ["bak", "old", "orig", "txt", "out", "dat"];
+const OTHERS: [&str; 18] = [
+    "png", "jpg", "svg", "pdf", "csv", "h5", "html", "toml", "json", "py", "k", "key", "inc",
+    "dyn", "rad", "gp", "log", "xlsx",
+];
+
+/// Whether a file has nearly the name of another, `rwforc`: `rwforc.gz`, `RWFORC`, `rwforc_1`, or with a job id `car.rwforc.bak`.
+fn is_named_nearly(name: &str, kind: &str) -> bool {
+    let name = name.to_lowercase();
+    let words: Vec<&str> = name.split(|c: char| !c.is_ascii_alphanumeric()).collect();
+    let is_end = |word: &&str| PACKED.contains(word) || ASIDE.contains(word);
+    match words.iter().position(|word| *word == kind) {
+        Some(0) => !OTHERS.contains(&words[words.len() - 1]),
+        Some(at) => words[at + 1..].iter().all(is_end),
+        None => false,
+    }
+}
 
 /// Files that are not read and may hold what a run lacks: those of a restart, such as `nodout01`, and those with nearly the
 /// name of a file that is not there, such as `rwforc.gz` and `RWFORC`, unless a binary file has its histories; each with what to do.
 pub(super) fn unread_beside(folder: &Path, is_read: impl Fn(&str) -> bool) -> Vec<String> {
     let entries = folder.read_dir().into_iter().flatten().filter_map(Result::ok);
-    let mut names: Vec<String> = entries.map(|entry| shown_name(&entry.path())).collect();
+    let paths = entries.map(|entry| entry.path()).filter(|path| path.is_file());
+    let mut names: Vec<String> = paths.map(|path| shown_name(&path)).collect();
     names.sort();
     let mut found = Vec::new();
     for kind in [MOTION].into_iter().chain(FORCES).chain(ENERGIES) {
         let is_there = names.iter().any(|name| without_job_id(name) == kind);
         let is_read = is_there || is_read(kind);
         for name in &names {
-            let lower = name.to_lowercase();
             let rest = without_job_id(name).strip_prefix(kind);
             let is_of_restart = is_there
                 && rest.is_some_and(|rest| {
                     !rest.is_empty() && rest.bytes().all(|b| b.is_ascii_digit())
                 });
-            let is_nearly_so =
-                !is_read && lower.contains(kind) && !OTHERS.iter().any(|end| lower.ends_with(end));
-            let what = match PACKED.iter().any(|end| lower.ends_with(end)) {
+            let end = name.rsplit('.').next().unwrap_or_default().to_lowercase();
+            let what = match PACKED.contains(&&*end) {
                 _ if is_of_restart => {
                     "it is named like the file of a restart: append its states to the first file to have them read".into()
                 }
-                _ if !is_nearly_so => continue,
+                _ if is_read || !is_named_nearly(name, kind) => continue,
                 true => format!("if it is the {kind}, unpack it and name it {kind}"),
                 false => format!("if it is the {kind}, rename it accordingly"),
             };
@@ -217,14 +231,17 @@ pub(super) fn speed_in(name: &str) -> Option<f64> {
     let name = name.to_ascii_lowercase();
     for (at, _) in name.match_indices(|c: char| c.is_ascii_digit()) {
         let before = name[..at].chars().next_back();
-        if before.is_some_and(|c| c.is_ascii_digit() || matches!(c, '.' | ',')) {
+        if before.is_some_and(|c| c.is_ascii_digit() || c == '.') {
             continue;
         }
-        let end = name[at..].find(|c: char| !c.is_ascii_digit() && !matches!(c, '.' | ','));
+        // In "case1,48kmh" a comma separates.
+        let has_comma = before.is_none_or(|c| !c.is_alphabetic());
+        let is_of_number = |c: char| c.is_ascii_digit() || c == '.' || (c == ',' && has_comma);
+        let end = name[at..].find(|c: char| !is_of_number(c));
         let (number, unit) = name[at..].split_at(end.unwrap_or(name.len() - at));
         // "45_5kmh" may be 45.5 km/h, or 5 km/h of run 45.
         let mut ahead = name[..at].chars().rev();
-        let joins = ahead.next().is_some_and(|c| matches!(c, '_' | '-' | 'p'));
+        let joins = ahead.next().is_some_and(|c| matches!(c, '_' | '-' | 'p' | ','));
         if number.len() == 1 && joins && ahead.next().is_some_and(|c| c.is_ascii_digit()) {
             continue;
         }
@@ -264,8 +281,15 @@ impl LeftOut {
         let mut message = reason.to_string();
         // What the record lacks may stand beside it.
         if !matches!(reason, Reason::NoMotion { .. } | Reason::Renamed { .. }) {
-            for why in unread_beside(&path, |_| false) {
+            let files = output_files(&path).unwrap_or_default();
+            let has_binary = files.iter().any(|file| is_named_like_binary(&shown_name(file)));
+            for why in unread_beside(&path, |_| has_binary) {
                 message.push_str(&format!(" (not read: {why})"));
+            }
+            for file in FORCES.map(|force| path.join(force)) {
+                if file.metadata().is_ok_and(|file| file.len() == 0) {
+                    message.push_str(&format!(" ({} is empty)", file.display()));
+                }
             }
         }
         Self { path, message, reason, entry: None }
@@ -378,6 +402,9 @@ mod tests {
         t("36,5 km_h", Some(36.5));
         t("run2_48kmh", Some(48.0));
         t("45_5kmh", None);
+        t("case1,48kmh", Some(48.0));
+        t("crash,25kmh", Some(25.0));
+        t("v36,5kmh", None);
     }
 
     #[test]

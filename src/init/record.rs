@@ -24,8 +24,8 @@ pub(super) struct Run {
 
 /// A force below this share of its largest is none.
 const NO_FORCE: f64 = 0.01;
-/// A first displacement below this share of what follows is none.
-const MOVED: f64 = 0.01;
+/// A body that has moved by this share of what follows is slower than at the impact.
+const MOVED: f64 = 0.1;
 /// A motion that goes on for more states than this goes on without its force.
 const FURTHER: usize = 3;
 /// A flight after the contact that is shorter than this, in states and as a share of the record,
@@ -331,7 +331,11 @@ impl Record {
     fn masses_by_energy(&self) -> Option<Vec<f64>> {
         let energy = self.run.sources.energy.as_ref()?.read(None, &["kinetic_energy"]).ok()?;
         // The energies may be recorded from an earlier time on than the motion.
+        let is_late = self.starts_in_contact();
         let first = |part: &History| {
+            if !is_late {
+                return part.values.first().copied();
+            }
             let states = rising(&part.time);
             let (time, values) = (picked(&part.time, &states), picked(&part.values, &states));
             let at = self.time[0].clamp(*time.first()?, *time.last()?);

@@ -73,17 +73,19 @@ impl Sources {
                 decks::fill_titles(section, deck);
             }
         }
-        let sections = listed.iter().flat_map(|(_, sections)| sections);
-        let is_read = |name: &str| {
-            let holds = |s: &SolverFile| is_section_of(&s.section, name) && !s.time.is_empty();
-            sections.clone().any(holds)
+        // Of forces and energies one is enough.
+        let is_read = |kind: &str| {
+            let same = [&FORCES[..], &ENERGIES[..]].into_iter().find(|kinds| kinds.contains(&kind));
+            same.unwrap_or(&[MOTION]).iter().any(|name| {
+                Source::choose(folder, name, &listed).is_some_and(|source| source.states > 0)
+            })
         };
         unread.extend(unread_beside(folder, is_read));
         let motion = Source::choose(folder, MOTION, &listed).ok_or_else(|| {
-            let mut found: Vec<String> = files.iter().map(|path| shown_name(path)).collect();
+            let found: Vec<String> = files.iter().map(|path| shown_name(path)).collect();
             let of_motion = unread.iter().find(|why| why.to_lowercase().contains(MOTION));
-            found.extend(of_motion.or(unread.first()).map(|why| format!("({why})")));
-            Reason::NoMotion { found: found.join(", ") }
+            let why = of_motion.or(unread.first()).map(|why| format!(" ({why})"));
+            Reason::NoMotion { found: found.join(", ") + &why.unwrap_or_default() }
         })?;
         let chosen = FORCES.iter().filter_map(|name| Source::choose(folder, name, &listed));
         // LS-DYNA's rigid bodies have motions, those of OpenRadioss forces.
@@ -95,7 +97,7 @@ impl Sources {
             .collect();
         if forces.iter().all(|source| source.states == 0) {
             let empty = forces.iter().map(|source| source.path.display());
-            unread.extend(empty.map(|path| format!("{path}: it holds no complete state")));
+            unread.extend(empty.map(|path| format!("{path}: there is no complete state in it")));
         }
         let mut parts = motion.parts();
         for part in forces.iter().flat_map(Source::parts) {

@@ -249,7 +249,7 @@ struct CachedLaw {
 }
 
 /// What decides a law: its curve; role, and whether vehicles are split; speed and mass if a model gives it.
-type LawKey = (String, (bool, bool, bool, u64, u64));
+type LawKey = (String, (u8, bool, u64, u64));
 
 /// Laws of models, with the table that each was made for, so that a sweep, whose interfaces close at few different speeds,
 /// makes each once.
@@ -449,13 +449,7 @@ impl<'a> Builder<'a> {
         let source = source.ok_or_else(|| self.not_read(curve))?;
         let is_model = matches!(source, CurveSource::Model(_));
         let of_model = |value: f64| if is_model { value.to_bits() } else { 0 };
-        let key = (
-            slot.role == Role::Wall,
-            slot.role == Role::Within,
-            slot.split,
-            of_model(speed),
-            of_model(slot.mass_kg),
-        );
+        let key = (slot.role as u8, slot.split, of_model(speed), of_model(slot.mass_kg));
         let key = (curve.to_string(), key);
         // What belongs to the interface and not to its law.
         let of_law = CurveTable { gap: None, tension: None, damping: None, ..table.clone() };
