@@ -56,7 +56,7 @@ pub(crate) fn steepest_rise(deflection_m: &[f64], force_n: &[f64]) -> f64 {
     if rise > 0.0 { rise } else { of_jumps }
 }
 
-/// The steepest rise that is no jump, and that of jumps, in N/m; 0 if there is none.
+/// The steepest rise that is not a jump, and that of jumps, in N/m; 0 if there is none.
 pub(super) fn steepest_rises(deflection_m: &[f64], force_n: &[f64]) -> [f64; 2] {
     let step_m = |i: &usize| deflection_m[*i] - deflection_m[i - 1];
     let jump_m = STEP_WIDTH_SHARE * (1.0 + 1e-6) * deflection_m.last().copied().unwrap_or(0.0);

@@ -306,6 +306,9 @@ pub(crate) fn is_within(speed: f64, (low, high): (f64, f64)) -> bool {
     (low <= speed || is_same_speed(low, speed)) && (speed <= high || is_same_speed(high, speed))
 }
 
+/// Cases near a speed that a forest learns from at least, if there are so many.
+const FEWEST_NEAR: usize = 10;
+
 /// Most steps of a grid: 40 m of [`GRID_M`], more than any vehicle crushes.
 const MOST_STEPS: f64 = 20_000.0;
 
@@ -435,7 +438,8 @@ impl TrainingSet {
     }
 
     /// The same table of the declared force or of the body's; with at most so many rows, those of the cases nearest to a speed in
-    /// m/s, half of them on either side if there are so many. Where other features distinguish cases, all are thinned evenly.
+    /// m/s, half of them on either side if there are so many; of [`FEWEST_NEAR`] cases with more rows, each is thinned. Where other
+    /// features distinguish cases, all are thinned evenly.
     pub(crate) fn table_of(
         &self,
         kind: TableKind,
@@ -462,11 +466,13 @@ impl TrainingSet {
                 let faster = (range.end < points.len()).then(|| (rows[1], 1, range.end));
                 let Some((_, side, k)) = slower.into_iter().chain(faster).min() else { break };
                 rows[side] += points[k].0.len();
-                if rows[0] + rows[1] > most && !range.is_empty() {
+                if rows[0] + rows[1] > most && range.len() >= FEWEST_NEAR {
                     break;
                 }
                 range = range.start.min(k)..range.end.max(k + 1);
             }
+            let rows: usize = range.clone().map(|k| points[k].0.len()).sum();
+            step = rows.div_ceil(most).max(1);
             chosen = range.collect();
         }
         for (case, (deflection_m, force_n)) in
