@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use rayon::prelude::*;
+
 use super::reference::{MotionErrors, Reference};
 use crate::curve::force_curve::ForceCurve;
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
@@ -12,6 +14,7 @@ use crate::signal::peaks::matched_peaks;
 use crate::surrogate::band::{self, Gap, Residuals};
 use crate::surrogate::leave_one_out::{Floor, LeftOut, PeakError};
 use crate::surrogate::max_crush::MaxCrushRule;
+use crate::surrogate::model::Material;
 use crate::surrogate::predict::Prediction;
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query};
 use crate::unit::km_per_h;
@@ -114,15 +117,32 @@ impl<'a> LeftOutCase<'a> {
         }
     }
 
-    /// The model without the case's speed: the same for all cases that a set lacks.
-    pub(super) fn fit(&self, kind: ModelKind) -> Result<Model, Error> {
-        Model::fit_curves(&self.rest, kind.near(self.case.conditions.speed.m_per_s))
-            .map_err(|error| error!(Validation, "without this speed: {}", error))
+    /// What models are fitted to without the case's speed: the same for all cases that a set lacks.
+    pub(super) fn material(&self) -> Result<Material<'_>, Error> {
+        Material::of(&self.rest)
+    }
+
+    /// The model without the case's speed.
+    pub(super) fn fit(
+        &self,
+        kind: ModelKind,
+        material: &Result<Material<'_>, Error>,
+    ) -> Result<Model, Error> {
+        let near = kind.near(self.case.conditions.speed.m_per_s);
+        let fitted = material.as_ref().map_err(Error::to_string);
+        let fitted = fitted.and_then(|of| of.fit(near).map_err(|e| e.to_string()));
+        fitted.map_err(|error| error!(Validation, "without this speed: {error}"))
     }
 
     /// Predicts the case by one model and every rule for the maximum crush.
-    pub(super) fn trial(&self, kind: ModelKind) -> LeftOutRun<'_> {
-        self.trial_of(kind, &self.fit(kind), &MaxCrushRule::ALL)
+    fn trial(&self, kind: ModelKind, material: &Result<Material<'_>, Error>) -> LeftOutRun<'_> {
+        self.trial_of(kind, &self.fit(kind, material), &MaxCrushRule::ALL)
+    }
+
+    /// The same by all of several models.
+    pub(super) fn trials(&self, kinds: &[ModelKind]) -> Vec<LeftOutRun<'_>> {
+        let material = self.material();
+        kinds.par_iter().map(|kind| self.trial(*kind, &material)).collect()
     }
 
     /// Predicts the case by a fitted model and some rules for the maximum crush.

@@ -122,9 +122,10 @@ fn subset(
     let mut rows: Vec<LeftOut> = Vec::new();
     let mut means = Vec::new();
     let mut inside: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    let material = lacking[0].material();
     for of in &tables.means {
         let kind = fitting.iter().find(|kind| kind.name() == of.model)?;
-        let model = lacking[0].fit(*kind);
+        let model = lacking[0].fit(*kind, &material);
         let rule = of.max_crush_rule;
         let judged = lacking.iter().map(|case| case.trial_of(*kind, &model, &[rule]).judged(rule));
         // The models are compared over the same subsets.

@@ -382,9 +382,7 @@ pub(super) fn trials<'a>(
     kinds: &[ModelKind],
     left_out: &'a [LeftOutCase<'a>],
 ) -> Vec<LeftOutRun<'a>> {
-    let pairs: Vec<(ModelKind, &LeftOutCase<'_>)> =
-        kinds.iter().flat_map(|&kind| left_out.iter().map(move |case| (kind, case))).collect();
-    pairs.par_iter().map(|(kind, case)| case.trial(*kind)).collect()
+    left_out.par_iter().flat_map(|case| case.trials(kinds)).collect()
 }
 
 /// Results of the left-out speeds for all models.
@@ -451,7 +449,7 @@ impl Tables {
                 is_within(v, end) || if is_low { v > end.0 } else { v < end.0 }
             });
             let case = LeftOutCase::new(&set, if is_low { 0 } else { set.cases.len() - 1 }).ok()?;
-            let trial = case.trial_of(*kind, &case.fit(*kind), &[rule]);
+            let trial = case.trial_of(*kind, &case.fit(*kind, &case.material()), &[rule]);
             trial.judged(rule).ok().map(|score| score.residuals)
         };
         let ends: Vec<(bool, f64)> = ends.collect();

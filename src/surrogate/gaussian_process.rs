@@ -148,6 +148,8 @@ fn points_of(curves: &[[f64; 2]], points: usize, scales: [f64; 2]) -> Vec<[f64; 
 
 /// Correlations that are computed at once.
 const LANES: usize = 8;
+/// Rows of a matrix that are decomposed at once.
+const ROWS: usize = 4;
 
 /// The sum of weights times the correlations of their points with another.
 #[multiversion(targets("x86_64+avx+avx2"))]
@@ -256,29 +258,41 @@ fn solved(
 ) -> Option<(f64, Vec<f64>)> {
     let n = at.len();
     let scaled: Vec<[f64; 2]> = at.iter().map(|p| [p[0] / speed, p[1] / deflection]).collect();
-    // The lower triangle by rows, decomposed in place (Cholesky).
+    // The lower triangle by rows, decomposed in place (Cholesky); several rows at once, since the products of one wait for
+    // one another.
     let mut rows: Vec<Vec<f64>> = Vec::with_capacity(n);
     let mut log_root = 0.0;
-    for i in 0..n {
-        let mut row = Vec::with_capacity(i + LANES);
-        for first in (0..i).step_by(LANES) {
-            let mut distances = [0.0; LANES];
-            for k in first..i.min(first + LANES) {
-                distances[k - first] = distance(scaled[k], scaled[i]);
+    for first_row in (0..n).step_by(ROWS) {
+        let mut block: Vec<Vec<f64>> = Vec::with_capacity(ROWS);
+        for i in first_row..n.min(first_row + ROWS) {
+            let mut row = Vec::with_capacity(i + LANES);
+            for first in (0..i).step_by(LANES) {
+                let mut distances = [0.0; LANES];
+                for k in first..i.min(first + LANES) {
+                    distances[k - first] = distance(scaled[k], scaled[i]);
+                }
+                row.extend(correlations(distances));
             }
-            row.extend(correlations(distances));
+            row.truncate(i);
+            block.push(row);
         }
-        row.truncate(i);
-        for k in 0..i {
-            row[k] = (row[k] - dot(&row[..k], &rows[k][..k])) / rows[k][k];
+        for (k, above) in rows.iter().enumerate() {
+            for row in &mut block {
+                row[k] = (row[k] - dot(&row[..k], &above[..k])) / above[k];
+            }
         }
-        let square = 1.0 + noise + JITTER - dot(&row, &row);
-        if square.is_nan() || square <= 0.0 {
-            return None;
+        for mut row in block {
+            for k in first_row..row.len() {
+                row[k] = (row[k] - dot(&row[..k], &rows[k][..k])) / rows[k][k];
+            }
+            let square = 1.0 + noise + JITTER - dot(&row, &row);
+            if square.is_nan() || square <= 0.0 {
+                return None;
+            }
+            row.push(square.sqrt());
+            log_root += libm::log(square.sqrt());
+            rows.push(row);
         }
-        row.push(square.sqrt());
-        log_root += libm::log(row[i]);
-        rows.push(row);
     }
     let mut half: Vec<f64> = Vec::with_capacity(n);
     for (i, row) in rows.iter().enumerate() {

@@ -20,7 +20,7 @@ mod gaussian_process;
 pub(crate) mod leave_one_out;
 mod linear;
 pub(crate) mod max_crush;
-mod model;
+pub(crate) mod model;
 mod model_file;
 pub(crate) mod models;
 mod nearest;

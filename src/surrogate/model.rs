@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::alignment::mode_switches;
 use super::band::{self, Band};
+use super::cached::Cached;
 use super::cases::{Curves, ModelCase, SlopeJump};
 use super::crush_law::{CrushCurve, CrushLaw};
 use super::curves::interpolate_held;
@@ -16,7 +17,9 @@ use super::response::with_response;
 use super::{CaseCurve, QueryPoint, Surrogate, Warning, WarningCode};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{ForceKind, Masses};
-use crate::dataset::{Feature, MASS, OTHER_MASS, SAME_MASS, SAME_SPEED, TrainingSet, nearest};
+use crate::dataset::{
+    Feature, MASS, OTHER_MASS, SAME_MASS, SAME_SPEED, TrainingCase, TrainingSet, nearest,
+};
 use crate::error::{Error, error};
 use crate::forest::RegressionForest;
 use crate::unit::{SpeedKind, UnitSystem};
@@ -65,48 +68,44 @@ pub struct Model {
     /// Stopped mass and crush force behind both forces; `None` if the runs do not determine them.
     pub(crate) crush_law: Option<CrushLaw>,
     /// The curves of `cases`, made when the model is fitted or read.
-    pub(super) curves: Curves,
+    pub(super) curves: Arc<Curves>,
 }
 
-impl Model {
-    /// Fits the model to both forces of the set. The choice of a model by leaving speeds
-    /// out is `validate::train`'s.
-    ///
-    /// # Errors
-    /// If the set is too small for the model, differs in more than the model
-    /// sees, or its options are wrong.
-    pub fn fit(set: &TrainingSet, kind: ModelKind) -> Result<Self, Error> {
-        let model = Self::fit_curves(set, kind)?;
-        let crush_law = match model.crush_law {
-            Some(law) => Some(law),
-            None => crush_law(set, &model.curves.declared),
-        };
-        let speed = |i: usize| model.cases[i].speed_m_per_s;
-        let switches = if set.features.is_empty() {
-            mode_switches(&model.curves.declared)
-        } else {
-            Vec::new()
-        };
-        let mode_switches_m_per_s = switches.iter().map(|&(i, k)| (speed(i), speed(k))).collect();
-        Ok(Self { crush_law, mode_switches_m_per_s, ..model })
+/// What models of all kinds are fitted to: the data and curves of a set's cases, and their crush law, made once.
+pub(crate) struct Material<'a> {
+    set: &'a TrainingSet,
+    cases: Vec<ModelCase>,
+    curves: Arc<Curves>,
+    crush_law: Cached<Option<CrushLaw>>,
+}
+
+impl<'a> Material<'a> {
+    pub(crate) fn of(set: &'a TrainingSet) -> Result<Self, Error> {
+        let of = |case: &Arc<TrainingCase>| ModelCase::of(case, set.force_kind);
+        let cases: Vec<ModelCase> = set.cases.iter().map(of).collect();
+        let curves = Arc::new(Curves::of(&cases)?);
+        Ok(Self { set, cases, curves, crush_law: Cached::default() })
     }
 
-    /// The same without a crush law that its curves do not need and without changes of mode, for trials that only ask for curves.
-    pub(crate) fn fit_curves(set: &TrainingSet, kind: ModelKind) -> Result<Self, Error> {
-        Self::check_inputs(set, kind)?;
-        let cases: Vec<ModelCase> =
-            set.cases.iter().map(|c| ModelCase::of(c, set.force_kind)).collect();
-        let curves = Curves::of(&cases)?;
-        let needed_law = if kind.entry().needs_crush_law {
-            crush_law(set, &curves.declared).filter(|law| law.stopped.is_known())
-        } else {
-            None
+    fn crush_law(&self) -> &Option<CrushLaw> {
+        let contact = &self.curves.declared;
+        let of = |stopped| CrushLaw::of(stopped, contact);
+        self.crush_law.get_or_compute(|| self.set.stopped_mass().map(of))
+    }
+
+    /// [`Model::fit_curves`] of the set.
+    pub(crate) fn fit(&self, kind: ModelKind) -> Result<Model, Error> {
+        let Self { set, cases, curves, .. } = self;
+        Model::check_inputs(set, kind)?;
+        let needed_law = match kind.entry().needs_crush_law {
+            true => self.crush_law().clone().filter(|law| law.stopped.is_known()),
+            false => None,
         };
         let fitted = |curves: &[CaseCurve], force: ForceKind| {
             let (forest, crush_law) = (kind.forest_options(), needed_law.as_ref());
             (kind.entry().fit)(&FitInput { set, curves, force, forest, crush_law })
         };
-        Ok(Self {
+        Ok(Model {
             written_by: concat!("crumple ", env!("CARGO_PKG_VERSION")).into(),
             group: set.group.clone(),
             speed_kind: set.speed_kind,
@@ -126,9 +125,38 @@ impl Model {
             },
             crush_law: needed_law,
             kind,
-            cases,
-            curves,
+            cases: cases.clone(),
+            curves: curves.clone(),
         })
+    }
+}
+
+impl Model {
+    /// Fits the model to both forces of the set. The choice of a model by leaving speeds
+    /// out is `validate::train`'s.
+    ///
+    /// # Errors
+    /// If the set is too small for the model, differs in more than the model
+    /// sees, or its options are wrong.
+    pub fn fit(set: &TrainingSet, kind: ModelKind) -> Result<Self, Error> {
+        Self::check_inputs(set, kind)?;
+        let material = Material::of(set)?;
+        let model = material.fit(kind)?;
+        let crush_law = material.crush_law().clone();
+        let speed = |i: usize| model.cases[i].speed_m_per_s;
+        let switches = if set.features.is_empty() {
+            mode_switches(&model.curves.declared)
+        } else {
+            Vec::new()
+        };
+        let mode_switches_m_per_s = switches.iter().map(|&(i, k)| (speed(i), speed(k))).collect();
+        Ok(Self { crush_law, mode_switches_m_per_s, ..model })
+    }
+
+    /// The same without a crush law that its curves do not need and without changes of mode, for trials that only ask for curves.
+    pub(crate) fn fit_curves(set: &TrainingSet, kind: ModelKind) -> Result<Self, Error> {
+        Self::check_inputs(set, kind)?;
+        Material::of(set)?.fit(kind)
     }
 
     /// Whether the model can be fitted to the set, without fitting it.
@@ -285,7 +313,7 @@ impl Model {
                 let law_n =
                     |at: &QueryPoint<'_>| body.force_n(&self.curves.declared, at, deflection_m);
                 let mass_kg = self.masses().effective_kg();
-                let Curves { body: runs, responses, .. } = &self.curves;
+                let Curves { body: runs, responses, .. } = &*self.curves;
                 with_response(runs, responses, mass_kg, at, deflection_m, law_n)
             }
             Some(body) => body.force_n(&self.curves.body, at, deflection_m),
@@ -295,7 +323,7 @@ impl Model {
 
     /// Whether the body forces of its runs are others than the declared ones: those of curves without times are not.
     pub(crate) fn has_own_body_forces(&self) -> bool {
-        let Curves { declared, body, .. } = &self.curves;
+        let Curves { declared, body, .. } = &*self.curves;
         declared.iter().zip(body).any(|(declared, body)| declared != body)
     }
 
@@ -432,9 +460,4 @@ impl Model {
         }
         warnings
     }
-}
-
-/// The crush law of a group whose runs may determine a stopped mass.
-fn crush_law(set: &TrainingSet, contact: &[CaseCurve]) -> Option<CrushLaw> {
-    set.stopped_mass().map(|stopped| CrushLaw::of(stopped, contact))
 }

@@ -163,7 +163,7 @@ impl Model {
         let model = Self {
             fitted: declared?,
             fitted_body: of_body?,
-            curves: Curves::of(&file.cases).map_err(|e| damaged(e.to_string()))?,
+            curves: Arc::new(Curves::of(&file.cases).map_err(|e| damaged(e.to_string()))?),
             written_by: file.written_by,
             group: file.group,
             speed_kind: file.speed_kind,
