@@ -42,7 +42,7 @@ def simulate(fmu, kind, step_s=STEP_S):
     more = {"solver": "Euler", "step_size": step_s} if kind == "ModelExchange" else {}
     result = fmpy.simulate_fmu(
         fmu, fmi_type=kind, stop_time=0.1, output_interval=step_s, input=signal,
-        output=["force", "stored_energy", "dissipated_energy", "largest_deflection"],
+        output=["force", "stored_energy", "dissipated_energy", "max_deflection"],
         record_events=False, **more
     )
     return numpy.array([list(row) for row in result])

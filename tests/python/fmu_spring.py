@@ -22,7 +22,7 @@ from fmpy.fmi2 import (
 )
 from fmpy.fmi3 import FMU3Model, FMU3Slave, fmi3LogMessageCallback
 
-OUTPUTS = ["force", "stored_energy", "dissipated_energy", "largest_deflection"]
+OUTPUTS = ["force", "stored_energy", "dissipated_energy", "max_deflection"]
 
 
 def from_bits(text):

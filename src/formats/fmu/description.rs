@@ -57,7 +57,7 @@ const VARIABLES: [Variable; 8] = [
         description: "Energy that does not come back",
     },
     Variable {
-        name: "largest_deflection",
+        name: "max_deflection",
         reference: 6,
         role: Role::Output(&[DEFLECTION]),
         unit: Some("m"),
