@@ -1,5 +1,6 @@
 //! `crumple rate`: how far a prediction is from its reference, by every measure.
 
+use std::fmt::Display;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::path::{Path, PathBuf};
 
@@ -208,7 +209,8 @@ struct LoadedSignal {
     is_table: bool,
     /// Of its values, where its name says it and they are not scaled.
     unit: Option<ValueUnit>,
-    problems: usize,
+    /// Of its file; they have been printed.
+    problems: Vec<String>,
 }
 
 /// Signals whose phase error is smaller have one shape; and a factor that is off by less is that of a unit.
@@ -307,9 +309,10 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             ));
         }
     }
-    let outcome = options.warn_all(&rating.warnings);
+    options.warn_all(&rating.warnings);
+    rating.warnings.extend([reference.problems, prediction.problems].concat());
     options.show(&rating, |out| print(out, &rating))?;
-    Ok(outcome.max(Outcome::warned_if(reference.problems + prediction.problems > 0)))
+    Ok(Outcome::warned_if(!rating.warnings.is_empty()))
 }
 
 impl Args {
@@ -415,7 +418,7 @@ fn rate_runs(reference: &Path, prediction: &Path, options: GlobalOptions) -> Com
 
 fn print_runs(out: &mut dyn Write, found: &RunAcceptance) -> io::Result<()> {
     let largest = |of: fn(&StageAcceptance) -> f64| found.stages.iter().map(of).fold(0.0, f64::max);
-    let energy = Shown::energy(largest(|s| s.reference.dissipated_j));
+    let energy = Shown::energy(found.initial_energy_j);
     let force = Shown::force(largest(|s| s.reference.mean_force_n));
     let signed = |error: f64| format!("{:+.1} %", 100.0 * error);
     let table = Table::of(&found.stages)
@@ -425,10 +428,10 @@ fn print_runs(out: &mut dyn Write, found: &RunAcceptance) -> io::Result<()> {
         .column("of initial", |s| signed(s.acceptance.energy_error))
         .column("crush", |s| format!("{:.3} m", s.reference.displacement_m))
         .column("other", |s| format!("{:.3} m", s.prediction.displacement_m))
-        .column("error", |s| signed(s.acceptance.displacement_error))
+        .column("error", |s| or_dash(s.acceptance.displacement_error.map(signed)))
         .column("mean force", |s| force.text(s.reference.mean_force_n))
         .column("other", |s| force.text(s.prediction.mean_force_n))
-        .column("error", |s| signed(s.acceptance.mean_force_error))
+        .column("error", |s| or_dash(s.acceptance.mean_force_error.map(signed)))
         .column("within 10 %", |s| match (s.counts, s.acceptance.passes) {
             (false, _) => "does not count",
             (true, true) => "yes",
@@ -438,6 +441,7 @@ fn print_runs(out: &mut dyn Write, found: &RunAcceptance) -> io::Result<()> {
     let [r, p] = found.sequences.each_ref().map(|names| names.join(", "));
     let sequence = match found.same_sequence {
         true => format!("the same sequence: {r}"),
+        false if p.is_empty() || r.is_empty() => "one of the sequences is empty".into(),
         false => format!("another sequence: {p} instead of {r}"),
     };
     writeln!(out, "{sequence}")?;
@@ -452,7 +456,7 @@ fn print_runs(out: &mut dyn Write, found: &RunAcceptance) -> io::Result<()> {
     let verdict = if found.passes { "passes" } else { "fails" };
     writeln!(
         out,
-        "energy of all {} of {} taken by the reference; {verdict}: {ACCEPTANCE} of each interface that takes at least 1 % of the energy, and the same sequence ({STANDARD})",
+        "energy of all {} of {} taken by the reference; {verdict}: {ACCEPTANCE} of each interface that takes at least 1 % of the energy in one of the runs, and the same sequence ({STANDARD})",
         signed(found.energy_error),
         energy.text(found.initial_energy_j)
     )
@@ -560,11 +564,10 @@ impl SignalRequest<'_> {
             )));
         }
         let signal = self.signal(&read.name, &read.time, &read.values)?;
-        let gaps = time_gaps(&read.time);
-        options.warn_of(self.path(), &gaps);
+        let problems = self.warned_of(&time_gaps(&read.time), options);
         let column = format!("{} {}", read.name, read.title);
         let unit = value_unit(&read.name).filter(|_| self.address.scale == 1.0);
-        Ok(LoadedSignal { signal, column, is_table: true, unit, problems: gaps.len() })
+        Ok(LoadedSignal { signal, column, is_table: true, unit, problems })
     }
 
     fn read_solver_file(&self, options: GlobalOptions) -> Result<LoadedSignal, Failure> {
@@ -582,7 +585,7 @@ impl SignalRequest<'_> {
             ..Selection::all()
         };
         let file = solver::read(self.path(), self.both.format.as_deref(), &selection)?;
-        options.warn_of(self.path(), &file.problems);
+        let problems = self.warned_of(&file.problems, options);
         let path = self.path().display();
         let history = match &file.histories[..] {
             [history] => history,
@@ -605,8 +608,15 @@ impl SignalRequest<'_> {
             )));
         }
         let signal = self.signal(&label, &history.time, &history.values)?;
-        let problems = file.problems.len();
         Ok(LoadedSignal { signal, column: label, is_table: false, unit: None, problems })
+    }
+
+    /// Warns of what is wrong with the file, and returns it.
+    fn warned_of<W: Display>(&self, problems: &[W], options: GlobalOptions) -> Vec<String> {
+        let path = self.path().display();
+        let problems: Vec<String> = problems.iter().map(|p| format!("{path}: {p}")).collect();
+        options.warn_all(&problems);
+        problems
     }
 
     /// The signal in s and scaled.
@@ -660,10 +670,13 @@ fn digits(value: f64) -> String {
     format!("{value:.decimals$}")
 }
 
+fn or_dash(text: Option<String>) -> String {
+    text.unwrap_or_else(|| "-".into())
+}
+
 /// The lines of the table: measure, value, and what belongs to it.
 fn rows(rating: &Rating) -> Vec<[String; 3]> {
     let percent = |ratio: f64| format!("{:.2} %", ratio * 100.0);
-    let or_dash = |text: Option<String>| text.unwrap_or_else(|| "-".into());
     let mut rows = Vec::new();
     let mut row = |measure: &str, value: Option<String>, more: String| {
         rows.push([measure.to_string(), or_dash(value), more]);
@@ -708,8 +721,13 @@ fn rows(rating: &Rating) -> Vec<[String; 3]> {
             let number = |of: &Deceleration| or_dash(value(of).map(digits));
             (Some(number(&of.prediction)), format!("reference {}", number(&of.reference)))
         };
+        let span = |of: Deceleration| {
+            let ends = of.from_s.zip(of.to_s);
+            ends.map_or("-".into(), |(from, to)| format!("{:.1} to {:.1} ms", 1e3 * from, 1e3 * to))
+        };
         let (value, more) = both(|d| d.mean);
-        row("mean deceleration", value, more);
+        let spans = format!("{more}; {}, reference {}", span(of.prediction), span(of.reference));
+        row("mean deceleration", value, spans);
         let (value, more) = both(|d| d.largest_120ms_mean);
         row("largest 120 ms mean", value, more);
     }

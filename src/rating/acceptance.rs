@@ -17,25 +17,28 @@ pub(crate) const LIMIT: f64 = 0.1;
 pub(crate) struct Acceptance {
     /// Difference of the dissipated energies over the initial energy.
     pub energy_error: f64,
-    /// Of the largest displacement.
-    pub displacement_error: f64,
-    /// Of the mean force until there.
-    pub mean_force_error: f64,
+    /// Of the largest displacement; null where the reference has none.
+    pub displacement_error: Option<f64>,
+    /// Of the mean force until there; null where the reference has none.
+    pub mean_force_error: Option<f64>,
     /// Whether all three are within 10 %.
     pub passes: bool,
 }
 
 impl Acceptance {
     pub(crate) fn of(energy_error: f64, displacement_error: f64, mean_force_error: f64) -> Self {
+        let known = |error: f64| Some(error).filter(|error| error.is_finite());
         let errors = [energy_error, displacement_error, mean_force_error];
         let passes = errors.iter().all(|error| error.abs() <= LIMIT);
+        let [displacement_error, mean_force_error] =
+            [displacement_error, mean_force_error].map(known);
         Self { energy_error, displacement_error, mean_force_error, passes }
     }
 
     /// The error that is largest in magnitude.
     pub(crate) fn worst(&self) -> f64 {
-        let errors = [self.energy_error, self.displacement_error, self.mean_force_error];
-        errors.into_iter().fold(0.0, |worst, error| worst.max(error.abs()))
+        let errors = [Some(self.energy_error), self.displacement_error, self.mean_force_error];
+        errors.into_iter().flatten().fold(0.0, |worst, error| worst.max(error.abs()))
     }
 }
 
@@ -62,6 +65,13 @@ pub(crate) struct StageResult {
     pub begin_s: Option<f64>,
     /// Whether the record ends while the displacement grows: neither it nor the energy is final.
     pub is_cut: bool,
+}
+
+impl StageResult {
+    /// Energy taken until the largest displacement, in J.
+    fn taken_j(&self) -> f64 {
+        self.mean_force_n * self.displacement_m
+    }
 }
 
 impl StageRecord<'_> {
@@ -103,7 +113,7 @@ pub(crate) struct StageAcceptance {
     pub prediction: StageResult,
     #[serde(flatten)]
     pub acceptance: Acceptance,
-    /// Whether it counts: it takes at least 1 % of the reference's energy.
+    /// Whether it counts: in one of the runs it takes at least 1 % of the reference's energy.
     pub counts: bool,
 }
 
@@ -149,12 +159,12 @@ pub(crate) fn accept(
         .collect();
     let most_j = |stages: &[StageRecord<'_>]| -> f64 {
         let results = stages.iter().map(StageRecord::result);
-        results.map(|result| result.mean_force_n * result.displacement_m).sum()
+        results.map(|result| result.taken_j()).sum()
     };
     let lacks = |of: &[StageRecord<'_>], other: &[StageRecord<'_>]| -> Vec<String> {
         let least_j = LEAST_SHARE * most_j(of);
         let alone = of.iter().filter(|stage| other.iter().all(|o| o.name != stage.name));
-        let counting = alone.filter(|stage| stage.result().dissipated_j >= least_j);
+        let counting = alone.filter(|stage| stage.result().taken_j() >= least_j);
         counting.map(|stage| stage.name.to_string()).collect()
     };
     let missing = [lacks(reference, prediction), lacks(prediction, reference)].concat();
@@ -173,7 +183,7 @@ pub(crate) fn accept(
                 p.displacement_m / r.displacement_m - 1.0,
                 p.mean_force_n / r.mean_force_n - 1.0,
             ),
-            counts: r.dissipated_j >= LEAST_SHARE * initial_energy_j,
+            counts: r.taken_j().max(p.taken_j()) >= LEAST_SHARE * initial_energy_j,
         })
         .collect();
     let all_j = |stages: &[StageRecord<'_>]| -> f64 {
@@ -194,12 +204,14 @@ pub(crate) fn accept(
         .all(|stage| stage.reference.begin_s.is_some() == stage.prediction.begin_s.is_some());
     let order = |begin: fn(&StageAcceptance) -> Option<f64>| {
         let mut order = counting.clone();
+        order.retain(|stage| begin(stage).is_some());
         let time = |stage: &StageAcceptance| begin(stage).unwrap_or(f64::INFINITY);
         order.sort_by(|a, b| time(a).total_cmp(&time(b)));
         order.into_iter().map(|stage| stage.stage.clone()).collect::<Vec<String>>()
     };
     let sequences = [order(|s| s.reference.begin_s), order(|s| s.prediction.begin_s)];
     let passes = same_sequence
+        && !counting.is_empty()
         && missing.is_empty()
         && energy_error.abs() <= LIMIT
         && counting.iter().all(|stage| {
@@ -244,8 +256,8 @@ mod tests {
         let found = accept(&reference, &close, 0.01).unwrap();
         assert!(found.passes && found.same_sequence, "{found:?}");
         assert_eq!(found.initial_energy_j, 1.5);
-        assert!((found.stages[0].acceptance.displacement_error - 0.08).abs() < 1e-12);
-        assert!((found.stages[0].acceptance.mean_force_error + 0.08).abs() < 1e-12);
+        assert!((found.stages[0].acceptance.displacement_error.unwrap() - 0.08).abs() < 1e-12);
+        assert!((found.stages[0].acceptance.mean_force_error.unwrap() + 0.08).abs() < 1e-12);
         let turned = [stage("b", &first.0, &first.1), stage("a", &d2, &f2)];
         let found = accept(&reference, &turned, 0.01).unwrap();
         assert!(!found.same_sequence && !found.passes);
@@ -258,6 +270,18 @@ mod tests {
         let found = accept(&reference, &[close[0], cut], 0.01).unwrap();
         assert!(!found.passes && found.stages[1].prediction.is_cut, "{found:?}");
         assert!(found.stages[1].acceptance.passes && !found.stages[0].prediction.is_cut);
+        // What gives its energy back counts by what it took; so does what only the prediction crushes.
+        let elastic = ([0.0, 1.0, 0.0, 0.0, 0.0], [0.0, 2.0, 0.0, 0.0, 0.0]);
+        let half = ([0.0, 0.5, 0.0, 0.0, 0.0], [0.0, 2.0, 0.0, 0.0, 0.0]);
+        let [one, other] = [&elastic, &half].map(|(d, f)| [stage("a", d, f)]);
+        let found = accept(&one, &other, 0.01).unwrap();
+        assert!(!found.passes && found.stages[0].counts, "{found:?}");
+        assert!(accept(&one, &one, 0.01).unwrap().passes);
+        let untouched = stage("b", &[0.0; 5], &[0.0; 5]);
+        let found = accept(&[one[0], untouched], &[one[0], stage("b", &d, &f)], 0.01).unwrap();
+        assert!(!found.passes && !found.same_sequence && found.stages[1].counts, "{found:?}");
+        assert_eq!(found.sequences, [vec!["a"], vec!["a", "b"]]);
+        assert_eq!(found.stages[1].acceptance.displacement_error, None);
         // At the bound, and beyond.
         assert!(Acceptance::of(0.1, -0.1, 0.1).passes && !Acceptance::of(0.0, 0.0, 0.1001).passes);
     }

@@ -230,6 +230,8 @@ fn size(a: &[f64], b: &[f64]) -> f64 {
 
 /// The deceleration begins above this share of its largest value.
 const THRESHOLD: f64 = 0.05;
+/// Spells of deceleration that change the speed by less than this share of the largest do not count, as in a run.
+const LEAST_CHANGE: f64 = 0.005;
 const MOVING_MEAN_S: f64 = 0.120;
 
 /// Means of a deceleration, in the unit of the signal.
@@ -237,7 +239,8 @@ const MOVING_MEAN_S: f64 = 0.120;
 pub(crate) struct Deceleration {
     /// Mean of −a from the first instant at which it exceeds 5 % of its largest value until it
     /// next returns to zero or the interval ends; null if it is never above zero. Where only the
-    /// contact decelerates, that is the time in which the net contact force is above zero.
+    /// contact decelerates, that is the time in which the net contact force is above zero. Spells that
+    /// change the speed by less than 0.5 % of what the largest does, as noise does, do not count.
     pub mean: Option<f64>,
     /// Time at which that mean begins, in s.
     pub from_s: Option<f64>,
@@ -248,6 +251,8 @@ pub(crate) struct Deceleration {
     /// Whether the interval ends while −a still exceeds 5 % of its largest value: the mean then
     /// covers only part of the deceleration.
     pub is_cut: bool,
+    /// Share of that time in all that −a, where it is above zero, takes off the speed.
+    pub share_of_change: Option<f64>,
     /// Largest mean of −a over 120 ms; null if the interval is shorter.
     pub largest_120ms_mean: Option<f64>,
 }
@@ -261,33 +266,59 @@ impl Deceleration {
         let deceleration: Vec<f64> = acceleration.iter().map(|a| -a).collect();
         let largest_120ms_mean = largest_moving_mean(time_s, &deceleration, MOVING_MEAN_S);
         let largest = deceleration.iter().copied().fold(0.0, f64::max);
-        let above = |&d: &f64| d > THRESHOLD * largest && d > 0.0;
-        let Some(first) = deceleration.iter().position(above) else {
+        let above = |d: f64| d > THRESHOLD * largest && d > 0.0;
+        let spells = spells(time_s, &deceleration, above);
+        let most = spells.iter().map(|spell| spell.change).fold(0.0, f64::max);
+        let counts = |spell: &&Spell| spell.change >= LEAST_CHANGE * most;
+        let Some(Spell { first, last, to_s, change }) = spells.iter().find(counts).copied() else {
             return Self { largest_120ms_mean, ..Self::default() };
         };
-        let length = deceleration[first..].iter().take_while(|&&d| d > 0.0).count();
-        let after = first + length;
-        let last = after - 1;
-        let above_to = (first..after).rev().find(|&k| above(&deceleration[k]));
-        let mut area = integral(&time_s[first..after], &deceleration[first..after]);
-        let (from_s, mut to_s) = (time_s[first], time_s[last]);
-        // The zero lies between two samples.
-        if let Some(&below) = deceleration.get(after) {
-            let share = deceleration[last] / (deceleration[last] - below);
-            let part_s = share * (time_s[after] - time_s[last]);
-            area += 0.5 * deceleration[last] * part_s;
-            to_s += part_s;
-        }
-        let mean = if to_s > from_s { area / (to_s - from_s) } else { deceleration[first] };
+        let above_to = (first..=last).rev().find(|&k| above(deceleration[k]));
+        let from_s = time_s[first];
+        let mean = if to_s > from_s { change / (to_s - from_s) } else { deceleration[first] };
+        let positive: Vec<f64> = deceleration.iter().map(|d| d.max(0.0)).collect();
+        let all = integral(time_s, &positive);
         Self {
             mean: Some(mean),
             from_s: Some(from_s),
             to_s: Some(to_s),
             above_to_s: above_to.map(|k| time_s[k]),
-            is_cut: after == deceleration.len() && above(&deceleration[last]),
+            is_cut: last + 1 == deceleration.len() && above(deceleration[last]),
+            share_of_change: (all > 0.0).then(|| (change / all).min(1.0)),
             largest_120ms_mean,
         }
     }
+}
+
+/// Samples above zero, from one that exceeds the threshold on.
+#[derive(Clone, Copy)]
+struct Spell {
+    first: usize,
+    last: usize,
+    /// Where it returns to zero, or the last sample.
+    to_s: f64,
+    /// Integral.
+    change: f64,
+}
+
+fn spells(time_s: &[f64], deceleration: &[f64], above: impl Fn(f64) -> bool) -> Vec<Spell> {
+    let (mut found, mut from) = (Vec::new(), 0);
+    while let Some(first) = (from..deceleration.len()).find(|&k| above(deceleration[k])) {
+        let after = first + deceleration[first..].iter().take_while(|&&d| d > 0.0).count();
+        let last = after - 1;
+        let mut change = integral(&time_s[first..after], &deceleration[first..after]);
+        let mut to_s = time_s[last];
+        // The zero lies between two samples.
+        if let Some(&below) = deceleration.get(after) {
+            let share = deceleration[last] / (deceleration[last] - below);
+            let part_s = share * (time_s[after] - time_s[last]);
+            change += 0.5 * deceleration[last] * part_s;
+            to_s += part_s;
+        }
+        found.push(Spell { first, last, to_s, change });
+        from = after;
+    }
+    found
 }
 
 /// Largest mean of `values` over any `length_s` that begins at a sample; equal intervals.
@@ -416,6 +447,21 @@ mod tests {
         assert!(!cut(&[0.0, -2.0, -40.0, -20.0, 1.0]));
         assert!(!cut(&[0.0, -2.0, -40.0, -1.9]), "what remains is below 5 %");
         assert!(!cut(&[0.0, -40.0, 1.0, -40.0]), "a second pulse is not in the mean");
+    }
+
+    /// Noise before the impact rises above 5 % of its peak, but changes the speed by next to nothing.
+    #[test]
+    fn noise_before_the_impact_does_not_count() {
+        let mut a = vec![0.0, -3.0, 1.0];
+        a.extend([-40.0; 80]);
+        a.extend([1.0, 0.0]);
+        let of = Deceleration::of(&times(a.len()), &a);
+        assert!(of.from_s.unwrap() > 2.9e-3 && of.mean.unwrap() > 39.0, "{of:?}");
+        assert!(of.share_of_change.unwrap() > 0.99);
+        // Two pulses: the mean is that of the first, which is half of it.
+        let two = [[-40.0; 40], [1.0; 40], [-40.0; 40]].concat();
+        let of = Deceleration::of(&times(120), &two);
+        assert!((of.share_of_change.unwrap() - 0.5).abs() < 0.01, "{of:?}");
     }
 
     #[test]

@@ -211,7 +211,7 @@ pub(crate) fn rate(
         }),
         warnings: Vec::new(),
     };
-    rating.warnings = warnings(&rating, r, settings);
+    rating.warnings = warnings(&rating, [r, p], settings);
     for (who, signal) in [("reference", reference), ("prediction", prediction)] {
         let within = signal.samples_within(rating.from_s, rating.to_s);
         if within < LEAST_SAMPLES {
@@ -246,8 +246,10 @@ const UNRATED: f64 = 0.05;
 
 /// A contact that fades takes less.
 const TAIL_S: f64 = 0.020;
+/// A mean deceleration over less than this share of the change of speed is not that of the impact.
+const MOST_OF_CHANGE: f64 = 0.5;
 
-fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Vec<String> {
+fn warnings(rating: &Rating, both: [&[f64]; 2], settings: &RatingSettings) -> Vec<String> {
     let mut warnings = Vec::new();
     let (from_s, to_s) =
         (settings.from_s.unwrap_or(rating.from_s), settings.to_s.unwrap_or(rating.to_s));
@@ -271,8 +273,11 @@ fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Ve
             100.0 * unrated
         ));
     }
-    if reference.iter().all(|&r| r == 0.0) {
+    let is_zero = both.map(|signal| signal.iter().all(|&value| value == 0.0));
+    if is_zero[0] {
         warnings.push("the reference is zero throughout: relative measures are undefined".into());
+    } else if is_zero[1] {
+        warnings.push("the prediction is zero throughout: check which column was named".into());
     }
     if rating.iso18571.is_none() {
         warnings.push(format!(
@@ -298,6 +303,16 @@ fn warnings(rating: &Rating, reference: &[f64], settings: &RatingSettings) -> Ve
                 "the {who} is decelerated by less than 5 % of its largest value from {:.1} to {:.1} ms, which is in its mean deceleration: if that is braking or friction, end the interval before (--to)",
                 1e3 * above_to_s,
                 1e3 * to_s
+            ));
+        }
+        if let (Some(share), Some(from_s), Some(to_s)) = (of.share_of_change, of.from_s, of.to_s)
+            && share < MOST_OF_CHANGE
+        {
+            warnings.push(format!(
+                "the mean deceleration of the {who} is that from {:.1} to {:.1} ms, which takes {:.0} % of what all its decelerations take off the speed: filter it (--cfc 60), or choose the interval (--from, --to)",
+                1e3 * from_s,
+                1e3 * to_s,
+                100.0 * share
             ));
         }
         if of.is_cut {

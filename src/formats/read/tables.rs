@@ -212,13 +212,10 @@ pub(crate) fn history(bytes: &[u8], wanted: Option<&str>) -> Result<History, Err
         let number = |field: usize| {
             row.number(field).map_err(|found| {
                 let (column, name) = (field + 1, name_of(field));
-                let (kind, remedy) = match found.parse::<f64>() {
-                    Ok(_) => ("a finite number", ": remove the lines without a value"),
-                    Err(_) => ("a number", ""),
-                };
+                let kind = if found.parse::<f64>().is_ok() { "a finite number" } else { "a number" };
                 error!(
                     Rating,
-                    "line {line}, column {column} (\"{name}\"): expected {kind}, found \"{found}\"{remedy}",
+                    "line {line}, column {column} (\"{name}\"): expected {kind}, found \"{found}\": remove the lines without a value",
                     found = shown(found)
                 )
             })
