@@ -220,7 +220,7 @@ const MOVING_MEAN_S: f64 = 0.120;
 pub(crate) const COARSEST_S: f64 = 0.005;
 
 /// Mean deceleration in m/s² over the 120 ms in which its magnitude is largest, from the speeds
-/// at both ends; `None` for a record that is shorter or too coarse.
+/// at both ends, one of which is an output's; `None` for a record that is shorter or too coarse.
 pub(super) fn moving_mean(speeds: &[f64], interval_s: f64) -> Option<f64> {
     if interval_s > COARSEST_S {
         return None;
@@ -244,6 +244,12 @@ pub(super) fn moving_mean(speeds: &[f64], interval_s: f64) -> Option<f64> {
     let mut most = most.into_iter().fold(0.0, larger);
     for j in now.len() - rest.len()..now.len() {
         most = larger(most, fall(before[j], after[j], now[j]));
+    }
+    // Windows that end at an output have been tried; those that begin at one are others.
+    if share > 0.0 {
+        for ((from, to), last) in speeds.iter().zip(now).zip(&speeds[back - 1..]) {
+            most = larger(most, from - (to + share * (last - to)));
+        }
     }
     (!now.is_empty()).then_some(most / MOVING_MEAN_S)
 }
