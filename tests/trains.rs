@@ -2,7 +2,7 @@
 //! may drive an interface, speeds of the interfaces, the comparison with FE's run of a train.
 
 use crate::common::{
-    crumple_fails, crumple_ok, demo_folder, json as parsed, read_json, root, says,
+    crumple_fails, crumple_in, crumple_ok, demo_folder, json as parsed, read_json, root, says,
 };
 use serde_json::{Value, json};
 
@@ -1321,6 +1321,14 @@ fn a_curve_of_another_speed_inside_a_train_is_said() {
     says(&both, "it is for 72 km/h, but A1|B1 closes at 36 km/h");
     // Outputs that do not show how an interface begins to close say nothing.
     assert!(!warnings(&case("72kmh"), "10ms").contains(said));
+    // A sweep says it once, of the scenario as it stands.
+    warnings(&case("72kmh"), "0.75ms");
+    let plan = "[sweep]\nresults = [\"peak_force\"]\nvary = [ { what = \"mass\", vehicle = \"A1\", values = [\"24t\", \"25t\"] } ]\n";
+    std::fs::write(here.join("plan.toml"), plan).unwrap();
+    let swept = crumple_in(here, "sweep inner.toml --plan plan.toml -o s.csv").stderr;
+    let swept = String::from_utf8(swept).unwrap();
+    assert_eq!(swept.matches(said).count(), 1, "{swept}");
+    assert!(!std::fs::read_to_string(here.join("s.csv")).unwrap().contains(said));
 }
 
 /// A1 is braked by 2 MN, A2 is not: their gap of 30 mm closes after √(2 · 0.03 m · 24 t / 2 MN), whatever the outputs.

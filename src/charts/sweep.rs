@@ -6,6 +6,7 @@ use crate::guess::hint;
 use crate::multibody::STANDARD_GRAVITY_M_PER_S2;
 use crate::plan::{OVER_LIMITS, ResultName};
 use crate::plot::{Axis, Band, Cell, Chart, Panel, Series, Shown};
+use crate::plural::counted;
 use crate::sweep::{ResultColumn, SweepColumns, share_interval};
 
 /// More values than this were not written down as a grid.
@@ -288,8 +289,10 @@ fn add_share(
     middles: Vec<f64>,
     groups: &[(f64, Vec<usize>)],
 ) {
+    let mut unknown = 0;
     let shares = groups.iter().map(|(_, rows)| {
         let known = sorted(result, rows);
+        unknown += rows.len() - known.len();
         let (over, count) = (known.iter().sum::<f64>(), rows.len() as f64);
         let most = over + count - known.len() as f64;
         let interval = |runs: f64| share_interval(runs / count, rows.len() as u64);
@@ -297,7 +300,11 @@ fn add_share(
     });
     let (shares, (low, high)): (Vec<f64>, (Vec<f64>, Vec<f64>)) = shares.unzip();
     panel.y = Axis::new("share of runs over a limit", "%", 1e2).over(0.0, 1.0);
-    let (name, x) = ("95 % confidence interval if drawn at random".into(), middles.clone());
+    let mut name = "95 % confidence interval if drawn at random".to_string();
+    if unknown > 0 {
+        name.push_str(&format!("; {} without a verdict may be either", counted(unknown, "run")));
+    }
+    let x = middles.clone();
     panel.bands.push(Band { name, look: 0, x, low, high, is_stacked: false });
     panel.series.push(Series::line("known to be over a limit", 0, middles, shares));
 }

@@ -112,6 +112,13 @@ impl Prepared {
     /// another speed.
     pub fn warnings_of(&self, run: &Run) -> Vec<String> {
         let mut warnings = self.warnings.clone();
+        warnings.extend(self.other_speeds(run));
+        warnings.extend(run.all_warnings());
+        warnings
+    }
+
+    /// Warnings of curves of one impact that drive interfaces inside the train which close at another speed in a run.
+    pub(crate) fn other_speeds(&self, run: &Run) -> Vec<String> {
         let interfaces = self.chain.interfaces().iter().zip(&run.interfaces).zip(&self.used);
         let mut others: BTreeMap<&str, (f64, Vec<String>)> = BTreeMap::new();
         for (k, ((interface, history), used)) in interfaces.enumerate() {
@@ -130,7 +137,7 @@ impl Prepared {
                 closes.push(format!("{} at {}", interface.name, km_per_h(closing)));
             }
         }
-        warnings.extend(others.into_iter().map(|(curve, (own, closes))| {
+        let warning = |(curve, (own, closes)): (&str, (f64, Vec<String>))| {
             let more = closes.len().saturating_sub(NAMED);
             let more = if more > 0 { format!(", and {more} more") } else { String::new() };
             format!(
@@ -138,9 +145,14 @@ impl Prepared {
                 km_per_h(own),
                 closes.iter().take(NAMED).cloned().collect::<Vec<_>>().join(", ")
             )
-        }));
-        warnings.extend(run.all_warnings());
-        warnings
+        };
+        others.into_iter().map(warning).collect()
+    }
+
+    /// The same of a run of its own; none if it has no curve of one impact, or does not run.
+    pub(crate) fn other_speeds_as_it_stands(&self) -> Vec<String> {
+        let run = (!self.of_one.0.is_empty()).then(|| simulate(&self.chain, &self.settings));
+        run.and_then(Result::ok).map_or_else(Vec::new, |run| self.other_speeds(&run))
     }
 }
 

@@ -177,6 +177,7 @@ impl Sweep {
         let results = results(&plan, scenario.limits.is_some()).map_err(invalid)?;
         let sources = Sources::read(path, &scenario)?;
         let mut base = scenario::assemble(path, &scenario, &sources)?;
+        base.warnings.extend(base.other_speeds_as_it_stands());
         for variable in &variables {
             let Some(curve) = variable.gap_of() else { continue };
             let (_, others) = scenario::takes_gap_of(&scenario, curve)?;

@@ -43,6 +43,9 @@ pub(crate) struct Row {
     pub message: String,
 }
 
+/// Between the warnings of a row; in one of them it is a comma.
+pub(super) const BETWEEN: &str = "; ";
+
 /// A value as it is in a file: shortest digits that read back the same, a name, or nothing.
 pub(crate) fn text(value: f64, names: &[String]) -> String {
     let mut bytes = Vec::new();

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use rayon::prelude::*;
 
 use super::Sweep;
-use super::row::{Row, Status};
+use super::row::{BETWEEN, Row, Status};
 use crate::error::{Error, ErrorCode};
 use crate::multibody::{BodyHistory, Record, Run, RunSettings, simulate};
 use crate::plan::ResultName;
@@ -129,7 +129,8 @@ impl<'a> Worker<'a> {
                 vec![error.message().to_string()]
             }
         };
-        row.message = messages.join("; ").replace(|c: char| c.is_control(), " ");
+        let messages: Vec<String> = messages.iter().map(|m| m.replace(BETWEEN, ", ")).collect();
+        row.message = messages.join(BETWEEN).replace(|c: char| c.is_control(), " ");
         row
     }
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::Report;
-use super::row::{Line, Row, ShardHeader, Status};
+use super::row::{BETWEEN, Line, Row, ShardHeader, Status};
 use crate::plan::{OVER_LIMITS, RESULTS, ResultName};
 use crate::stream::mix;
 
@@ -298,6 +298,18 @@ impl Reason {
     }
 }
 
+/// Counts each warning of a row.
+fn count(reasons: &mut Vec<Reason>, message: &str) {
+    for warning in message.split(BETWEEN) {
+        let kind = kind(warning);
+        match reasons.iter().position(|known| known.kind == kind) {
+            Some(k) => reasons[k].add(warning),
+            None if reasons.len() < REASONS => reasons.push(Reason::new(kind, warning)),
+            None => {}
+        }
+    }
+}
+
 /// A report, row by row.
 pub(super) struct Tally {
     head: ShardHeader,
@@ -311,7 +323,7 @@ pub(super) struct Tally {
 
 const MESSAGES: usize = 3;
 /// Different reasons of warnings that are counted.
-const REASONS: usize = 50;
+const REASONS: usize = 1000;
 
 impl Tally {
     pub(crate) fn new(head: &ShardHeader) -> Self {
@@ -392,14 +404,7 @@ impl Tally {
         report.done += 1;
         report.warned += u64::from(status == Status::Warned);
         if status == Status::Warned {
-            let kind = kind(message);
-            match self.reasons.iter().position(|known| known.kind == kind) {
-                Some(k) => self.reasons[k].add(message),
-                None if self.reasons.len() < REASONS => {
-                    self.reasons.push(Reason::new(kind, message));
-                }
-                None => {}
-            }
+            count(&mut self.reasons, message);
         }
         report.failed += u64::from(status == Status::Failed);
         if status == Status::Failed && report.messages.len() < MESSAGES {
@@ -494,15 +499,10 @@ mod tests {
     #[test]
     fn warnings_are_counted_by_their_words() {
         let warning = |of: &str, share: f64| format!("{of} is crushed {share} m (4.5 %), -1e-3.");
-        let messages = [("A1|A2", 2.0), ("A2|A3", 9.0), ("A1|A2", 0.5), ("A1|A2", 1.0)];
         let mut reasons: Vec<Reason> = Vec::new();
-        for (of, share) in messages {
-            let message = warning(of, share);
-            match reasons.iter_mut().find(|reason| reason.kind == kind(&message)) {
-                Some(known) => known.add(&message),
-                None => reasons.push(Reason::new(kind(&message), &message)),
-            }
-        }
+        count(&mut reasons, &warning("A1|A2", 2.0));
+        count(&mut reasons, &[warning("A2|A3", 9.0), warning("A1|A2", 0.5)].join(BETWEEN));
+        count(&mut reasons, &warning("A1|A2", 1.0));
         let texts: Vec<(String, u64)> = reasons.iter().map(|r| (r.text(), r.count)).collect();
         let first = "A1|A2 is crushed 0.5 to 2 m (4.5 %), -1e-3.".to_string();
         assert_eq!(texts, [(first, 3), (warning("A2|A3", 9.0), 1)]);
