@@ -1331,6 +1331,10 @@ fn inspect_takes_folders() {
     assert_eq!(files[0]["path"], "lead-car-wall/25kmh/nodout");
     assert_eq!(files[0]["states"], 400);
     assert_eq!(files[0]["entities"][0]["id"], 900001);
+    // What holds histories under another name is named.
+    fs::copy(here.join("36kmh/nodout"), here.join("36kmh/nodes.txt")).unwrap();
+    let listed = crumple_ok(above, "inspect lead-car-wall/36kmh");
+    says(&listed, "not read, by their names: nodes.txt (nodout)");
     // A damaged file is a warning, one that is only named like a solver's too.
     let nodout = here.join("36kmh/nodout");
     cut(&nodout, " n o d a l   p r i n t ", 100);

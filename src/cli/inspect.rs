@@ -12,7 +12,7 @@ use crate::database;
 use crate::error::{Error, error};
 use crate::solver::decks::{self, Search};
 use crate::solver::lsdyna::deck::{Deck, DeckEntity};
-use crate::solver::runs::{output_files, run_folders};
+use crate::solver::runs::{is_named_like_output, output_files, renamed_files, run_folders};
 use crate::solver::{self, Access, Selection, SolverFile, Value};
 use crate::table::Table;
 
@@ -87,7 +87,16 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             None => one.sections.iter().try_for_each(|section| print(out, section)),
             Some(folder) => {
                 writeln!(out, "{}", folder.display())?;
-                output::table(out, table(&one.sections))
+                output::table(out, table(&one.sections))?;
+                let renamed = renamed_files(folder).into_iter().filter_map(|(path, kind)| {
+                    let name = path.file_name()?.to_string_lossy().into_owned();
+                    (!is_named_like_output(&name)).then(|| format!("{name} ({kind})"))
+                });
+                let renamed: Vec<String> = renamed.collect();
+                match renamed.is_empty() {
+                    true => Ok(()),
+                    false => writeln!(out, "not read, by their names: {}", renamed.join(", ")),
+                }
             }
         })
     })?;

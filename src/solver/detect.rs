@@ -276,7 +276,7 @@ pub(super) fn files_in(folder: &Path) -> String {
 }
 
 /// Whether a file is named as a solver names one that can be read.
-pub(super) fn is_named_like_output(name: &str) -> bool {
+pub(crate) fn is_named_like_output(name: &str) -> bool {
     let own = without_job_id(name);
     restart_number(name).is_some() || FORMATS.iter().any(|f| own.starts_with(f.name))
 }

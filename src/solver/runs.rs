@@ -4,7 +4,8 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-use super::detect::{detect, is_named_like_output};
+use super::detect::detect;
+pub(crate) use super::detect::is_named_like_output;
 use super::is_output;
 use super::source::{self, Access};
 use crate::error::Error;
