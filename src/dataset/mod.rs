@@ -2,6 +2,7 @@
 
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::ops::Range;
 use std::sync::Arc;
 
 use linfa::Dataset;
@@ -458,22 +459,9 @@ impl TrainingSet {
             // Those from all over the range are worth less.
             step = rows.div_ceil(2 * most).max(1);
         } else if let Some((most, near)) = most_rows {
-            // The nearest of the side that has fewer rows, in turn.
-            let faster = self.cases.partition_point(|case| case.speed_m_per_s <= near);
-            let (mut range, mut rows) = (faster..faster, [0, 0]);
-            loop {
-                let slower = (range.start > 0).then(|| (rows[0], 0, range.start - 1));
-                let faster = (range.end < points.len()).then(|| (rows[1], 1, range.end));
-                let Some((_, side, k)) = slower.into_iter().chain(faster).min() else { break };
-                rows[side] += points[k].0.len();
-                if rows[0] + rows[1] > most && range.len() >= FEWEST_NEAR {
-                    break;
-                }
-                range = range.start.min(k)..range.end.max(k + 1);
-            }
-            let rows: usize = range.clone().map(|k| points[k].0.len()).sum();
-            step = rows.div_ceil(most).max(1);
-            chosen = range.collect();
+            let rows: Vec<usize> = points.iter().map(|(d, _)| d.len()).collect();
+            let (range, thinned) = nearest_rows(&self.speeds_m_per_s(), &rows, near, most);
+            (chosen, step) = (range.collect(), thinned);
         }
         for (case, (deflection_m, force_n)) in
             chosen.into_iter().map(|k| (&self.cases[k], &points[k]))
@@ -491,6 +479,25 @@ impl TrainingSet {
             names.into_iter().chain(self.features.iter().map(Feature::name)).collect(),
         )
     }
+}
+
+/// The cases nearest to a speed whose rows are at most so many, but [`FEWEST_NEAR`] at least, and by how much each is thinned.
+fn nearest_rows(speeds: &[f64], rows: &[usize], near: f64, most: usize) -> (Range<usize>, usize) {
+    // The nearest of the side that has fewer rows, in turn.
+    let faster = speeds.partition_point(|speed| *speed <= near);
+    let (mut range, mut sides) = (faster..faster, [0, 0]);
+    loop {
+        let slower = (range.start > 0).then(|| (sides[0], 0, range.start - 1));
+        let faster = (range.end < rows.len()).then(|| (sides[1], 1, range.end));
+        let Some((_, side, k)) = slower.into_iter().chain(faster).min() else { break };
+        sides[side] += rows[k];
+        if sides[0] + sides[1] > most && range.len() >= FEWEST_NEAR {
+            break;
+        }
+        range = range.start.min(k)..range.end.max(k + 1);
+    }
+    let found: usize = rows[range.clone()].iter().sum();
+    (range, found.div_ceil(most).max(1))
 }
 
 impl TrainingCase {
@@ -596,7 +603,21 @@ fn loading_run(case: &Arc<TrainingCase>) -> Option<LoadingRun> {
 
 #[cfg(test)]
 mod tests {
-    use super::nearly_same;
+    use super::{nearest_rows, nearly_same};
+
+    #[test]
+    fn rows_of_both_sides_are_taken_and_thinned_where_ten_cases_have_more() {
+        let speeds: Vec<f64> = (0..40).map(f64::from).collect();
+        let of = |rows: usize, near: f64| nearest_rows(&speeds, &vec![rows; 40], near, 4000);
+        assert_eq!(of(50, 19.5), (0..40, 1));
+        assert_eq!(of(200, 19.5), (10..30, 1));
+        assert_eq!(of(1000, 19.5), (15..25, 3));
+        assert_eq!(of(1000, -1.0), (0..10, 3));
+        assert_eq!(of(1000, 38.5), (30..40, 3));
+        // A few rows of one side, and many of the other.
+        let rows: Vec<usize> = (0..40).map(|k| if k < 20 { 20 } else { 500 }).collect();
+        assert_eq!(nearest_rows(&speeds, &rows, 19.5, 4000), (0..27, 1));
+    }
 
     #[test]
     fn speeds_that_nearly_repeat_one_another_are_found() {
