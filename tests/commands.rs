@@ -1030,7 +1030,7 @@ fn scenarios_choose_the_force() {
     let export = ["export", "old.json", "--to", "csv", "--force", "body"];
     assert!(crumple_fails(here, 1, &export).contains("no body force"));
     says(&crumple_fails(here, 2, "export old.json --to csv"), "use --force contact");
-    says(&crumple_fails(here, 1, "export a.json --to json --units mm-t-s"), "json is always in SI");
+    says(&crumple_fails(here, 2, "export a.json --to json --units mm-t-s"), "json is always in SI");
     let error = crumple_fails(here, 1, "export a.json --to csv --units in-kg-s");
     says(&error, "lengths in mm, cm, m, in, ft, um, forces in N, kN, MN, lbf");
 }

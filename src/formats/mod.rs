@@ -410,7 +410,7 @@ impl Format {
         let with: Vec<&str> = FORMATS.iter().filter(|f| f.units).map(|f| f.name).collect();
         let (format, with) = (self.name, with.join(", "));
         Err(error!(
-            Export,
+            Usage,
             "{format} is always in SI: remove --units, or take a format that has units ({with})"
         ))
     }
