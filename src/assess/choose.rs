@@ -16,6 +16,7 @@ use serde::Serialize;
 use crate::dataset::TrainingSet;
 use crate::plural::counted;
 use crate::surrogate::leave_one_out::{LeftOut, Means, Validation};
+use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{MODELS, Model, ModelKind};
 use crate::unit::km_per_h;
 
@@ -123,14 +124,17 @@ fn gains_tell(speeds: usize) -> bool {
 }
 
 /// Errors of each model that has means, at the speeds left out that count for a purpose: force, velocity, acceleration and crush, each
-/// relative to what the models have in the median, and averaged.
+/// relative to what the models have in the median, and averaged. The crush is that of the motion, where it has one: by another rule it may
+/// be right although the curve is not.
 pub(crate) fn scores<'a>(
     means: &'a [Means],
     rows: &[LeftOut],
     purpose: Purpose,
 ) -> Vec<(&'a str, Vec<f64>)> {
     let measures = |row: &LeftOut| {
-        [row.force_l1, row.velocity_l1, row.acceleration_l1, row.max_crush_error.abs()]
+        let crush = row.max_crush_errors.get(&MaxCrushRule::Motion);
+        let crush = crush.unwrap_or(&row.max_crush_error);
+        [row.force_l1, row.velocity_l1, row.acceleration_l1, crush.abs()]
     };
     let counts = |row: &&LeftOut| row.inner || purpose == Purpose::Train;
     let of = |model: &'a Means| {

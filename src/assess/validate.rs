@@ -597,10 +597,10 @@ fn without_means(model: &str) -> String {
     format!("{model} has no means and cannot be chosen: it cannot predict every inner speed")
 }
 
-/// With too few speeds to leave one out: the default, or the nearest of cases that differ in more than speed.
+/// With too few speeds to leave one out: the default, or of cases that differ in more than speed a forest, which blends them.
 fn without_validation(fitting: &[ModelKind], physical: &[&str]) -> (String, String) {
     let fits = |name: &&&str| fitting.iter().any(|kind| kind.name() == **name);
-    let default = physical.iter().find(fits).unwrap_or(&"nearest");
+    let default = physical.iter().chain(&["extra"]).find(fits).unwrap_or(&"nearest");
     ((*default).into(), "too few speeds to leave one out".into())
 }
 

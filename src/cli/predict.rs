@@ -33,7 +33,7 @@ pub(super) struct Args {
     /// Mass of the body, or of each body of a pair, with its unit (default: the training runs')
     #[arg(long, value_parser = arguments::mass, allow_hyphen_values = true)]
     mass: Option<f64>,
-    /// Rule for the maximum crush [default: the best one when speeds were left out]
+    /// Rule for the maximum crush [default: the model's own, mostly motion]
     #[arg(long, value_parser = one_of(MAX_CRUSH_RULES))]
     max_crush: Option<MaxCrushRule>,
     /// The reference method's choices: maximum crush by the cubic spline

@@ -168,6 +168,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         warnings.push(format!(
             "the group has {curves}: with fewer than 3, no speed can be left out to assess the model"
         ));
+    } else if model.leave_one_out.as_ref().is_none_or(|of| of.rows.is_empty()) {
+        let why = "no speed could be left out to assess the model: its curves have no band";
+        warnings.push(why.into());
     }
     let of_cases = model.case_warnings().into_iter();
     warnings.extend(

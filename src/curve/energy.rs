@@ -142,7 +142,9 @@ impl Cause {
             ),
             Self::Histories(cause) => (*cause).into(),
             Self::Unknown(mass) => {
-                format!("check units, speed and mass{mass}, and node and force of the recipe")
+                format!(
+                    "check units, speed and mass{mass}, and node, force and signs of the recipe"
+                )
             }
         }
     }
@@ -348,6 +350,9 @@ fn significant_mass(kg: f64) -> String {
 fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();
+    }
+    if !(1e-4..1e7).contains(&value.abs()) {
+        return format!("{value:.1e}");
     }
     let digits = (3 - libm::log10(value.abs()).floor() as i32).max(0) as usize;
     format!("{value:.digits$}")

@@ -20,7 +20,7 @@ const LEAST_ALIKE: usize = 3;
 /// Parts of the common deflection over which two curves are compared.
 const PARTS: usize = 12;
 /// Mean force of the faster of two neighbours over that of the slower: of one design 0.99 to 1.17.
-const LEAST_RATIO: f64 = 0.9;
+pub(crate) const LEAST_RATIO: f64 = 0.9;
 const MOST_RATIO: f64 = 1.25;
 /// Rate effects grow with the speed: the bound is multiplied by the ratio of the speeds to this power.
 const RATE_POWER: f64 = 0.15;

@@ -15,6 +15,7 @@
 
 use super::CaseCurve;
 use super::curves::{LEAST_WAY_M, mean_over, neighbours};
+use crate::curve::group::LEAST_RATIO;
 use crate::piecewise;
 
 /// A pair is aligned if that takes so much away from the mean square of its differences, relative to the level, after the price of the
@@ -116,18 +117,19 @@ impl<F: Fn(usize, f64) -> f64> Sampled<'_, F> {
 }
 
 /// Pairs of neighbouring curves between which the collapse mode changes: they differ by more than a shift, or by a much larger
-/// one than the other pairs.
+/// one than the other pairs, or the faster one is weaker, where rate and inertia only add.
 pub(super) fn mode_switches(cases: &[CaseCurve]) -> Vec<(usize, usize)> {
     let pair = |i: usize| {
         let end_m = cases[i].end_m().min(cases[i + 1].end_m());
-        // A difference in level is not a change of mode.
+        // A higher level at the higher speed is not a change of mode.
         let level = |curve: usize| cases[curve].envelope().work_to(end_m) / end_m;
         let levels = [level(i), level(i + 1)];
         let relative = |curve: usize, d: f64| cases[curve].force_at(d) / levels[curve - i];
         let by = |curve: usize| Sampled { end_m: cases[curve].end_m(), level_n: &relative, curve };
-        Pair::of(&by(i), &by(i + 1))
+        (Pair::of(&by(i), &by(i + 1)), levels[1] < LEAST_RATIO * levels[0])
     };
-    let pairs: Vec<Pair> = (0..cases.len().saturating_sub(1)).map(pair).collect();
+    let pairs = (0..cases.len().saturating_sub(1)).map(pair);
+    let (pairs, is_weaker): (Vec<Pair>, Vec<bool>) = pairs.unzip();
     let speed = |i: usize| cases[i + 1].speed_m_per_s - cases[i].speed_m_per_s;
     let mut rates: Vec<f64> =
         pairs.iter().enumerate().map(|(i, p)| p.most_m() / speed(i)).collect();
@@ -138,7 +140,7 @@ pub(super) fn mode_switches(cases: &[CaseCurve]) -> Vec<(usize, usize)> {
         let jumps = pairs.len() > 2
             && of[i] > JUMP * usual
             && pairs[i].most_m() > LEAST_JUMP * cases[i + 1].end_m();
-        jumps || pairs[i].rest > UNLIKE
+        jumps || pairs[i].rest > UNLIKE || is_weaker[i]
     };
     (0..pairs.len()).filter(switches).map(|i| (i, i + 1)).collect()
 }
@@ -378,6 +380,11 @@ mod tests {
         let hump = |d: f64, f: f64| f + 4e6 * (-((d - 0.7) / 0.1_f64).powi(2)).exp();
         let pair = [step(10.0, 0.9), step(12.0, 0.9).map_forces(hump)];
         assert_eq!(mode_switches(&pair), [(0, 1)]);
+        // Nothing but another mode makes a structure weaker at a higher speed.
+        let times = |factor: f64| [step(10.0, 0.9), step(12.0, 0.9).map_forces(|_, f| factor * f)];
+        assert_eq!(mode_switches(&times(0.8)), [(0, 1)]);
+        assert_eq!(mode_switches(&times(0.95)), []);
+        assert_eq!(mode_switches(&times(1.3)), []);
     }
 
     #[test]

@@ -221,10 +221,23 @@ impl Model {
         (self.cases[0].speed_m_per_s, self.cases[self.cases.len() - 1].speed_m_per_s)
     }
 
-    /// Whether a speed lies between the training speeds, but for the rounding of units.
-    pub(super) fn contains(&self, speed_m_per_s: f64) -> bool {
-        let (low, high) = self.range_m_per_s();
-        (low * (1.0 - SAME_SPEED)..=high * (1.0 + SAME_SPEED)).contains(&speed_m_per_s)
+    /// The training speeds in m/s that a query lies among or beyond, in order: those of the runs with its parameters, or all if these have
+    /// one speed or none.
+    pub(super) fn speeds_around(&self, at: &QueryPoint<'_>) -> Vec<f64> {
+        let alike = self.cases.iter().filter(|case| self.is_alike(case, at));
+        let alike: Vec<f64> = alike.map(|case| case.speed_m_per_s).collect();
+        if alike.first() < alike.last() {
+            alike
+        } else {
+            self.cases.iter().map(|case| case.speed_m_per_s).collect()
+        }
+    }
+
+    /// Whether a query lies between these training speeds, but for the rounding of units.
+    pub(super) fn contains(&self, at: &QueryPoint<'_>) -> bool {
+        let speeds = self.speeds_around(at);
+        let (low, high) = (speeds[0], speeds[speeds.len() - 1]);
+        (low * (1.0 - SAME_SPEED)..=high * (1.0 + SAME_SPEED)).contains(&at.speed_m_per_s)
     }
 
     /// Speed in m/s at which the training mass (that of the first run, where they differ) has the energy of `mass_kg` at a
@@ -265,15 +278,18 @@ impl Model {
             (of.body_band, of.body_band_outside)
         };
         if inner.or(ends).is_none() {
-            return Ok(None);
+            // Of fewer than three that is said already.
+            return match self.cases.len() {
+                0..3 => Ok(None),
+                _ => Err(Warning::no_band("no speed could be left out to assess the model")),
+            };
         }
         if let Some((feature, ..)) = self.features_outside(at).next() {
             let name = feature.name();
             let why = format!("no case outside the training cases' {name} was left out");
             return Err(Warning::no_band(&why));
         }
-        let speeds: Vec<f64> = self.cases.iter().map(|c| c.speed_m_per_s).collect();
-        match band::at(inner, ends, &speeds, at.speed_m_per_s) {
+        match band::at(inner, ends, &self.speeds_around(at), at.speed_m_per_s) {
             Some(band) => Ok(Some(band)),
             None => Err(Warning::no_band(
                 "no left-out speed shows how far FE may lie from a curve here",
@@ -406,15 +422,20 @@ impl Model {
     /// Warnings of a query here, for any mass and rule.
     pub(crate) fn warnings(&self, at: &QueryPoint<'_>) -> Vec<Warning> {
         let v = at.speed_m_per_s;
-        let (low, high) = self.range_m_per_s();
+        let speeds = self.speeds_around(at);
+        let (low, high) = (speeds[0], speeds[speeds.len() - 1]);
         let mut warnings = Vec::new();
         if self.cases.len() < 3 {
             warnings.push(Warning::too_few_curves(self.cases.len()));
         }
-        let speeds = || self.cases.iter().map(|c| c.speed_m_per_s);
-        let nearest = self.cases[nearest(speeds(), v)].speed_m_per_s;
-        if !self.contains(v) {
-            warnings.push(Warning::out_of_range(v, low, high));
+        let nearest = speeds[nearest(speeds.iter().copied(), v)];
+        if !self.contains(at) {
+            let of = if speeds.len() < self.cases.len() {
+                " of the runs with these parameters"
+            } else {
+                ""
+            };
+            warnings.push(Warning::out_of_range(v, low, high, of));
         } else if (nearest / v - 1.0).abs() > FAR_OUTSIDE_SHARE {
             warnings.push(Warning::far_from_training(v, nearest));
         }

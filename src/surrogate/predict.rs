@@ -281,11 +281,11 @@ impl<'a> Prediction<'a> {
         warnings.extend(asked.unlike_peak(&declared));
         let (crush_m, data_end_m) = (declared.end_m(), model.largest_crush_m());
         if is_beyond(crush_m, data_end_m) {
-            let by_speed_m = crush.monotone_m.filter(|_| !model.contains(v));
+            let by_speed_m = crush.monotone_m.filter(|_| !model.contains(&asked.at()));
             warnings.push(Warning::beyond_data(crush_m, data_end_m, by_speed_m));
         }
         // Between the training speeds no curve that was left out goes on there: a mass does that.
-        let is_beyond = is_beyond(crush_m, data_end_m) && model.contains(v);
+        let is_beyond = is_beyond(crush_m, data_end_m) && model.contains(&asked.at());
         let ratio = asked.mass_kg / model.masses().effective_kg();
         let without_band = match () {
             () if is_unlike(ratio) && !model.has_mass() => {
@@ -383,8 +383,8 @@ fn provenance(
     (energy, body_energy): (f64, Option<f64>),
 ) -> Provenance {
     let (model, v) = (asked.model, asked.v);
-    let speeds = || model.cases.iter().map(|c| c.speed_m_per_s);
-    let nearest = model.cases[nearest(speeds(), v)].speed_m_per_s;
+    let around = model.speeds_around(&asked.at());
+    let nearest = around[nearest(around.iter().copied(), v)];
     let mut parameters = asked.parameters.clone();
     let is_unequal = asked.masses.other_kg.is_some_and(|other| other != asked.masses.body_kg);
     parameters.retain(|name, _| {
@@ -398,8 +398,8 @@ fn provenance(
         force_kind: model.force_kind,
         training_hash: model.training_hash.clone(),
         study_units: model.study_units,
-        training_speeds_m_per_s: speeds().collect(),
-        in_range: model.contains(v),
+        training_speeds_m_per_s: model.cases.iter().map(|c| c.speed_m_per_s).collect(),
+        in_range: model.contains(&asked.at()),
         nearest_training_speed_m_per_s: nearest,
         distance_to_nearest_m_per_s: (nearest - v).abs(),
         max_crush_rule: Some(rule),

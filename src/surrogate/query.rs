@@ -161,7 +161,7 @@ impl<'a> ResolvedQuery<'a> {
         query.rule.unwrap_or(match self.model.max_crush_rule {
             // Crush over speed is that of the trained mass and speeds; the motion knows both.
             MaxCrushRule::Spline | MaxCrushRule::Monotone
-                if !(self.same_mass && self.model.contains(self.v)) =>
+                if !(self.same_mass && self.model.contains(&self.at())) =>
             {
                 MaxCrushRule::Motion
             }
@@ -208,7 +208,7 @@ impl<'a> ResolvedQuery<'a> {
         // At the speed of a run, that run alone.
         let high = if share > 0.0 { high } else { low };
         let is_inside =
-            self.model.contains(self.v) && self.same_mass && self.model.features.is_empty();
+            self.model.contains(&self.at()) && self.same_mass && self.model.features.is_empty();
         let peak = |k: usize| (speeds[k], curves[k].envelope().peak_force_n());
         is_inside
             .then(|| Warning::peak_force(declared.peak_force_n(), [peak(low), peak(high)]))

@@ -6,6 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::curve::Masses;
+use crate::curve::force_curve::FULLY_CRUSHED;
 use crate::dataset::{Feature, SAME_SPEED};
 use crate::plural::counted;
 use crate::unit::{Shown, km_per_h};
@@ -116,7 +117,7 @@ impl fmt::Display for Warning {
 }
 
 impl Warning {
-    pub(crate) fn out_of_range(speed_m_per_s: f64, low: f64, high: f64) -> Self {
+    pub(crate) fn out_of_range(speed_m_per_s: f64, low: f64, high: f64, of: &str) -> Self {
         let far = if is_far_outside(speed_m_per_s, low, high) {
             " by more than a third of the range"
         } else {
@@ -125,7 +126,7 @@ impl Warning {
         Self {
             code: WarningCode::OutOfRange,
             message: format!(
-                "{}: this is extrapolation{far}",
+                "{}{of}: this is extrapolation{far}",
                 outside_of(speed_m_per_s, low, high)
             ),
         }
@@ -309,13 +310,20 @@ impl Warning {
 
     /// `by_speed_m`: what the runs' maximum crush over their speeds, continued, would give.
     pub(crate) fn beyond_data(crush_m: f64, data_end_m: f64, by_speed_m: Option<f64>) -> Self {
-        let other =
-            by_speed_m.map(|m| format!("; their crush over the speed, continued, gives {m:.3} m"));
+        let mut other = String::new();
+        if let Some(m) = by_speed_m {
+            other = format!("; their crush over the speed, continued, gives {m:.3} m");
+        }
+        let fully_m = FULLY_CRUSHED * data_end_m;
+        if crush_m > fully_m {
+            other.push_str(&format!(
+                "; a run of crumple takes the structure as fully crushed from {fully_m:.3} m on, and stops earlier, at a higher force"
+            ));
+        }
         Self {
             code: WarningCode::OutOfRange,
             message: format!(
-                "the maximum crush of {crush_m:.3} m lies beyond the {data_end_m:.3} m of the training runs: the force there is an assumption{}",
-                other.unwrap_or_default()
+                "the maximum crush of {crush_m:.3} m lies beyond the {data_end_m:.3} m of the training runs: the force there is an assumption{other}"
             ),
         }
     }
