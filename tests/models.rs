@@ -717,6 +717,54 @@ fn several_parameters() {
     assert!(unsuited.iter().any(|n| n.starts_with("linear: ")), "{unsuited:?}");
 }
 
+/// Inside the training speeds are those between the runs of the query's parameters.
+#[test]
+fn the_speeds_around_are_those_of_the_parameters() {
+    let make = |v: f64, grade: &str, factor: f64| {
+        let mut made = case(&format!("{v} {grade}"), v, 24e3, &|d, u| factor * law(d, u));
+        let grade = Parameter::Category(grade.into());
+        made.conditions.parameters = BTreeMap::from([("grade".into(), grade)]);
+        made
+    };
+    let soft = [8.0, 10.0, 12.0].map(|v| make(v, "soft", 1.0));
+    let hard = [14.0, 16.0, 18.0].map(|v| make(v, "hard", 1.6));
+    let both = [soft, hard].concat();
+    let auto = Choice::Auto { purpose: Purpose::Vehicle, seed: 0, trees: None };
+    let model = train("made", &both, auto).unwrap();
+    let ask = |v: f64, grade: &str| {
+        let parameters = BTreeMap::from([("grade".into(), Parameter::Category(grade.to_string()))]);
+        predict(&model, &Query { parameters, ..Query::at(v) }).unwrap()
+    };
+    let outside = |curve: &PredictedCurve| {
+        curve.warnings.iter().any(|w| w.message.contains("of the runs with these parameters"))
+    };
+    for (v, grade, inside, nearest) in
+        [(9.0, "soft", true, 8.0), (16.0, "soft", false, 12.0), (10.0, "hard", false, 14.0)]
+    {
+        let curve = ask(v, grade);
+        assert_eq!((curve.provenance.in_range, outside(&curve)), (inside, !inside), "{v} {grade}");
+        assert!((curve.provenance.nearest_training_speed_m_per_s - nearest).abs() <= 2.0);
+    }
+    assert_eq!(ask(16.0, "soft").provenance.nearest_training_speed_m_per_s, 12.0);
+    let width =
+        |v: f64| ask(v, "soft").provenance.band.map_or(f64::INFINITY, |b| b.pointwise_share);
+    assert!(width(15.0) > width(11.0), "{} and {}", width(15.0), width(11.0));
+    // Runs of one speed and parameters say nothing of others: all speeds count.
+    let scattered = [8.0, 11.0, 14.0, 17.0].map(|v| make(v, &format!("g{v}"), 1.0));
+    let model = train("made", &scattered, auto).unwrap();
+    let parameters = BTreeMap::from([("grade".into(), Parameter::Category("g8".into()))]);
+    let curve = predict(&model, &Query { parameters, ..Query::at(12.0) }).unwrap();
+    assert!(curve.provenance.in_range && !outside(&curve));
+    // Two speeds: none can be left out, which the curve says, and a blend is better than the nearest run.
+    let two = [8.0, 14.0].map(|v| ["soft", "hard"].map(|grade| make(v, grade, 1.0)));
+    let model = train("made", &two.concat(), auto).unwrap();
+    assert_eq!(model.name(), "extra");
+    let parameters = BTreeMap::from([("grade".into(), Parameter::Category("soft".into()))]);
+    let curve = predict(&model, &Query { parameters, ..Query::at(11.0) }).unwrap();
+    let said = curve.warnings.iter().any(|w| w.message.contains("no speed could be left out"));
+    assert!(said && curve.provenance.band.is_none(), "{:?}", curve.warnings);
+}
+
 /// Masses that scatter by less than half a per cent are one, as are numbers that differ by rounding.
 #[test]
 fn numbers_that_only_scatter_are_not_parameters() {
