@@ -29,7 +29,7 @@ const MAY_NAME: [(&str, &str); 38] = [
     ("forest", "stream"),
     ("solver", "guess plural signal history file os unit"),
     ("curve", "plural signal piecewise history unit"),
-    ("rating", "guess curve signal history"),
+    ("rating", "guess plural curve signal history"),
     ("study", "guess curve solver history manifest file unit"),
     ("history_hdf5", "solver history hdf5 file os unit"),
     ("dataset", "curve unit"),
@@ -229,7 +229,7 @@ fn functions_are_the_same_on_every_platform() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 86626), ("files", 307), ("public types", 165), ("error types", 9)];
+    [("lines", 86703), ("files", 307), ("public types", 165), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {

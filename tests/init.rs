@@ -1347,6 +1347,9 @@ fn inspect_takes_folders() {
     fs::create_dir(above.join("empty")).unwrap();
     let error = crumple_fails(above, 1, "inspect empty");
     says(&error, "empty: none of its folders holds solver files");
+    fs::rename(here.join("36kmh/nodes.txt"), above.join("empty/nodes.txt")).unwrap();
+    let error = crumple_fails(above, 1, "inspect empty");
+    says(&error, "solver files: name a file to have it inspected, as nodes.txt (nodout)");
 }
 
 #[test]

@@ -882,7 +882,10 @@ fn reasons_are_counted_and_grids_have_no_percentiles() {
     let (_, rows) = rows(&folder.text("out.csv"));
     let warned = rows.iter().filter(|row| row[row.len() - 2] == "warned").count();
     assert!(warned > 1, "{said}");
-    assert!(said.contains(&format!("{warned} of 9 items have warnings in their rows: ")), "{said}");
+    assert!(
+        said.contains(&format!("{warned} of 9 items have warnings in their rows:\n")),
+        "{said}"
+    );
     // With the range of the numbers that differ.
     let reason = said.split(" × interface ").nth(1).unwrap();
     let (_, crushed) = reason.split_once(" is crushed ").unwrap();

@@ -20,6 +20,7 @@ use crate::error::Error;
 use crate::plural::counted;
 use crate::surrogate::ModelKind;
 use crate::surrogate::leave_one_out::{LeftOut, Means, Scatter};
+use crate::surrogate::max_crush::MaxCrushRule;
 
 /// Numbers of speeds that a subset keeps.
 const SIZES: [u32; 2] = [4, 5];
@@ -127,7 +128,10 @@ fn subset(
         let kind = fitting.iter().find(|kind| kind.name() == of.model)?;
         let model = lacking[0].fit(*kind, &material);
         let rule = of.max_crush_rule;
-        let judged = lacking.iter().map(|case| case.trial_of(*kind, &model, &[rule]).judged(rule));
+        // The models are compared by the crush of the motion.
+        let rules = [rule, MaxCrushRule::Motion];
+        let rules = if rule == MaxCrushRule::Motion { &rules[..1] } else { &rules[..] };
+        let judged = lacking.iter().map(|case| case.trial_of(*kind, &model, rules).judged(rule));
         // The models are compared over the same subsets.
         let judged = judged.collect::<Result<Vec<_>, _>>().ok()?;
         for (kind, residuals) in judged.iter().flat_map(|score| &score.residuals) {

@@ -88,11 +88,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             Some(folder) => {
                 writeln!(out, "{}", folder.display())?;
                 output::table(out, table(&one.sections))?;
-                let renamed = renamed_files(folder).into_iter().filter_map(|(path, kind)| {
-                    let name = path.file_name()?.to_string_lossy().into_owned();
-                    (!is_named_like_output(&name)).then(|| format!("{name} ({kind})"))
-                });
-                let renamed: Vec<String> = renamed.collect();
+                let renamed = renamed(folder);
                 match renamed.is_empty() {
                     true => Ok(()),
                     false => writeln!(out, "not read, by their names: {}", renamed.join(", ")),
@@ -268,6 +264,15 @@ fn print(out: &mut dyn Write, section: &Section) -> io::Result<()> {
     Ok(())
 }
 
+/// Files of a folder that hold histories under names which no solver gives, with the kind.
+fn renamed(folder: &Path) -> Vec<String> {
+    let named = renamed_files(folder).into_iter().filter_map(|(path, kind)| {
+        let name = path.file_name()?.to_string_lossy().into_owned();
+        (!is_named_like_output(&name)).then(|| format!("{name} ({kind})"))
+    });
+    named.collect()
+}
+
 /// What is to be inspected: files, with the folder of the run where it was found by that.
 type Asked = (Option<PathBuf>, Vec<PathBuf>);
 
@@ -282,7 +287,13 @@ fn asked(paths: &[PathBuf]) -> Result<Vec<Asked>, Failure> {
         let named = |e| failed_at(path, e);
         let found = run_folders(path).map_err(named)?;
         if found.runs.is_empty() {
-            return Err(failed_at(path, "none of its folders holds solver files"));
+            let renamed = renamed(path);
+            let renamed = match renamed.is_empty() {
+                true => String::new(),
+                false => format!(": name a file to have it inspected, as {}", renamed.join(" or ")),
+            };
+            let why = format!("none of its folders holds solver files{renamed}");
+            return Err(failed_at(path, why));
         }
         for folder in found.runs {
             let mut files = output_files(&folder).map_err(named)?;

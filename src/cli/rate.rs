@@ -440,6 +440,7 @@ fn print_runs(out: &mut dyn Write, found: &RunAcceptance) -> io::Result<()> {
     output::table(out, table)?;
     let [r, p] = found.sequences.each_ref().map(|names| names.join(", "));
     let sequence = match found.same_sequence {
+        true if r.is_empty() => "no interface counts".into(),
         true => format!("the same sequence: {r}"),
         false if p.is_empty() || r.is_empty() => "one of the sequences is empty".into(),
         false => format!("another sequence: {p} instead of {r}"),

@@ -269,10 +269,10 @@ fn say(
             reasons.iter().take(SHOWN_REASONS).map(|(text, count)| format!("{count} × {text}"));
         let mut shown: Vec<String> = shown.collect();
         if reasons.len() > SHOWN_REASONS {
-            shown.push(format!("{} further kinds", reasons.len() - SHOWN_REASONS));
+            shown.push(counted(reasons.len() - SHOWN_REASONS, "further kind"));
         }
-        let (warned, rows, reasons) = (report.warned, report.rows, shown.join("; "));
-        global.warn(&format!("{warned} of {rows} items have warnings in their rows: {reasons}"));
+        let (warned, rows, reasons) = (report.warned, report.rows, shown.join("\n  "));
+        global.warn(&format!("{warned} of {rows} items have warnings in their rows:\n  {reasons}"));
     }
     let is_short = reached.is_some_and(|reached| !reached.is_reached);
     let outcome = match report.failed {

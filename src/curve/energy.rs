@@ -346,7 +346,7 @@ fn significant_mass(kg: f64) -> String {
     }
 }
 
-/// Four significant digits, for messages.
+/// Four significant digits, for messages; two of what is as small or large as no crash.
 fn significant(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();

@@ -54,13 +54,15 @@ pub(crate) fn write(model: &Model, options: &Options) -> Result<Exported, Error>
 
 impl Table {
     fn of(model: &Model, options: &Options) -> Result<Self, Error> {
-        let (low, high) = model.range_m_per_s();
+        let query = Query { speed_m_per_s: model.range_m_per_s().0, ..options.query.clone() };
+        let training = query.speeds_around(model)?;
+        let (low, high) = (training[0], training[training.len() - 1]);
         let even = |k: usize| low + (high - low) * k as f64 / (SPEEDS - 1) as f64;
         let mut speed_m_per_s = options.speeds_m_per_s.clone();
         if speed_m_per_s.is_empty() {
             // The training speeds themselves belong to it: a curve is best known there.
             speed_m_per_s = (0..SPEEDS).map(even).collect();
-            speed_m_per_s.extend(model.cases.iter().map(|c| c.speed_m_per_s));
+            speed_m_per_s.extend(training);
         }
         speed_m_per_s.sort_by(f64::total_cmp);
         speed_m_per_s.dedup_by(|a, b| (*a - *b).abs() <= 1e-9 * b.abs());

@@ -72,6 +72,11 @@ impl StageResult {
     fn taken_j(&self) -> f64 {
         self.mean_force_n * self.displacement_m
     }
+
+    /// The same, or what it dissipates in all, in pulls and in strokes after the largest one.
+    fn most_j(&self) -> f64 {
+        self.taken_j().max(self.dissipated_j)
+    }
 }
 
 impl StageRecord<'_> {
@@ -103,6 +108,11 @@ impl StageRecord<'_> {
             begin_s,
         }
     }
+}
+
+/// Prediction over reference, minus 1; 0 where they are equal, as where both only pull.
+fn relative(prediction: f64, reference: f64) -> f64 {
+    if prediction == reference { 0.0 } else { prediction / reference - 1.0 }
 }
 
 /// One stage of both runs.
@@ -164,7 +174,7 @@ pub(crate) fn accept(
     let lacks = |of: &[StageRecord<'_>], other: &[StageRecord<'_>]| -> Vec<String> {
         let least_j = LEAST_SHARE * most_j(of);
         let alone = of.iter().filter(|stage| other.iter().all(|o| o.name != stage.name));
-        let counting = alone.filter(|stage| stage.result().taken_j() >= least_j);
+        let counting = alone.filter(|stage| stage.result().most_j() >= least_j);
         counting.map(|stage| stage.name.to_string()).collect()
     };
     let missing = [lacks(reference, prediction), lacks(prediction, reference)].concat();
@@ -180,10 +190,10 @@ pub(crate) fn accept(
             prediction: *p,
             acceptance: Acceptance::of(
                 (p.dissipated_j - r.dissipated_j) / initial_energy_j,
-                p.displacement_m / r.displacement_m - 1.0,
-                p.mean_force_n / r.mean_force_n - 1.0,
+                relative(p.displacement_m, r.displacement_m),
+                relative(p.mean_force_n, r.mean_force_n),
             ),
-            counts: r.taken_j().max(p.taken_j()) >= LEAST_SHARE * initial_energy_j,
+            counts: r.most_j().max(p.most_j()) >= LEAST_SHARE * initial_energy_j,
         })
         .collect();
     let all_j = |stages: &[StageRecord<'_>]| -> f64 {
@@ -282,6 +292,13 @@ mod tests {
         assert!(!found.passes && !found.same_sequence && found.stages[1].counts, "{found:?}");
         assert_eq!(found.sequences, [vec!["a"], vec!["a", "b"]]);
         assert_eq!(found.stages[1].acceptance.displacement_error, None);
+        // A coupler that only pulls is rated by its energy, however little is crushed.
+        let pull = [0.0, -0.5, -1.0, -1.0, -1.0];
+        let (strong, weak) = ([0.0, -1.0, -1.0, 0.0, 0.0], [0.0, -0.5, -0.5, 0.0, 0.0]);
+        let [strong, weak] = [&strong, &weak].map(|f| [one[0], stage("b", &pull, f)]);
+        assert!(accept(&strong, &strong, 0.01).unwrap().passes);
+        let found = accept(&strong, &weak, 0.01).unwrap();
+        assert!(found.stages[1].counts && !found.passes, "{found:?}");
         // At the bound, and beyond.
         assert!(Acceptance::of(0.1, -0.1, 0.1).passes && !Acceptance::of(0.0, 0.0, 0.1001).passes);
     }

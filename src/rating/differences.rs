@@ -253,6 +253,8 @@ pub(crate) struct Deceleration {
     pub is_cut: bool,
     /// Share of that time in all that −a, where it is above zero, takes off the speed.
     pub share_of_change: Option<f64>,
+    /// Times above zero that count, of which it is the first.
+    pub pulses: usize,
     /// Largest mean of −a over 120 ms; null if the interval is shorter.
     pub largest_120ms_mean: Option<f64>,
 }
@@ -284,6 +286,7 @@ impl Deceleration {
             to_s: Some(to_s),
             above_to_s: above_to.map(|k| time_s[k]),
             is_cut: last + 1 == deceleration.len() && above(deceleration[last]),
+            pulses: spells.iter().filter(counts).count(),
             share_of_change: (all > 0.0).then(|| (change / all).min(1.0)),
             largest_120ms_mean,
         }

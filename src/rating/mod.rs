@@ -21,6 +21,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::error::Error;
+use crate::plural::counted;
 use crate::signal::l1_ratio;
 use crate::signal::peaks::{MatchedPeak, matched_peaks};
 pub(crate) use differences::{Cora, Deceleration, MagnitudePhase, MaxAbs, Pointwise};
@@ -248,6 +249,9 @@ const UNRATED: f64 = 0.05;
 const TAIL_S: f64 = 0.020;
 /// A mean deceleration over less than this share of the change of speed is not that of the impact.
 const MOST_OF_CHANGE: f64 = 0.5;
+/// More pulses than those of the contacts of a train are an oscillation, and so is a shorter one.
+const MOST_PULSES: usize = 4;
+const SHORTEST_S: f64 = 0.005;
 
 fn warnings(rating: &Rating, both: [&[f64]; 2], settings: &RatingSettings) -> Vec<String> {
     let mut warnings = Vec::new();
@@ -291,7 +295,7 @@ fn warnings(rating: &Rating, both: [&[f64]; 2], settings: &RatingSettings) -> Ve
         .iter()
         .flat_map(|d| [("reference", d.reference), ("prediction", d.prediction)])
     {
-        if of.mean.is_none() {
+        if of.mean.is_none() && !(who == "prediction" && is_zero[1]) {
             warnings.push(format!(
                 "the {who} is never decelerated: an acceleration is negative while the body is slowed down, so scale it by -1 if it has the opposite sign"
             ));
@@ -308,8 +312,13 @@ fn warnings(rating: &Rating, both: [&[f64]; 2], settings: &RatingSettings) -> Ve
         if let (Some(share), Some(from_s), Some(to_s)) = (of.share_of_change, of.from_s, of.to_s)
             && share < MOST_OF_CHANGE
         {
+            let remedy = match of.pulses > MOST_PULSES || to_s - from_s < SHORTEST_S {
+                true => "it swings about zero, filter it (--cfc 60)",
+                false => "another one is chosen by --from and --to",
+            };
             warnings.push(format!(
-                "the mean deceleration of the {who} is that from {:.1} to {:.1} ms, which takes {:.0} % of what all its decelerations take off the speed: filter it (--cfc 60), or choose the interval (--from, --to)",
+                "the mean deceleration of the {who} is that of the first of {}, from {:.1} to {:.1} ms, with {:.0} % of the change of speed: {remedy}",
+                counted(of.pulses, "pulse"),
                 1e3 * from_s,
                 1e3 * to_s,
                 100.0 * share

@@ -63,9 +63,7 @@ pub(crate) fn assemble(
     let mut prepared = assemble_at(path, scenario, sources, &speeds_m_per_s)?;
     let mut before = vec![0.0; own.len()];
     for _ in 0..ROUNDS {
-        let mut settings = RunSettings { record: Record::Closing, ..prepared.settings };
-        settings.duration_s = settings.duration_s.min(LONGEST_S);
-        settings.output_interval_s = INTERVAL_S.min(settings.duration_s);
+        let mut settings = closing(prepared.settings);
         if !prepared.chain.has_rates() {
             settings = settings.with_method(Method::FourthOrder);
         }
@@ -100,6 +98,13 @@ pub(crate) fn assemble(
     Ok(prepared)
 }
 
+/// Settings of a run of which only the closing speeds are needed.
+fn closing(settings: RunSettings) -> RunSettings {
+    let duration_s = settings.duration_s.min(LONGEST_S);
+    let output_interval_s = INTERVAL_S.min(duration_s);
+    RunSettings { record: Record::Closing, duration_s, output_interval_s, ..settings }
+}
+
 /// Speeds of a curve and of an interface inside a train that differ by this factor are two: one curve drives many interfaces.
 const OTHER_SPEED: f64 = 1.5;
 /// A crush below this share of a curve's data says nothing of it.
@@ -112,20 +117,21 @@ impl Prepared {
     /// another speed.
     pub fn warnings_of(&self, run: &Run) -> Vec<String> {
         let mut warnings = self.warnings.clone();
-        warnings.extend(self.other_speeds(run));
+        warnings.extend(self.other_speeds(run, &[]));
         warnings.extend(run.all_warnings());
         warnings
     }
 
     /// Warnings of curves of one impact that drive interfaces inside the train which close at another speed in a run.
-    pub(crate) fn other_speeds(&self, run: &Run) -> Vec<String> {
+    fn other_speeds(&self, run: &Run, replaced: &[&str]) -> Vec<String> {
         let interfaces = self.chain.interfaces().iter().zip(&run.interfaces).zip(&self.used);
         let mut others: BTreeMap<&str, (f64, Vec<String>)> = BTreeMap::new();
         for (k, ((interface, history), used)) in interfaces.enumerate() {
             let is_of_one = self.of_one.0.iter().any(|of| of.curve == used.curve);
             let is_crushed = history.max_deflection_m > HARDLY_CRUSHED * history.data_end_m;
+            let is_replaced = replaced.contains(&&*used.curve);
             let (true, true, Some(own), Some(closing)) = (
-                k != self.meeting && is_of_one && is_crushed,
+                k != self.meeting && is_of_one && is_crushed && !is_replaced,
                 self.settings.output_interval_s <= LONGEST_INTERVAL_S,
                 used.speed_m_per_s,
                 closing_speed(&self.chain, run, k),
@@ -149,10 +155,14 @@ impl Prepared {
         others.into_iter().map(warning).collect()
     }
 
-    /// The same of a run of its own; none if it has no curve of one impact, or does not run.
-    pub(crate) fn other_speeds_as_it_stands(&self) -> Vec<String> {
-        let run = (!self.of_one.0.is_empty()).then(|| simulate(&self.chain, &self.settings));
-        run.and_then(Result::ok).map_or_else(Vec::new, |run| self.other_speeds(&run))
+    /// The same of a run of its own, but for curves that are replaced; none if it has no curve of one impact, or does not run.
+    pub(crate) fn other_speeds_as_it_stands(&self, replaced: &[&str]) -> Vec<String> {
+        let is_idle = self.of_one.0.iter().all(|of| replaced.contains(&&*of.curve));
+        if is_idle || self.settings.output_interval_s > LONGEST_INTERVAL_S {
+            return Vec::new();
+        }
+        let run = simulate(&self.chain, &closing(self.settings));
+        run.map_or_else(|_| Vec::new(), |run| self.other_speeds(&run, replaced))
     }
 }
 

@@ -289,7 +289,13 @@ impl Model {
             let why = format!("no case outside the training cases' {name} was left out");
             return Err(Warning::no_band(&why));
         }
-        match band::at(inner, ends, &self.speeds_around(at), at.speed_m_per_s) {
+        let speeds: Vec<f64> = self.cases.iter().map(|c| c.speed_m_per_s).collect();
+        let is_inside = (speeds[0]..=speeds[speeds.len() - 1]).contains(&at.speed_m_per_s);
+        if is_inside && !self.contains(at) {
+            let why = "no speed beyond those of the runs with these parameters was left out";
+            return Err(Warning::no_band(why));
+        }
+        match band::at(inner, ends, &speeds, at.speed_m_per_s) {
             Some(band) => Ok(Some(band)),
             None => Err(Warning::no_band(
                 "no left-out speed shows how far FE may lie from a curve here",

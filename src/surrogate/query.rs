@@ -59,6 +59,11 @@ impl Query {
         let Ok(asked) = ResolvedQuery::new(model, self) else { return Vec::new() };
         model.cases.iter().filter(|case| model.is_alike(case, &asked.at())).cloned().collect()
     }
+
+    /// The training speeds in m/s that the query lies among or beyond, in order.
+    pub(crate) fn speeds_around(&self, model: &Model) -> Result<Vec<f64>, Error> {
+        Ok(model.speeds_around(&ResolvedQuery::new(model, self)?.at()))
+    }
 }
 
 /// A query with everything that follows from it and the model alone.

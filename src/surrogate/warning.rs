@@ -118,7 +118,8 @@ impl fmt::Display for Warning {
 
 impl Warning {
     pub(crate) fn out_of_range(speed_m_per_s: f64, low: f64, high: f64, of: &str) -> Self {
-        let far = if is_far_outside(speed_m_per_s, low, high) {
+        // Of some of the runs alone it is not refused.
+        let far = if of.is_empty() && is_far_outside(speed_m_per_s, low, high) {
             " by more than a third of the range"
         } else {
             ""

@@ -177,7 +177,13 @@ impl Sweep {
         let results = results(&plan, scenario.limits.is_some()).map_err(invalid)?;
         let sources = Sources::read(path, &scenario)?;
         let mut base = scenario::assemble(path, &scenario, &sources)?;
-        base.warnings.extend(base.other_speeds_as_it_stands());
+        let replaced = plan.vary.iter().filter(|v| v.what == What::Curve).filter_map(|v| {
+            let curve = v.curve.as_deref()?;
+            let is_kept = v.values.iter().flatten().any(|value| value.0 == curve);
+            (!is_kept).then_some(curve)
+        });
+        let replaced: Vec<&str> = replaced.collect();
+        base.warnings.extend(base.other_speeds_as_it_stands(&replaced));
         for variable in &variables {
             let Some(curve) = variable.gap_of() else { continue };
             let (_, others) = scenario::takes_gap_of(&scenario, curve)?;

@@ -43,8 +43,8 @@ pub(crate) struct Row {
     pub message: String,
 }
 
-/// Between the warnings of a row; in one of them it is a comma.
-pub(super) const BETWEEN: &str = "; ";
+/// Between the warnings of a row.
+pub(super) const BETWEEN: &str = " | ";
 
 /// A value as it is in a file: shortest digits that read back the same, a name, or nothing.
 pub(crate) fn text(value: f64, names: &[String]) -> String {

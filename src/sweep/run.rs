@@ -129,7 +129,6 @@ impl<'a> Worker<'a> {
                 vec![error.message().to_string()]
             }
         };
-        let messages: Vec<String> = messages.iter().map(|m| m.replace(BETWEEN, ", ")).collect();
         row.message = messages.join(BETWEEN).replace(|c: char| c.is_control(), " ");
         row
     }

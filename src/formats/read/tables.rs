@@ -212,10 +212,13 @@ pub(crate) fn history(bytes: &[u8], wanted: Option<&str>) -> Result<History, Err
         let number = |field: usize| {
             row.number(field).map_err(|found| {
                 let (column, name) = (field + 1, name_of(field));
-                let kind = if found.parse::<f64>().is_ok() { "a finite number" } else { "a number" };
+                let is_number = found.parse::<f64>().is_ok();
+                let kind = if is_number { "a finite number" } else { "a number" };
+                let has_none = is_number || !found.contains(|c: char| c.is_ascii_digit());
+                let remedy = if has_none { ": remove the lines without a value" } else { "" };
                 error!(
                     Rating,
-                    "line {line}, column {column} (\"{name}\"): expected {kind}, found \"{found}\": remove the lines without a value",
+                    "line {line}, column {column} (\"{name}\"): expected {kind}, found \"{found}\"{remedy}",
                     found = shown(found)
                 )
             })
