@@ -699,6 +699,42 @@ fn build_keeps_what_h5py_put_into_the_database() {
     assert!(python().args(["-c", look]).current_dir(folder.path()).status().unwrap().success());
 }
 
+/// Links are seen by nothing else that they leave.
+#[test]
+#[ignore = "needs the Python clients (tests/run installs them)"]
+fn links_of_h5py_alone_are_kept_or_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let path = build_fixture(here, WALL);
+    let run = |text: &str| {
+        let text = format!("import h5py\n{text}\n");
+        assert!(python().args(["-c", &text]).current_dir(here).status().unwrap().success());
+    };
+    run("f = h5py.File('curves.h5', 'a')\n\
+         f['lead-car-wall/reference'] = h5py.SoftLink('/lead-car-wall/36kmh')\n\
+         f['lead-car-wall/36kmh/video'] = h5py.ExternalLink('video.h5', '/frames')");
+    for command in [
+        "note curves.h5 --case 12kmh --add checked",
+        "tag curves.h5 --case 36kmh --add main",
+        "rename curves.h5 --case 25kmh --to slow",
+    ] {
+        crumple_ok(here, &format!("db {command}"));
+        run("f = h5py.File('curves.h5', 'r')\n\
+             assert f['lead-car-wall'].get('reference', getlink=True).path == '/lead-car-wall/36kmh'\n\
+             assert f['lead-car-wall/36kmh'].get('video', getlink=True).filename == 'video.h5'");
+    }
+    // With more, the group's links move into a heap, where they cannot be edited.
+    run("f = h5py.File('curves.h5', 'a')\n\
+         for k in range(8): f['lead-car-wall'][f'l{k}'] = h5py.SoftLink('/x')");
+    let before = fs::read(&path).unwrap();
+    let error = crumple_fails(here, 1, "db tag curves.h5 --case 36kmh --add other");
+    says(
+        &error,
+        "curves.h5 holds objects that crumple did not write and would lose by rewriting the file: links",
+    );
+    assert!(fs::read(&path).unwrap() == before);
+}
+
 /// What a file says of itself may be meant for the terminal.
 #[test]
 fn text_of_files_is_printed_without_control_characters() {

@@ -1101,3 +1101,32 @@ proptest! {
         }
     }
 }
+
+/// A channel of the crush rests before contact, though the bodies close: its speed is not differentiated across that kink.
+#[test]
+fn a_crush_that_rests_before_contact_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    // A spring of 9.6 MN/m stops 24 t from 10 m/s: ω = 20 /s.
+    let state = |ms: i32| {
+        let t = 1e-3 * f64::from(ms.max(0));
+        let d = 0.5 * (20.0 * t).sin().max(0.0);
+        format!("{ms},{},{}\n", 1e3 * d, 9.6e3 * d)
+    };
+    let record = |from: i32| {
+        let rows: String = (from..200).map(state).collect();
+        format!("time [ms],deflection [mm],force [kN]\n{rows}")
+    };
+    for (name, from) in [("plain", 0), ("rests", -20)] {
+        fs::write(folder.path().join(format!("{name}.csv")), record(from)).unwrap();
+        crumple_ok(
+            folder.path(),
+            &format!("db add a.h5 {name}.csv --group {name} --speed 36km/h --mass 24t --kind wall"),
+        );
+        let database = crumple::database::Database::read(&folder.path().join("a.h5")).unwrap();
+        let case = &database.cases(name)[0];
+        let v = case.curves.closing_speed_m_per_s[0];
+        assert!((v - 10.0).abs() < 0.05, "{name}: {v} m/s");
+        let crush_m = case.curves.original.deflection_m().iter().copied().fold(0.0, f64::max);
+        assert!((crush_m - 0.5).abs() < 0.012, "{name}: {crush_m} m");
+    }
+}

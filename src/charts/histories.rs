@@ -22,7 +22,10 @@ pub fn histories(
     filter_class: Option<u32>,
 ) -> Result<Chart, Error> {
     if histories.is_empty() {
-        return Err(error!(Plot, "there is no history: give other ids or components"));
+        return Err(error!(
+            Plot,
+            "there is no history: give other ids or components, if the file holds complete states (crumple inspect)"
+        ));
     }
     if histories.len() > MOST {
         return Err(error!(
@@ -134,7 +137,10 @@ mod tests {
         assert!(histories("", &all[1..], None, None).is_ok());
         assert_eq!(
             histories("", &[], None, None),
-            Err(error!(Plot, "there is no history: give other ids or components"))
+            Err(error!(
+                Plot,
+                "there is no history: give other ids or components, if the file holds complete states (crumple inspect)"
+            ))
         );
     }
 }

@@ -3,6 +3,7 @@
 //! links, types and attributes stay as they were encoded. And writing a large database in parts.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
+use std::io::Read;
 use std::path::Path;
 use std::{fmt, fs};
 
@@ -28,6 +29,7 @@ pub(super) fn write_keeping(
     let moves = Moves::of(&old, database, before);
     let before: BTreeSet<Item> = before.iter().map(|item| moves.of_item(item)).collect();
     let would_drop = |what: String| {
+        let what = if what.is_empty() { "links".into() } else { what };
         error!(
             Database,
             "{} holds objects that crumple did not write and would lose by rewriting the file: {what}; the database is unchanged: copy them to another file and delete them here, or build into a new database",
@@ -44,6 +46,7 @@ pub(super) fn write_keeping(
         edited.map_err(|e| match e {
             // If the copy can be read, the editor cannot do it.
             EditError::Hdf5(e) => match opened::open(draft).and_then(|draft| found(&draft)) {
+                Ok(_) if before.is_empty() => would_drop(format!("links ({e})")),
                 Ok(_) => would_drop(format!("{} ({e})", listed(&before))),
                 Err(unread) => unread,
             },
@@ -477,6 +480,34 @@ pub(super) fn listed(items: &BTreeSet<Item>) -> String {
     match more {
         0 => names.join(", "),
         _ => format!("{} and {more} more", names.join(", ")),
+    }
+}
+
+/// Bytes of a file that are looked at at once.
+const WINDOW: usize = 1 << 20;
+/// Continued headers, and groups whose links are in a heap (a tree of type 5): files that crumple writes as a whole have neither.
+const CONTINUED: &[u8] = b"OCHK";
+const LINKS_IN_A_HEAP: [&[u8]; 2] = [b"BTHD\x00\x05", b"BTHD\x01\x05"];
+
+/// Whether another program may have put links into a file: those that are not hard are seen by no other trace.
+pub(super) fn may_have_links(path: &Path) -> Result<bool, Error> {
+    let failed = |source| Error::io(path, source);
+    let mut file = crate::file::open(path).map_err(failed)?;
+    let longest = LINKS_IN_A_HEAP[0].len();
+    let (mut window, mut kept) = (vec![0; WINDOW], 0);
+    loop {
+        let read = file.read(&mut window[kept..]).map_err(failed)?;
+        if read == 0 {
+            return Ok(false);
+        }
+        let seen = &window[..kept + read];
+        let mut marks = LINKS_IN_A_HEAP.into_iter().chain([CONTINUED]);
+        if marks.any(|mark| memchr::memmem::find(seen, mark).is_some()) {
+            return Ok(true);
+        }
+        let end = seen.len();
+        kept = (longest - 1).min(end);
+        window.copy_within(end - kept..end, 0);
     }
 }
 

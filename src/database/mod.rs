@@ -167,8 +167,10 @@ impl Database {
     pub fn write(&self, path: &Path) -> Result<(), Error> {
         let is_there = is_file(path)?;
         if is_there {
-            let foreign = edit::found(&opened::open(path)?)?;
-            if !foreign.is_empty() {
+            let opened = opened::open(path)?;
+            let foreign = edit::found(&opened)?;
+            let is_current = opened.version == layout::VERSION;
+            if !foreign.is_empty() || is_current && edit::may_have_links(path)? {
                 return edit::write_keeping(self, path, &foreign);
             }
         }

@@ -124,7 +124,12 @@ pub(crate) fn is_file(path: &Path) -> Result<bool, Error> {
 
 /// The file that is written at `path`: a link is followed, so that its target is and not the link.
 pub(crate) fn target_of(path: &Path) -> io::Result<PathBuf> {
-    Ok(if_there(fs::canonicalize(path))?.unwrap_or_else(|| path.to_path_buf()))
+    if let Some(target) = if_there(fs::canonicalize(path))? {
+        return Ok(target);
+    }
+    // The link of a file that is not there yet.
+    let target = fs::read_link(path).map(|link| folder_of(path).join(link));
+    Ok(target.unwrap_or_else(|_| path.to_path_buf()))
 }
 
 /// Whether two paths name the same existing file.

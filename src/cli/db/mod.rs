@@ -164,10 +164,10 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
 /// Which cases; every option narrows the choice.
 #[derive(clap::Args)]
 struct Chosen {
-    /// Group; may be repeated [default: all]
+    /// Group; may be repeated
     #[arg(long, help_heading = "Which cases")]
     group: Vec<String>,
-    /// Case of the group, or GROUP/CASE; may be repeated [default: all]
+    /// Case of the group, or GROUP/CASE; may be repeated
     #[arg(long, help_heading = "Which cases")]
     case: Vec<String>,
     /// Impact speeds: 20km/h..40km/h, ..40km/h, 20km/h.. or 36km/h; may be repeated

@@ -310,14 +310,25 @@ impl Motion {
 
     fn differentiated(deflection: Signal, missing: String, remarks: &mut Notes) -> Self {
         remarks.note("closing speed: displacement differentiated, because no velocity was read");
+        let (t, d) = (&deflection.time_s, &deflection.values);
+        // A channel of the crush rests before contact, though the bodies close: no derivative across that kink.
+        let rests = d.iter().take_while(|value| **value == d[0]).count().saturating_sub(1);
+        let rests = if rests + LEAST_MOVING <= d.len() { rests } else { 0 };
+        let mut rate_m_per_s = derivative(&t[rests..], &d[rests..]);
+        if let Some(&first) = rate_m_per_s.first() {
+            rate_m_per_s.splice(0..0, vec![first; rests]);
+        }
         Self {
-            rate_m_per_s: derivative(&deflection.time_s, &deflection.values),
+            rate_m_per_s,
             time_s: deflection.time_s,
             deflection_m: deflection.values,
             missing_velocity: Some(missing),
         }
     }
 }
+
+/// Samples that must move for the rest before them to be that of a channel of the crush.
+const LEAST_MOVING: usize = 3;
 
 /// A node's history less another's.
 fn relative(
