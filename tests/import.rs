@@ -374,7 +374,7 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
     }
     let csv = |rows: &str| format!("d_m,force_N\n{rows}");
     #[rustfmt::skip]
-    let cases: [(&str, Vec<u8>, &[&str]); 20] = [
+    let cases: [(&str, Vec<u8>, &[&str]); 21] = [
         ("a.csv", csv("0,0\n1,NaN\n2,3\n3,4\n").into(), &["line 3, field 2: expected a number, found \"NaN\""]),
         ("a.csv", csv("0,0\n1,ten\n2,3\n3,4\n").into(), &["line 3, field 2: expected a number, found \"ten\""]),
         ("a.csv", csv("0,0\n1\n2,3\n3,4\n").into(), &["line 3, field 2: expected a number, found \"\""]),
@@ -389,6 +389,7 @@ fn what_is_no_curve_is_refused_with_file_place_and_remedy() {
         ("a.csv", "d [inch],force_N\n0,0\n1,2\n2,3\n3,4\n".into(), &["line 1: the unit \"inch\" of the deflection is not known: use one of mm, cm, m, in, ft"]),
         ("a.csv", "d_m,force [kn]\n0,0\n1,2\n2,3\n3,4\n".into(), &["the unit \"kn\" of the force is not known: use one of N, kN, MN, lbf"]),
         ("a.csv", "date,note\n0,0\n1,2\n2,3\n3,4\n".into(), &["line 1: expected a column deflection with its unit, such as d_m or d_mm, found \"date\""]),
+        ("a.csv", "d_m,F1_kN,F2_kN\n0,0,0\n1,2,2\n2,3,3\n3,4,4\n".into(), &["expected a column force with its unit, such as force_N or force_kN, found \"F1_kN\", \"F2_kN\""]),
         ("a.csv", "d_m,note\n0,0\n1,2\n2,3\n3,4\n".into(), &["expected a column force with its unit, such as force_N or force_kN, found \"note\""]),
         ("a.csv", "# force_kind: big\nd_m,force_N\n0,0\n".into(), &["line 1: \"# force_kind: big\": expected \"body\" or \"contact\""]),
         ("a.csv", b"d_m,force_N\n0,\xff\n1,2\n".into(), &["line 2"]),

@@ -78,7 +78,7 @@ fn titles_above_the_header_are_skipped() {
         ("\n0;0", "\n0;null", "line 7, field 2: expected a number, found \"null\""),
         ("[kN]", "[kgf]", "line 6: the unit \"kgf\" of the force is not known"),
         ("Weg;", "Weg [cm];", "line 6, field 1: expected the unit of the header, cm, found \"mm\""),
-        ("Weg;Kraft", "Hub;Last", "line 5: expected a column deflection with its unit, such as d_m or d_mm, found \"Hub\"; or choose the column with --deflection-column"),
+        ("Weg;Kraft", "Hub;Last", "line 5: expected a column deflection with its unit, such as d_m or d_mm, found \"Hub\", \"Last\"; or choose the column with --deflection-column"),
         ("\n[mm];[kN]", "", "line 5: the deflection has no unit (\"Weg\")"),
     ];
     cases.into_iter().for_each(|(from, to, expected)| wrong(from, to, expected));

@@ -138,10 +138,13 @@ pub(super) fn layout(
             let is_legend = |(_, (_, name)): &(usize, &(u64, String))| {
                 Label::of_column(name).is_none() && !name.contains([' ', '_', '[', '(', '/'])
             };
-            for column in free.filter(is_legend) {
+            for column in free.clone().filter(is_legend) {
                 found.push(of(column, Label { quantity, unit: None })?);
             }
         }
+        let left: Vec<String> =
+            free.clone().take(LISTED).map(|(_, (_, n))| format!("\"{}\"", shown(n))).collect();
+        let line_left = free.map(|(_, (line, _))| *line).next().unwrap_or(table.line());
         found.sort_by_key(Named::fit);
         let best = found.first().map(Named::fit);
         let alike = found.iter().filter(|column| Some(column.fit()) == best);
@@ -161,14 +164,13 @@ pub(super) fn layout(
             Some(column) => taken.push(column),
             None if quantity == Quantity::Time => {}
             None => {
-                let usual = names.get(usize::from(quantity == Quantity::Force));
+                let left = if left.is_empty() { "no other".into() } else { left.join(", ") };
                 return Err(error!(
                     CurveFile,
-                    "{place}: expected a column {wanted} with its unit, such as {example}, found \"{found}\"; or choose the column with {option}",
+                    "{place}: expected a column {wanted} with its unit, such as {example}, found {left}; or choose the column with {option}",
                     example = quantity.example(),
-                    found = shown(usual.map_or("", |(_, name)| name)),
                     option = quantity.option(),
-                    place = Place::Line(usual.map_or(table.line(), |(line, _)| *line)),
+                    place = Place::Line(line_left),
                     wanted = quantity.name()
                 ));
             }
