@@ -28,8 +28,11 @@ pub(super) fn write_keeping(
     let mut old = opened::decode(path)?;
     let moves = Moves::of(&old, database, before);
     let before: BTreeSet<Item> = before.iter().map(|item| moves.of_item(item)).collect();
+    let listed = |items: &BTreeSet<Item>| match items.is_empty() {
+        true => "links".to_string(),
+        false => listed(items),
+    };
     let would_drop = |what: String| {
-        let what = if what.is_empty() { "links".into() } else { what };
         error!(
             Database,
             "{} holds objects that crumple did not write and would lose by rewriting the file: {what}; the database is unchanged: copy them to another file and delete them here, or build into a new database",
@@ -46,7 +49,6 @@ pub(super) fn write_keeping(
         edited.map_err(|e| match e {
             // If the copy can be read, the editor cannot do it.
             EditError::Hdf5(e) => match opened::open(draft).and_then(|draft| found(&draft)) {
-                Ok(_) if before.is_empty() => would_drop(format!("links ({e})")),
                 Ok(_) => would_drop(format!("{} ({e})", listed(&before))),
                 Err(unread) => unread,
             },
@@ -485,11 +487,11 @@ pub(super) fn listed(items: &BTreeSet<Item>) -> String {
 
 /// Bytes of a file that are looked at at once.
 const WINDOW: usize = 1 << 20;
-/// Continued headers, and groups whose links are in a heap (a tree of type 5): files that crumple writes as a whole have neither.
+/// Signatures of continued headers, and of trees of links that are in a heap (type 5): what crumple writes has neither.
 const CONTINUED: &[u8] = b"OCHK";
 const LINKS_IN_A_HEAP: [&[u8]; 2] = [b"BTHD\x00\x05", b"BTHD\x01\x05"];
 
-/// Whether another program may have put links into a file: those that are not hard are seen by no other trace.
+/// Whether another program has edited a file, and so may have put soft or external links into it, which our HDF5 library does not list.
 pub(super) fn may_have_links(path: &Path) -> Result<bool, Error> {
     let failed = |source| Error::io(path, source);
     let mut file = crate::file::open(path).map_err(failed)?;
