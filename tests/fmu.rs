@@ -55,16 +55,22 @@ fn envelope() -> Envelope {
     Envelope::new(d, vec![0.0, 3e6, 1e6, 1.8e6, 0.7e6, 2e6]).unwrap()
 }
 
-/// The recorded curve of a lead car, with its own unloading branch.
 fn recorded() -> ForceLaw {
+    recorded_at(1.0).0
+}
+
+/// The recorded curve of a lead car, with its own unloading branch and so many times its own stiffness, in N/m.
+fn recorded_at(factor: f64) -> (ForceLaw, f64) {
     let folder = tempfile::tempdir().unwrap();
     let database = Database::read(&build_fixture(folder.path(), "lead-car-wall")).unwrap();
     let cases = database.cases("lead-car-wall");
     let case =
         cases.iter().find(|c| (c.conditions.speed.m_per_s - SPEED_M_PER_S).abs() < 0.1).unwrap();
-    let curve = ForceCurve::recorded(case).unwrap();
-    assert!(matches!(curve.unloading, CurveUnloading::Recorded { .. }));
-    ForceLaw::of_curve(&curve, None, EnvelopeEnd::Hold)
+    let mut curve = ForceCurve::recorded(case).unwrap();
+    let CurveUnloading::Recorded { stiffness_n_per_m, .. } = &mut curve.unloading else { panic!() };
+    *stiffness_n_per_m *= factor;
+    let stiffness_n_per_m = *stiffness_n_per_m;
+    (ForceLaw::of_curve(&curve, None, EnvelopeEnd::Hold), stiffness_n_per_m)
 }
 
 /// The curve that a model of the lead car predicts at 50 km/h, with 401 points.
@@ -78,14 +84,23 @@ fn predicted(kind: ModelKind) -> ForceLaw {
     ForceLaw::of_curve(&curve, None, EnvelopeEnd::Hold)
 }
 
-/// One of each kind.
 fn laws() -> Vec<(&'static str, ForceLaw)> {
-    let memory = |stiffness_n_per_m| Unloading::Memory { stiffness_n_per_m };
+    laws_at(1.0).into_iter().map(|(name, law, _)| (name, law)).collect()
+}
+
+/// One of each kind, with so many times its unloading stiffness, in N/m.
+fn laws_at(factor: f64) -> Vec<(&'static str, ForceLaw, Option<f64>)> {
+    let line = |stiffness_n_per_m: f64, end| {
+        let stiffness_n_per_m = factor * stiffness_n_per_m;
+        let unloading = Unloading::Memory { stiffness_n_per_m };
+        (ForceLaw::new(envelope(), unloading, end), stiffness_n_per_m)
+    };
+    let of = |name, (law, stiffness)| (name, law, Some(stiffness));
     vec![
-        ("line", ForceLaw::new(envelope(), memory(40e6), EnvelopeEnd::Slope)),
-        ("stiff", ForceLaw::new(envelope(), memory(400e6), EnvelopeEnd::Error)),
-        ("recorded", recorded()),
-        ("elastic", ForceLaw::new(envelope(), Unloading::Elastic, EnvelopeEnd::Slope)),
+        of("line", line(40e6, EnvelopeEnd::Slope)),
+        of("stiff", line(400e6, EnvelopeEnd::Error)),
+        of("recorded", recorded_at(factor)),
+        ("elastic", ForceLaw::new(envelope(), Unloading::Elastic, EnvelopeEnd::Slope), None),
     ]
 }
 
@@ -227,12 +242,13 @@ fn odd_names_make_sound_archives() {
     }
 }
 
-/// 10 000 pairs of deflection and maximum deflection for each law: the same bits.
+/// 10 000 pairs of deflection and maximum deflection for each law: the same bits, also where the importer
+/// has set its unloading stiffness.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]
 fn the_c_law_is_ours_bit_by_bit() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, law) in laws() {
+    for ((name, law, stiffness), (_, stiffer, _)) in laws_at(1.0).into_iter().zip(laws_at(3.0)) {
         // Any fixed sequence does; half the pairs lie on the envelope or beyond its end.
         let mut seed = 1_u64;
         let mut random = || {
@@ -259,10 +275,16 @@ fn the_c_law_is_ours_bit_by_bit() {
         });
         let file = folder.path().join("pairs.json");
         std::fs::write(&file, asked.to_string()).unwrap();
-        for (_, version) in VERSIONS {
-            let fmu = write(folder.path(), name, &law, version);
-            let found = run_python("fmu_law.py", &[fmu.to_str().unwrap(), file.to_str().unwrap()]);
-            println!("{name}, {version:?}: {found}");
+        let set = stiffness.map(|stiffness| (&stiffer, format!("{stiffness:?}")));
+        let of_versions = VERSIONS.map(|(_, version)| (version, (&law, String::new())));
+        for (version, (law, set)) in
+            of_versions.into_iter().chain(set.map(|set| (FmiVersion::Fmi3, set)))
+        {
+            let fmu = write(folder.path(), name, law, version);
+            let mut arguments = vec![fmu.to_str().unwrap(), file.to_str().unwrap()];
+            arguments.extend((!set.is_empty()).then_some(&*set));
+            let found = run_python("fmu_law.py", &arguments);
+            println!("{name}, {version:?}, {set}: {found}");
             assert_eq!(found["pairs"], 10_000);
             assert_eq!(found["different"], 0, "{name}, {version:?}: {found}");
             // Between two knots the force is a straight line.

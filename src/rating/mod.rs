@@ -317,7 +317,7 @@ fn warnings(rating: &Rating, both: [&[f64]; 2], settings: &RatingSettings) -> Ve
                 false => "another one is chosen by --from and --to",
             };
             warnings.push(format!(
-                "the mean deceleration of the {who} is that of the first of {}, from {:.1} to {:.1} ms, with {:.0} % of the change of speed: {remedy}",
+                "the mean deceleration of the {who} is that of the first of {}, from {:.1} to {:.1} ms, with {:.1} % of the change of speed: {remedy}",
                 counted(of.pulses, "pulse"),
                 1e3 * from_s,
                 1e3 * to_s,

@@ -74,10 +74,13 @@ def wrong_order(fmu, kind):
         check(f"{kind} deflection is as before", s.get("deflection") == 0.1)
         for value in [0.0, -1.0, math.nan]:
             refuses(s, f"{kind} scale {value}", lambda: s.set(value, "force_scale"))
+        refuses(s, f"{kind} stiffness after initialization", lambda: s.set(1e6, "unloading_stiffness"))
+        refuses(s, f"{kind} derivative by the stiffness after initialization",
+                lambda: s.partial("stored_energy", "unloading_stiffness"))
         refuses(s, f"{kind} output set", lambda: s.set(1.0, "force"))
         setter = s.i.setReal if fmu.version == 2 else s.i.setFloat64
         getter = s.i.getReal if fmu.version == 2 else s.i.getFloat64
-        for reference in [0 if fmu.version == 2 else 10, 2, 99, 2**32 - 1]:
+        for reference in [0 if fmu.version == 2 else 11, 2, 99, 2**32 - 1]:
             refuses(s, f"{kind} get of {reference}", lambda: getter([reference]))
             refuses(s, f"{kind} set of {reference}", lambda: setter([reference], [1.0]))
         refuses(s, f"{kind} several, one unknown", lambda: setter([1, 99], [0.3, 1.0]))
@@ -194,6 +197,52 @@ def memory(fmu, kind):
         check(f"{kind} which is remembered", s.get("max_deflection") == 0.3)
 
 
+def unloading_stiffness(fmu, kind):
+    """Set in the initialization it goes with the state, and a reset brings back the curve's own."""
+    own = float(next(v.start for v in fmu.description.modelVariables if v.name == "unloading_stiffness"))
+
+    def unloaded(s):
+        s.set(0.3)
+        s.step(1e-3)
+        s.set(0.299)
+        return bits(s.outputs())
+
+    def within(s):
+        for value in [0.0, -1.0, math.nan, math.inf]:
+            refuses(s, f"{kind} stiffness {value}", lambda: s.set(value, "unloading_stiffness"))
+        for d in [0.01, 0.1, 0.3, 0.5, -0.1]:
+            s.set(d)
+            for name in OUTPUTS + ["past_knot"]:
+                partial = s.partial(name, "unloading_stiffness")
+                ends = []
+                for factor in [1 - 1e-6, 1 + 1e-6]:
+                    s.set(factor * own, "unloading_stiffness")
+                    ends.append(s.get(name))
+                s.set(own, "unloading_stiffness")
+                energy = max(s.get("stored_energy"), 1e-9)
+                off = abs((ends[1] - ends[0]) / 2e-6 - partial * own)
+                check(f"{kind} {name} by the stiffness at {d}", off <= 1e-4 * energy)
+        check(f"{kind} stiffness has a derivative", s.set(0.5) or s.partial("stored_energy", "unloading_stiffness") < 0)
+        s.set(0.0)
+
+    with Spring(fmu, kind, stiffness=own) as s, Spring(fmu, kind, stiffness=0.5 * own) as soft:
+        check(f"{kind} stiffness reads as it was set", soft.get("unloading_stiffness") == 0.5 * own)
+        state = soft.i.getFMUState()
+        first, softly = unloaded(s), unloaded(soft)
+        check(f"{kind} stiffness changes the unloading", first != softly)
+        s.i.setFMUState(state)
+        s.time = 0.0
+        check(f"{kind} stiffness of a state", unloaded(s) == softly)
+        soft.i.freeFMUState(state)
+        soft.i.terminate()
+        soft.i.reset()
+        soft.time = 0.0
+        soft.start(within=lambda: within(soft))
+        if kind == "me":
+            soft.continuous()
+        check(f"{kind} stiffness after a reset", unloaded(soft) == first)
+
+
 def input_derivatives(fmu):
     """The same end of step and memory as from the value itself; a turn within a step counts."""
     with Spring(fmu, "cs") as s:
@@ -253,6 +302,7 @@ def main(path, other_path):
             wrong_order(fmu, kind)
             states(fmu, kind)
             memory(fmu, kind)
+            unloading_stiffness(fmu, kind)
         with Spring(fmu, "cs", stop=1e-2) as s:
             s.step(1e-2)
             refuses(s, "step beyond the stop time", lambda: s.i.doStep(1e-2, 1e-3))

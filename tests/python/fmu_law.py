@@ -1,8 +1,9 @@
 """The law inside an FMU against numbers of ours.
 
-    python fmu_law.py FMU PAIRS.json
+    python fmu_law.py FMU PAIRS.json [UNLOADING_STIFFNESS]
 
-PAIRS.json holds deflections, largest deflections and our force and energies, as bits. Prints a JSON
+PAIRS.json holds deflections, largest deflections and our force and energies, as bits; the stiffness in N/m is set in
+the initialization. Prints a JSON
 object: pairs, how many of the numbers differ, the largest relative difference, the largest difference of
 the directional derivatives from central differences, in the scale of the largest, and how far the force
 is from a straight line between two knots, in shares of the largest force.
@@ -38,12 +39,12 @@ def bent(spring, deflection):
     return abs(ends[0] + (ends[1] - ends[0]) * past / (past + before) - force)
 
 
-def main(path, pairs):
+def main(path, pairs, stiffness=None):
     asked = json.load(open(pairs))
     numbers = {key: [from_bits(text) for text in asked[key]] for key in ["deflection", "largest"]}
     different, worst, bends, top = 0, 0.0, [], 0.0
     slopes = {name: [] for name in QUANTITIES}
-    with Unpacked(path) as fmu, Spring(fmu, "cs") as spring:
+    with Unpacked(path) as fmu, Spring(fmu, "cs", stiffness=stiffness and float(stiffness)) as spring:
         fresh = spring.i.getFMUState()
         for k, (d, largest) in enumerate(zip(numbers["deflection"], numbers["largest"])):
             spring.i.setFMUState(fresh)

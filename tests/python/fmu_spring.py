@@ -53,7 +53,7 @@ class Unpacked:
 class Spring:
     """`kind` is "cs" or "me". With `is_started` it is initialized and ready to step."""
 
-    def __init__(self, fmu, kind, is_started=True, events=False, token=None, stop=None):
+    def __init__(self, fmu, kind, is_started=True, events=False, token=None, stop=None, stiffness=None):
         self.fmu, self.kind, self.version = fmu, kind, fmu.version
         self.messages = []
         self.vr = fmu.references
@@ -83,14 +83,14 @@ class Spring:
             self.i.instantiate(logMessage=self.callbacks, **more)
         self.time = 0.0
         if is_started:
-            self.start(stop)
+            self.start(stop, stiffness=stiffness)
             if kind == "me":
                 self.continuous()
             elif events:
                 self.i.updateDiscreteStates()
                 self.i.enterStepMode()
 
-    def start(self, stop=None, deflection=None):
+    def start(self, stop=None, deflection=None, stiffness=None, within=None):
         if self.version == 2:
             self.i.setupExperiment(startTime=0.0, stopTime=stop)
             self.i.enterInitializationMode()
@@ -98,6 +98,10 @@ class Spring:
             self.i.enterInitializationMode(startTime=0.0, stopTime=stop)
         if deflection is not None:
             self.set(deflection)
+        if stiffness is not None:
+            self.set(stiffness, "unloading_stiffness")
+        if within is not None:
+            within()
         self.i.exitInitializationMode()
 
     def continuous(self):

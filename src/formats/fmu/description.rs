@@ -2,13 +2,17 @@
 
 use super::{FmiVersion, Spring};
 use crate::formats::text::escaped;
+use crate::multibody::ForceLaw;
 
 /// What a variable is.
 enum Role {
     Input,
+    /// May be set at events.
     Parameter,
-    /// With the variables that it follows from: always those of initialization; the parameter is
-    /// none of the others, since it is set at events only.
+    /// The law's own until initialization sets another; only where the law has one.
+    UnloadingStiffness,
+    /// With the variables that it follows from in the initialization. Later the parameters are not among them, since
+    /// they are set at events only.
     Output(&'static [u32]),
     /// Changes sign where a linear segment of the law ends.
     EventIndicator,
@@ -25,9 +29,10 @@ struct Variable {
 
 const DEFLECTION: u32 = 1;
 const FORCE_SCALE: u32 = 7;
+const UNLOADING_STIFFNESS: u32 = 10;
 
 /// In this order FMI 2 counts them from 1.
-const VARIABLES: [Variable; 8] = [
+const VARIABLES: [Variable; 9] = [
     Variable {
         name: "deflection",
         reference: DEFLECTION,
@@ -45,14 +50,14 @@ const VARIABLES: [Variable; 8] = [
     Variable {
         name: "stored_energy",
         reference: 4,
-        role: Role::Output(&[DEFLECTION, FORCE_SCALE]),
+        role: Role::Output(&[DEFLECTION, FORCE_SCALE, UNLOADING_STIFFNESS]),
         unit: Some("J"),
         description: "Energy that comes back in unloading",
     },
     Variable {
         name: "dissipated_energy",
         reference: 5,
-        role: Role::Output(&[DEFLECTION, FORCE_SCALE]),
+        role: Role::Output(&[DEFLECTION, FORCE_SCALE, UNLOADING_STIFFNESS]),
         unit: Some("J"),
         description: "Energy that does not come back",
     },
@@ -69,6 +74,13 @@ const VARIABLES: [Variable; 8] = [
         role: Role::Parameter,
         unit: None,
         description: "Factor of force and energies, above 0",
+    },
+    Variable {
+        name: "unloading_stiffness",
+        reference: UNLOADING_STIFFNESS,
+        role: Role::UnloadingStiffness,
+        unit: Some("N/m"),
+        description: "Unloading stiffness, above 0",
     },
     Variable {
         name: "past_knot",
@@ -115,13 +127,13 @@ pub(super) fn model_description(
             VARIABLES.iter().filter(|v| matches!(v.role, Role::EventIndicator)).count(),
             interfaces_2(name, sources),
             units(false),
-            variables_2(),
+            variables_2(spring.law),
         ),
         FmiVersion::Fmi3 => format!(
             "{head}\n<fmiModelDescription fmiVersion=\"3.0\" instantiationToken=\"{token}\" {about}>\n{}{}{LOG_CATEGORIES}{}</fmiModelDescription>\n",
             interfaces_3(name),
             units(true),
-            variables_3(),
+            variables_3(spring.law),
         ),
     }
 }
@@ -155,7 +167,7 @@ fn interfaces_3(name: &str) -> String {
 
 fn units(with_time: bool) -> String {
     let mut all = vec![("m", r#"m="1""#), ("N", r#"kg="1" m="1" s="-2""#)];
-    all.push(("J", r#"kg="1" m="2" s="-2""#));
+    all.extend([("J", r#"kg="1" m="2" s="-2""#), ("N/m", r#"kg="1" s="-2""#)]);
     if with_time {
         all.push(("s", r#"s="1""#));
     }
@@ -165,13 +177,28 @@ fn units(with_time: bool) -> String {
     format!("  <UnitDefinitions>\n{}  </UnitDefinitions>\n", each.collect::<String>())
 }
 
+/// Unloading stiffness of a law in N/m; `None` if it is followed back.
+fn stiffness(law: &ForceLaw) -> Option<f64> {
+    law.memory.as_ref().map(|memory| memory.stiffness_n_per_m)
+}
+
+/// The variables of a law.
+fn variables(law: &ForceLaw) -> impl Iterator<Item = &'static Variable> {
+    let has_stiffness = stiffness(law).is_some();
+    VARIABLES.iter().filter(move |v| has_stiffness || v.reference != UNLOADING_STIFFNESS)
+}
+
 /// Causality and the other attributes of a role, and the start value.
-fn role(role: &Role) -> (&'static str, Option<&'static str>) {
+fn role(role: &Role, law: &ForceLaw) -> (&'static str, Option<String>) {
     match role {
-        Role::Input => (r#"causality="input" variability="continuous""#, Some("0")),
+        Role::Input => (r#"causality="input" variability="continuous""#, Some("0".into())),
         Role::Parameter => {
-            (r#"causality="parameter" variability="tunable" initial="exact""#, Some("1"))
+            (r#"causality="parameter" variability="tunable" initial="exact""#, Some("1".into()))
         }
+        Role::UnloadingStiffness => (
+            r#"causality="parameter" variability="fixed" initial="exact""#,
+            stiffness(law).map(|stiffness| format!("{stiffness:?}")),
+        ),
         Role::Output(_) => {
             (r#"causality="output" variability="continuous" initial="calculated""#, None)
         }
@@ -182,43 +209,43 @@ fn role(role: &Role) -> (&'static str, Option<&'static str>) {
 }
 
 /// Unit and start value as attributes.
-fn value(variable: &Variable, start: Option<&str>) -> String {
+fn value(variable: &Variable, start: Option<String>) -> String {
     let unit = variable.unit.map_or(String::new(), |unit| format!(" unit=\"{unit}\""));
     unit + &start.map_or(String::new(), |start| format!(" start=\"{start}\""))
 }
 
-fn variables_2() -> String {
-    let mut variables = String::new();
-    for variable in &VARIABLES {
+fn variables_2(law: &ForceLaw) -> String {
+    let mut described = String::new();
+    for variable in variables(law) {
         let Variable { name, reference, description, .. } = variable;
-        let (attributes, start) = role(&variable.role);
-        variables += &format!(
+        let (attributes, start) = role(&variable.role, law);
+        described += &format!(
             "    <ScalarVariable name=\"{name}\" valueReference=\"{reference}\" {attributes} description=\"{description}\">\n      <Real{}/>\n    </ScalarVariable>\n",
             value(variable, start)
         );
     }
     // FMI 2 names variables by their place.
     let place = |reference: u32| {
-        VARIABLES.iter().position(|v| v.reference == reference).map_or(0, |at| at + 1)
+        variables(law).position(|v| v.reference == reference).map_or(0, |at| at + 1)
     };
     let unknown = |reference: u32, known: &[u32]| {
         let knowns: Vec<String> = known.iter().map(|r| place(*r).to_string()).collect();
         format!("      <Unknown index=\"{}\" {}/>\n", place(reference), dependencies(&knowns))
     };
-    let (outputs, initial) = unknowns(unknown);
+    let (outputs, initial) = unknowns(law, unknown);
     format!(
-        "  <ModelVariables>\n{variables}  </ModelVariables>\n  <ModelStructure>\n    <Outputs>\n{outputs}    </Outputs>\n    <InitialUnknowns>\n{initial}    </InitialUnknowns>\n  </ModelStructure>\n"
+        "  <ModelVariables>\n{described}  </ModelVariables>\n  <ModelStructure>\n    <Outputs>\n{outputs}    </Outputs>\n    <InitialUnknowns>\n{initial}    </InitialUnknowns>\n  </ModelStructure>\n"
     )
 }
 
-fn variables_3() -> String {
-    let mut variables = String::from(
+fn variables_3(law: &ForceLaw) -> String {
+    let mut described = String::from(
         "    <Float64 name=\"time\" valueReference=\"0\" causality=\"independent\" variability=\"continuous\" description=\"Time\" unit=\"s\"/>\n",
     );
-    for variable in &VARIABLES {
+    for variable in variables(law) {
         let Variable { name, reference, description, .. } = variable;
-        let (attributes, start) = role(&variable.role);
-        variables += &format!(
+        let (attributes, start) = role(&variable.role, law);
+        described += &format!(
             "    <Float64 name=\"{name}\" valueReference=\"{reference}\" {attributes} description=\"{description}\"{}/>\n",
             value(variable, start)
         );
@@ -227,24 +254,27 @@ fn variables_3() -> String {
         let knowns: Vec<String> = known.iter().map(u32::to_string).collect();
         format!("    <{element} valueReference=\"{reference}\" {}/>\n", dependencies(&knowns))
     };
-    let (outputs, _) = unknowns(|reference, known| unknown("Output", reference, known));
-    let (_, initial) = unknowns(|reference, known| unknown("InitialUnknown", reference, known));
+    let (outputs, _) = unknowns(law, |reference, known| unknown("Output", reference, known));
+    let (_, initial) =
+        unknowns(law, |reference, known| unknown("InitialUnknown", reference, known));
     let indicators: String = (VARIABLES.iter())
         .filter(|variable| matches!(variable.role, Role::EventIndicator))
         .map(|variable| unknown("EventIndicator", variable.reference, &[DEFLECTION]))
         .collect();
     format!(
-        "  <ModelVariables>\n{variables}  </ModelVariables>\n  <ModelStructure>\n{outputs}{initial}{indicators}  </ModelStructure>\n"
+        "  <ModelVariables>\n{described}  </ModelVariables>\n  <ModelStructure>\n{outputs}{initial}{indicators}  </ModelStructure>\n"
     )
 }
 
 /// Every output, as written for the run and for the initialization.
-fn unknowns(write: impl Fn(u32, &[u32]) -> String) -> (String, String) {
+fn unknowns(law: &ForceLaw, write: impl Fn(u32, &[u32]) -> String) -> (String, String) {
     let (mut outputs, mut initial) = (String::new(), String::new());
-    for variable in &VARIABLES {
+    let is_there = |known: &u32| variables(law).any(|variable| variable.reference == *known);
+    for variable in variables(law) {
         if let Role::Output(known) = variable.role {
+            let known: Vec<u32> = known.iter().copied().filter(is_there).collect();
             outputs += &write(variable.reference, &[DEFLECTION]);
-            initial += &write(variable.reference, known);
+            initial += &write(variable.reference, &known);
         }
     }
     (outputs, initial)

@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 /// Begins the block. `c/blank.c` has the same, and a test compares the rest of the layout.
 const MARK: &[u8; 16] = b"CRUMPLE TABLE 1\0";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 const POINTS: usize = 4096;
 const SHAPE: usize = 1024;
 const TOKEN: usize = 64;
@@ -17,7 +17,7 @@ const BY_MEAN_FORCE: u32 = 2;
 /// Bytes before the numbers: mark, sum, six counts, token.
 const HEAD: usize = 16 + 8 + 6 * 4 + TOKEN;
 /// Bytes of the block.
-const SIZE: usize = HEAD + 8 * (3 + 5 * POINTS + 3 * SHAPE);
+const SIZE: usize = HEAD + 8 * (3 + 4 * POINTS + 3 * SHAPE);
 
 /// A checked table.
 pub(super) struct Table {
@@ -25,10 +25,10 @@ pub(super) struct Table {
     shape_points: u32,
     flags: u32,
     token: [u8; TOKEN],
-    /// Stiffness, steepest rise, largest share.
+    /// Stiffness, its scale, largest share.
     numbers: [f64; 3],
-    /// Deflection, force, slope, work, dissipated energy.
-    envelope: [Vec<f64>; 5],
+    /// Deflection, force, slope, work.
+    envelope: [Vec<f64>; 4],
     /// Length, force, rest.
     shape: [Vec<f64>; 3],
 }
@@ -50,17 +50,15 @@ impl Table {
                 "an FMU holds at most {SHAPE} points of an unloading branch, found {shape_points}"
             ));
         }
-        let (flags, numbers, mut dissipated) = match &law.memory {
+        let (flags, numbers) = match &law.memory {
             // Never read, but no divisor should be 0.
-            None => (0, [1.0, 1.0, 0.5], Vec::new()),
+            None => (0, [1.0, 1.0, 0.5]),
             Some(memory) => (
                 HAS_MEMORY
                     | if memory.stored_by == StoredBy::MeanForce { BY_MEAN_FORCE } else { 0 },
-                [memory.stiffness_n_per_m, memory.steepest_n_per_m, memory.largest_share],
-                memory.dissipated_j.clone(),
+                [memory.stiffness_n_per_m, memory.scale, memory.largest_share],
             ),
         };
-        dissipated.resize(points, 0.0);
         let [force, slope, work] =
             [envelope.force_n(), &law.slope_n_per_m, envelope.work_j()].map(<[f64]>::to_vec);
         let checks = [
@@ -68,7 +66,6 @@ impl Table {
             ("force", &force),
             ("slope", &slope),
             ("work", &work),
-            ("dissipated energy", &dissipated),
             ("unloading branch", &shape.rest),
         ];
         for (what, values) in checks {
@@ -88,7 +85,7 @@ impl Table {
             flags,
             token: bytes,
             numbers,
-            envelope: [deflection_m.to_vec(), force, slope, work, dissipated],
+            envelope: [deflection_m.to_vec(), force, slope, work],
             shape: [&shape.length, &shape.force, &shape.rest].map(Vec::clone),
         })
     }

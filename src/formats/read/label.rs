@@ -67,6 +67,9 @@ static TERMS: [Terms; 3] = [
 /// With one of these words a name is that of another quantity: an edge, a bound, a rate.
 const OTHERS: &str = "low lo lower high hi upper min max std deviation error tolerance rate target setpoint command nominal soll";
 
+/// Units that make a column `T` that of a temperature, in lower case.
+const OF_TEMPERATURE: &str = "°c ºc c degc k °f degf celsius kelvin";
+
 /// Whether a word is one of several with blanks between.
 fn is_one(word: &str, of: &str) -> bool {
     of.split(' ').any(|one| one == word)
@@ -201,7 +204,10 @@ impl Label {
         let text = text.trim().trim_matches('"').trim();
         if let Some((name, unit)) = in_brackets(text) {
             let quantity = Quantity::named(name)?;
-            return Some(Self { quantity, unit: Some(unit.into()) });
+            // `T [°C]` is a temperature.
+            let is_its =
+                quantity != Quantity::Time || !is_one(&unit.to_lowercase(), OF_TEMPERATURE);
+            return is_its.then(|| Self { quantity, unit: Some(unit.into()) });
         }
         if let Some((name, unit)) = text.rsplit_once('/')
             && let Some(quantity) = Quantity::named(name)
@@ -330,5 +336,8 @@ mod tests {
         t("Load displacement [mm]", None);
         t("Reinforced [mm]", None);
         t("Temperature [°C]", None);
+        t("T [°C]", None);
+        t("T [K]", None);
+        t("t [sek]", Some((Time, Some("sek"))));
     }
 }

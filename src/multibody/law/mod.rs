@@ -82,7 +82,7 @@ impl ForceLaw {
     /// A law that unloads on a straight line. Forces below zero become zero, because an
     /// interface only pushes.
     pub fn new(envelope: Envelope, unloading: Unloading, end: EnvelopeEnd) -> Self {
-        Self::with(envelope, unloading, UnloadingShape::line(), end, StoredBy::Force)
+        Self::with(envelope, (unloading, 1.0), UnloadingShape::line(), end, StoredBy::Force)
     }
 
     /// The same with an unloading branch that is not a straight line; its energy is that of the
@@ -93,7 +93,7 @@ impl ForceLaw {
         shape: UnloadingShape,
         end: EnvelopeEnd,
     ) -> Self {
-        Self::with(envelope, unloading, shape, end, StoredBy::Force)
+        Self::with(envelope, (unloading, 1.0), shape, end, StoredBy::Force)
     }
 
     /// The law of a recorded motion: the unloading branch has its shape, and the energy of the
@@ -108,22 +108,15 @@ impl ForceLaw {
         shape: UnloadingShape,
         (turned_m, end): (f64, EnvelopeEnd),
     ) -> Self {
-        let unloading = match unloading {
-            Unloading::Elastic => unloading,
-            Unloading::Memory { stiffness_n_per_m } => {
-                let top = envelope.force_at(turned_m);
-                let mean = envelope.work_to(turned_m) / turned_m;
-                let scale = (mean / top).powi(2);
-                let scale = if scale > 0.0 && scale.is_finite() { scale } else { 1.0 };
-                Unloading::Memory { stiffness_n_per_m: stiffness_n_per_m * scale }
-            }
-        };
-        Self::with(envelope, unloading, shape, end, StoredBy::MeanForce)
+        let mean = envelope.work_to(turned_m) / turned_m;
+        let scale = (mean / envelope.force_at(turned_m)).powi(2);
+        let scale = if scale > 0.0 && scale.is_finite() { scale } else { 1.0 };
+        Self::with(envelope, (unloading, scale), shape, end, StoredBy::MeanForce)
     }
 
     fn with(
         envelope: Envelope,
-        unloading: Unloading,
+        (unloading, scale): (Unloading, f64),
         shape: UnloadingShape,
         end: EnvelopeEnd,
         stored_by: StoredBy,
@@ -153,7 +146,7 @@ impl ForceLaw {
                     work_j: work_j[i],
                 });
                 let (steepest, share) = (envelope.max_slope(), shape.share().min(0.5));
-                Some(Memory::new(stiffness_n_per_m, steepest, share, stored_by, points))
+                Some(Memory::new((stiffness_n_per_m, scale), steepest, share, stored_by, points))
             }
         };
         let data_end_m = envelope.end_m();

@@ -17,6 +17,8 @@ pub(crate) enum StoredBy {
 pub(crate) struct Memory {
     /// Unloading stiffness `k`.
     pub(crate) stiffness_n_per_m: f64,
+    /// Of `k` with the mean force, whose line then returns the energy that `k` does with the force; else 1.
+    pub(crate) scale: f64,
     /// `k_s`: steepest rise of the envelope, or the unloading stiffness if that is more.
     pub(crate) steepest_n_per_m: f64,
     /// `c`: a branch stores at most this share of force times deflection, since it would reach
@@ -31,7 +33,7 @@ impl Memory {
     /// `largest_share` is that of the branch's shape: ½ for a line. `points` are those of the
     /// envelope.
     pub(super) fn new(
-        stiffness_n_per_m: f64,
+        (stiffness_n_per_m, scale): (f64, f64),
         steepest_rise_n_per_m: f64,
         largest_share: f64,
         stored_by: StoredBy,
@@ -39,7 +41,8 @@ impl Memory {
     ) -> Self {
         let mut memory = Self {
             stiffness_n_per_m,
-            steepest_n_per_m: steepest_rise_n_per_m.max(stiffness_n_per_m),
+            scale,
+            steepest_n_per_m: steepest_rise_n_per_m.max(stiffness_n_per_m * scale),
             largest_share,
             stored_by,
             dissipated_j: Vec::new(),
@@ -73,7 +76,7 @@ impl Memory {
             StoredBy::MeanForce => {
                 let (d, work_j) = (top.deflection_m, top.work_j);
                 let mean_n = if d > 0.0 { work_j / d } else { 0.0 };
-                (0.5 * mean_n * mean_n / self.stiffness_n_per_m).min(work_j)
+                (0.5 * mean_n * mean_n / (self.stiffness_n_per_m * self.scale)).min(work_j)
             }
         }
     }

@@ -22,5 +22,4 @@ const crumple_table_t crumple_table = {
     {0.0},
     {0.0},
     {0.0},
-    {0.0},
 };

@@ -1,17 +1,25 @@
 /* SPDX-License-Identifier: MIT OR Apache-2.0 */
-/* Partial derivatives of the spring's outputs by its input and its parameter. */
+/* Partial derivatives of the spring's outputs by its input and its parameters. */
 #include "spring.h"
 
 #define MODES (MODE_INITIALIZATION | MODE_EVENT | MODE_CONTINUOUS | MODE_STEP | MODE_TERMINATED)
 
 /* Derivative of an output by a known variable; 0 if the call names no such pair. */
-static int partial(const state_t *now, uint32_t unknown, uint32_t known, double *value) {
-    double d = now->input[0];
-    int is_largest = d >= now->memory[0];
-    double largest = is_largest ? d : now->memory[0];
-    law_slopes_t slopes = law_slopes(&crumple_table, d, largest);
+static int partial(const spring_t *spring, uint32_t unknown, uint32_t known, double *value) {
+    const state_t *now = &spring->now;
+    double d = now->deflection;
+    int is_largest = d >= now->largest;
+    double largest = is_largest ? d : now->largest;
+    law_slopes_t slopes = law_slopes(&spring->law, d, largest);
     double stored, dissipated;
-    law_energies(&crumple_table, d, largest, &stored, &dissipated);
+    law_energies(&spring->law, d, largest, &stored, &dissipated);
+    if (known == VR_UNLOADING_STIFFNESS && now->mode == MODE_INITIALIZATION &&
+        spring_has_memory()) {
+        /* Nothing has unloaded yet. */
+        double by = now->force_scale * law_stored_by(&spring->law, d);
+        *value = unknown == VR_STORED_ENERGY ? by : unknown == VR_DISSIPATED_ENERGY ? -by : 0.0;
+        return unknown >= VR_FORCE && unknown <= VR_BEFORE_KNOT && unknown != VR_FORCE_SCALE;
+    }
     if (known != VR_DEFLECTION && known != VR_FORCE_SCALE) {
         return 0;
     }
@@ -23,7 +31,7 @@ static int partial(const state_t *now, uint32_t unknown, uint32_t known, double 
     switch (unknown) {
     case VR_FORCE:
         *value = known == VR_DEFLECTION ? now->force_scale * slopes.force
-                                        : law_force(&crumple_table, d, largest);
+                                        : law_force(&spring->law, d, largest);
         return 1;
     case VR_STORED_ENERGY:
         *value = known == VR_DEFLECTION ? now->force_scale * slopes.stored : stored;
@@ -55,9 +63,9 @@ static int multiply(spring_t *spring, const char *function, const uint32_t *unkn
     for (i = 0; i < unknowns; i++) {
         for (k = 0; k < knowns; k++) {
             double value;
-            if (!partial(&spring->now, unknown[i], known[k], &value)) {
+            if (!partial(spring, unknown[i], known[k], &value)) {
                 return spring_say(spring, SAID_ERROR, function,
-                                  "takes outputs as unknowns, the input or parameter as knowns");
+                                  "takes outputs as unknowns, the input or a parameter that may change as knowns");
             }
             if (is_backward) {
                 result[k] += value * seed[i];

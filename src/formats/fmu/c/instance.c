@@ -66,7 +66,9 @@ void spring_reset(spring_t *spring) {
     fresh.mode = MODE_INSTANTIATED;
     fresh.stop_time = DBL_MAX;
     fresh.force_scale = 1.0;
+    fresh.unloading_stiffness = crumple_table.stiffness;
     spring->now = fresh;
+    spring_follow_stiffness(spring);
 }
 
 /* What forbids an instance, or NULL. */
@@ -113,6 +115,7 @@ spring_t *spring_new(say_t say, void *environment, any_function_t logger, int is
         spring_free(spring);
         return NULL;
     }
+    spring->law.table = &crumple_table;
     spring->now.table_sum = crumple_table.sum;
     spring->now.kind = kind;
     spring_reset(spring);

@@ -11,29 +11,30 @@ static double at_most(double x, double bound) {
     return x < bound ? x : bound;
 }
 
-static law_piece_t piece_here(const state_t *now) {
-    double d = now->input[0];
-    return law_piece(&crumple_table, d, d > now->memory[0] ? d : now->memory[0]);
+static law_piece_t piece_here(const spring_t *spring) {
+    const state_t *now = &spring->now;
+    double d = now->deflection;
+    return law_piece(&spring->law, d, d > now->largest ? d : now->largest);
 }
 
 void spring_settle(spring_t *spring) {
     spring_remember(spring);
-    spring->now.piece = piece_here(&spring->now);
+    spring->now.piece = piece_here(spring);
 }
 
 int spring_accept(spring_t *spring) {
     law_piece_t piece;
     spring_remember(spring);
-    piece = piece_here(&spring->now);
+    piece = piece_here(spring);
     return piece.from != spring->now.piece.from || piece.to != spring->now.piece.to;
 }
 
 void spring_knots(const spring_t *spring, double knots[INDICATORS]) {
     const state_t *now = &spring->now;
     int has_events = now->kind == MODEL_EXCHANGE && (now->mode & (MODE_EVENT | MODE_CONTINUOUS));
-    law_piece_t piece = has_events ? now->piece : piece_here(now);
-    knots[0] = at_most(now->input[0] - piece.from, FARTHEST_M);
-    knots[1] = at_most(piece.to - now->input[0], FARTHEST_M);
+    law_piece_t piece = has_events ? now->piece : piece_here(spring);
+    knots[0] = at_most(now->deflection - piece.from, FARTHEST_M);
+    knots[1] = at_most(piece.to - now->deflection, FARTHEST_M);
 }
 
 int spring_indicators(spring_t *spring, const char *function, double indicators[], size_t n) {

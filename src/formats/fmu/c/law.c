@@ -62,31 +62,73 @@ static double storable(const crumple_table_t *t, const top_t *top, double stiffn
 }
 
 /* Energy of the branch of the unloading stiffness, were there no other. */
-static double by_stiffness(const crumple_table_t *t, const top_t *top) {
+static double by_stiffness(const law_t *law, const top_t *top) {
+    const crumple_table_t *t = law->table;
     double mean;
     if (!(t->flags & CRUMPLE_BY_MEAN_FORCE)) {
-        return storable(t, top, t->stiffness);
+        return storable(t, top, law->stiffness);
     }
     mean = top->deflection > 0.0 ? top->work / top->deflection : 0.0;
-    return smaller(0.5 * mean * mean / t->stiffness, top->work);
+    return smaller(0.5 * mean * mean / law->stiffness, top->work);
+}
+
+/* Derivative of `storable` by the stiffness. */
+static double storable_by(const crumple_table_t *t, const top_t *top, double stiffness) {
+    double length = 0.5 * top->force / stiffness;
+    return length < t->largest_share * top->deflection ? -top->force * length / stiffness : 0.0;
+}
+
+/* Derivative of `by_stiffness` by the stiffness. */
+static double by_stiffness_by(const law_t *law, const top_t *top) {
+    double mean, energy;
+    if (!(law->table->flags & CRUMPLE_BY_MEAN_FORCE)) {
+        return storable_by(law->table, top, law->stiffness);
+    }
+    mean = top->deflection > 0.0 ? top->work / top->deflection : 0.0;
+    energy = 0.5 * mean * mean / law->stiffness;
+    return energy < top->work ? -energy / law->stiffness : 0.0;
+}
+
+void law_set_stiffness(law_t *law, double stiffness) {
+    const crumple_table_t *t = law->table;
+    double dissipated = 0.0, by = 0.0;
+    uint32_t i;
+    law->given = stiffness;
+    law->stiffness = stiffness * t->scale;
+    law->steepest = law->stiffness;
+    for (i = 0; i < t->points; i++) {
+        top_t top = {i, t->deflection[i], t->force[i], t->work[i]};
+        double free = top.work - by_stiffness(law, &top);
+        if (free > dissipated) {
+            dissipated = free;
+            by = -by_stiffness_by(law, &top);
+        }
+        law->dissipated[i] = dissipated;
+        law->dissipated_by[i] = by;
+        if (i + 1 < t->points) {
+            law->steepest = larger(law->steepest, t->slope[i]);
+        }
+    }
 }
 
 /* Energy that comes back from a maximum deflection. */
-static double stored_from(const crumple_table_t *t, const top_t *top) {
-    double dissipated = larger(t->dissipated[top->piece], top->work - by_stiffness(t, top));
-    double stored = larger(top->work - dissipated, storable(t, top, t->steepest));
+static double stored_from(const law_t *law, const top_t *top) {
+    const crumple_table_t *t = law->table;
+    double dissipated = larger(law->dissipated[top->piece], top->work - by_stiffness(law, top));
+    double stored = larger(top->work - dissipated, storable(t, top, law->steepest));
     if (t->flags & CRUMPLE_BY_MEAN_FORCE) {
         stored = smaller(stored, top->force * t->largest_share * top->deflection);
     }
     return stored;
 }
 
-static branch_t branch_from(const crumple_table_t *t, double largest) {
+static branch_t branch_from(const law_t *law, double largest) {
+    const crumple_table_t *t = law->table;
     top_t top = on_envelope(t, largest);
     branch_t branch;
     branch.largest = largest;
     branch.top = top.force;
-    branch.stored = stored_from(t, &top);
+    branch.stored = stored_from(law, &top);
     branch.dissipated = top.work - branch.stored;
     branch.length = 0.0; /* the envelope itself has no force here */
     if (top.force > 0.0 && branch.stored > 0.0) {
@@ -132,7 +174,8 @@ static double force_on(const crumple_table_t *t, const branch_t *b, double defle
     return force;
 }
 
-double law_force(const crumple_table_t *t, double deflection, double largest) {
+double law_force(const law_t *law, double deflection, double largest) {
+    const crumple_table_t *t = law->table;
     branch_t branch;
     double slope;
     if (deflection <= 0.0) {
@@ -141,12 +184,13 @@ double law_force(const crumple_table_t *t, double deflection, double largest) {
     if (!(t->flags & CRUMPLE_HAS_MEMORY) || deflection >= largest) {
         return on_envelope(t, deflection).force;
     }
-    branch = branch_from(t, largest);
+    branch = branch_from(law, largest);
     return force_on(t, &branch, deflection, &slope);
 }
 
-void law_energies(const crumple_table_t *t, double deflection, double largest, double *stored,
+void law_energies(const law_t *law, double deflection, double largest, double *stored,
                   double *dissipated) {
+    const crumple_table_t *t = law->table;
     branch_t branch;
     double length, along, force, rest;
     uint32_t j;
@@ -159,7 +203,7 @@ void law_energies(const crumple_table_t *t, double deflection, double largest, d
         *stored = on_envelope(t, larger(deflection, 0.0)).work;
         return;
     }
-    branch = branch_from(t, largest);
+    branch = branch_from(law, largest);
     *dissipated = branch.dissipated;
     if (branch.length <= 0.0) {
         return;
@@ -185,19 +229,21 @@ static double storable_slope(const crumple_table_t *t, const top_t *top, double 
 }
 
 /* Slope of `by_stiffness` along the envelope. */
-static double by_stiffness_slope(const crumple_table_t *t, const top_t *top) {
+static double by_stiffness_slope(const law_t *law, const top_t *top) {
+    const crumple_table_t *t = law->table;
     double mean;
     if (!(t->flags & CRUMPLE_BY_MEAN_FORCE)) {
-        return storable_slope(t, top, t->stiffness);
+        return storable_slope(t, top, law->stiffness);
     }
     mean = top->work / top->deflection;
-    if (0.5 * mean * mean / t->stiffness < top->work) {
-        return mean * ((top->force - mean) / top->deflection) / t->stiffness;
+    if (0.5 * mean * mean / law->stiffness < top->work) {
+        return mean * ((top->force - mean) / top->deflection) / law->stiffness;
     }
     return top->force;
 }
 
-law_slopes_t law_slopes(const crumple_table_t *t, double deflection, double largest) {
+law_slopes_t law_slopes(const law_t *law, double deflection, double largest) {
+    const crumple_table_t *t = law->table;
     law_slopes_t slopes = {0.0, 0.0, 0.0};
     branch_t branch;
     top_t top;
@@ -212,25 +258,25 @@ law_slopes_t law_slopes(const crumple_table_t *t, double deflection, double larg
         return slopes;
     }
     if (deflection < largest) {
-        branch = branch_from(t, largest);
+        branch = branch_from(law, largest);
         slopes.stored = force_on(t, &branch, deflection, &slopes.force);
         return slopes;
     }
     slopes.force = t->slope[top.piece];
-    dissipated = t->dissipated[top.piece];
-    free = top.work - by_stiffness(t, &top);
+    dissipated = law->dissipated[top.piece];
+    free = top.work - by_stiffness(law, &top);
     slopes.stored = top.force;
     if (free > dissipated) {
         dissipated = free;
-        slopes.stored = by_stiffness_slope(t, &top);
+        slopes.stored = by_stiffness_slope(law, &top);
     } else if (free == dissipated) {
         /* What is dissipated never falls. */
-        slopes.stored = smaller(top.force, by_stiffness_slope(t, &top));
+        slopes.stored = smaller(top.force, by_stiffness_slope(law, &top));
     }
     stored = top.work - dissipated;
-    if (storable(t, &top, t->steepest) > stored) {
-        stored = storable(t, &top, t->steepest);
-        slopes.stored = storable_slope(t, &top, t->steepest);
+    if (storable(t, &top, law->steepest) > stored) {
+        stored = storable(t, &top, law->steepest);
+        slopes.stored = storable_slope(t, &top, law->steepest);
     }
     if ((t->flags & CRUMPLE_BY_MEAN_FORCE) &&
         top.force * t->largest_share * top.deflection < stored) {
@@ -240,7 +286,35 @@ law_slopes_t law_slopes(const crumple_table_t *t, double deflection, double larg
     return slopes;
 }
 
-law_piece_t law_piece(const crumple_table_t *t, double deflection, double largest) {
+double law_stored_by(const law_t *law, double deflection) {
+    const crumple_table_t *t = law->table;
+    top_t top;
+    double free, stored, least, by;
+    if (deflection <= 0.0 || !(t->flags & CRUMPLE_HAS_MEMORY)) {
+        return 0.0;
+    }
+    top = on_envelope(t, deflection);
+    stored = top.work - law->dissipated[top.piece];
+    by = -law->dissipated_by[top.piece];
+    free = top.work - by_stiffness(law, &top);
+    if (free > law->dissipated[top.piece]) {
+        stored = top.work - free;
+        by = by_stiffness_by(law, &top);
+    }
+    least = storable(t, &top, law->steepest);
+    if (least > stored) {
+        stored = least;
+        by = law->steepest > law->stiffness ? 0.0 : storable_by(t, &top, law->stiffness);
+    }
+    if ((t->flags & CRUMPLE_BY_MEAN_FORCE) &&
+        top.force * t->largest_share * top.deflection < stored) {
+        by = 0.0;
+    }
+    return by * t->scale;
+}
+
+law_piece_t law_piece(const law_t *law, double deflection, double largest) {
+    const crumple_table_t *t = law->table;
     law_piece_t piece = {-LAW_FAR, 0.0};
     branch_t branch;
     uint32_t i;
@@ -254,7 +328,7 @@ law_piece_t law_piece(const crumple_table_t *t, double deflection, double larges
         piece.to = i + 1 < t->points ? t->deflection[i + 1] : LAW_FAR;
         return piece;
     }
-    branch = branch_from(t, largest);
+    branch = branch_from(law, largest);
     piece.to = larger(largest - branch.length, 0.0);
     if (deflection > piece.to && branch.length > 0.0) {
         i = shape_piece(t, (largest - deflection) / branch.length);

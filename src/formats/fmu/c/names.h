@@ -35,6 +35,8 @@
 
 #define crumple_table CRUMPLE_NAME(crumple_table)
 #define crumple_table_sum CRUMPLE_NAME(crumple_table_sum)
+#define law_set_stiffness CRUMPLE_NAME(crumple_law_set_stiffness)
+#define law_stored_by CRUMPLE_NAME(crumple_law_stored_by)
 #define law_force CRUMPLE_NAME(crumple_law_force)
 #define law_energies CRUMPLE_NAME(crumple_law_energies)
 #define law_slopes CRUMPLE_NAME(crumple_law_slopes)
@@ -51,6 +53,8 @@
 #define spring_get CRUMPLE_NAME(crumple_spring_get)
 #define spring_set CRUMPLE_NAME(crumple_spring_set)
 #define spring_set_rates CRUMPLE_NAME(crumple_spring_set_rates)
+#define spring_follow_stiffness CRUMPLE_NAME(crumple_spring_follow_stiffness)
+#define spring_has_memory CRUMPLE_NAME(crumple_spring_has_memory)
 #define spring_remember CRUMPLE_NAME(crumple_spring_remember)
 #define spring_settle CRUMPLE_NAME(crumple_spring_settle)
 #define spring_accept CRUMPLE_NAME(crumple_spring_accept)

@@ -8,6 +8,7 @@
 /* Times of a step may differ by this share of it: importers add steps up. */
 #define STEP_SHARE 1e-3
 #define NO_ARRAY "an array is missing"
+#define NOT_A_VARIABLE "is not a variable of this type"
 
 static int is_finite(double x) {
     return x - x == 0.0;
@@ -31,13 +32,23 @@ int spring_set_time(spring_t *spring, const char *function, double time) {
     return SAID_OK;
 }
 
+void spring_follow_stiffness(spring_t *spring) {
+    if (spring->law.given != spring->now.unloading_stiffness) {
+        law_set_stiffness(&spring->law, spring->now.unloading_stiffness);
+    }
+}
+
+int spring_has_memory(void) {
+    return (crumple_table.flags & CRUMPLE_HAS_MEMORY) != 0;
+}
+
 /* The maximum deflection with the present point, which may be a trial. */
 static double largest_with(const state_t *now) {
-    return now->input[0] > now->memory[0] ? now->input[0] : now->memory[0];
+    return now->deflection > now->largest ? now->deflection : now->largest;
 }
 
 void spring_remember(spring_t *spring) {
-    spring->now.memory[0] = largest_with(&spring->now);
+    spring->now.largest = largest_with(&spring->now);
 }
 
 int spring_get(spring_t *spring, const char *function, const uint32_t *vr, size_t n,
@@ -53,7 +64,7 @@ int spring_get(spring_t *spring, const char *function, const uint32_t *vr, size_
         return spring_say(spring, SAID_ERROR, function, NO_ARRAY);
     }
     now = &spring->now;
-    law_energies(&crumple_table, now->input[0], largest_with(now), &stored, &dissipated);
+    law_energies(&spring->law, now->deflection, largest_with(now), &stored, &dissipated);
     spring_knots(spring, knots);
     for (i = 0; i < n; i++) {
         int is_output = vr[i] >= VR_FORCE && vr[i] <= VR_BEFORE_KNOT && vr[i] != VR_FORCE_SCALE;
@@ -62,18 +73,24 @@ int spring_get(spring_t *spring, const char *function, const uint32_t *vr, size_
         }
         switch (vr[i]) {
         case VR_TIME: values[i] = now->time; break;
-        case VR_DEFLECTION: values[i] = now->input[0]; break;
+        case VR_DEFLECTION: values[i] = now->deflection; break;
         case VR_FORCE:
             values[i] =
-                now->force_scale * law_force(&crumple_table, now->input[0], largest_with(now));
+                now->force_scale * law_force(&spring->law, now->deflection, largest_with(now));
             break;
         case VR_STORED_ENERGY: values[i] = now->force_scale * stored; break;
         case VR_DISSIPATED_ENERGY: values[i] = now->force_scale * dissipated; break;
         case VR_LARGEST_DEFLECTION: values[i] = largest_with(now); break;
         case VR_FORCE_SCALE: values[i] = now->force_scale; break;
+        case VR_UNLOADING_STIFFNESS:
+            if (!spring_has_memory()) {
+                return spring_say_of(spring, function, vr[i], NOT_A_VARIABLE);
+            }
+            values[i] = now->unloading_stiffness;
+            break;
         case VR_PAST_KNOT: values[i] = knots[0]; break;
         case VR_BEFORE_KNOT: values[i] = knots[1]; break;
-        default: return spring_say_of(spring, function, vr[i], "is not a variable of this type");
+        default: return spring_say_of(spring, function, vr[i], NOT_A_VARIABLE);
         }
     }
     return SAID_OK;
@@ -86,6 +103,14 @@ static const char *reason_against_value(const spring_t *spring, uint32_t vr, dou
     case VR_FORCE_SCALE:
         if (spring->now.mode == MODE_CONTINUOUS) {
             return "is a parameter: it can be set in event mode";
+        }
+        return is_finite(value) && value > 0.0 ? NULL : "must be a finite number above 0";
+    case VR_UNLOADING_STIFFNESS:
+        if (!spring_has_memory()) {
+            return "is not a variable: this curve is followed back";
+        }
+        if (!(spring->now.mode & (MODE_INSTANTIATED | MODE_INITIALIZATION))) {
+            return "is fixed after initialization";
         }
         return is_finite(value) && value > 0.0 ? NULL : "must be a finite number above 0";
     default: return "is neither an input nor a parameter";
@@ -111,12 +136,13 @@ int spring_set(spring_t *spring, const char *function, const uint32_t *vr, size_
         }
     }
     for (i = 0; i < n; i++) {
-        if (vr[i] == VR_DEFLECTION) {
-            spring->now.input[0] = values[i];
-        } else {
-            spring->now.force_scale = values[i];
+        switch (vr[i]) {
+        case VR_DEFLECTION: spring->now.deflection = values[i]; break;
+        case VR_FORCE_SCALE: spring->now.force_scale = values[i]; break;
+        default: spring->now.unloading_stiffness = values[i];
         }
     }
+    spring_follow_stiffness(spring);
     return SAID_OK;
 }
 
@@ -140,7 +166,7 @@ int spring_set_rates(spring_t *spring, const char *function, const uint32_t *vr,
         }
     }
     for (i = 0; i < n; i++) {
-        spring->now.rates[0][order[i] - 1] = values[i];
+        spring->now.rates[order[i] - 1] = values[i];
     }
     return SAID_OK;
 }
@@ -166,23 +192,23 @@ int spring_step(spring_t *spring, const char *function, double point, double ste
     }
     /* Values, derivatives and the end are of the input; the memory follows it all along the step.
      */
-    first = now->rates[0][0];
-    second = now->rates[0][1];
-    end = now->input[0] + (first + 0.5 * second * step) * step;
+    first = now->rates[0];
+    second = now->rates[1];
+    end = now->deflection + (first + 0.5 * second * step) * step;
     if (!is_finite(end)) {
         return spring_say(spring, SAID_ERROR, function, "the deflection has no finite end value");
     }
     spring_remember(spring);
     turn = second < 0.0 ? -first / second : 0.0;
     if (turn > 0.0 && turn < step) {
-        now->input[0] += 0.5 * first * turn;
+        now->deflection += 0.5 * first * turn;
         spring_remember(spring);
     }
-    now->input[0] = end;
+    now->deflection = end;
     spring_remember(spring);
     /* Else a later step whose derivatives nobody sets would go on along them. */
-    now->rates[0][0] = 0.0;
-    now->rates[0][1] = 0.0;
+    now->rates[0] = 0.0;
+    now->rates[1] = 0.0;
     now->time = point + step;
     return SAID_OK;
 }

@@ -8,7 +8,7 @@
 
 #include "law.h"
 
-#define STATE_LAYOUT 2u
+#define STATE_LAYOUT 3u
 
 /* Value references, the same in both versions; time is a variable in FMI 3 only. 2 is kept for a
  * second input, `deflection_rate`, should the law come to depend on it: nothing else moves then. */
@@ -21,7 +21,8 @@ enum {
     VR_LARGEST_DEFLECTION = 6,
     VR_FORCE_SCALE = 7,
     VR_PAST_KNOT = 8,
-    VR_BEFORE_KNOT = 9
+    VR_BEFORE_KNOT = 9,
+    VR_UNLOADING_STIFFNESS = 10
 };
 
 /* The event indicators: VR_PAST_KNOT and VR_BEFORE_KNOT. */
@@ -42,8 +43,8 @@ enum {
 
 enum { MODEL_EXCHANGE = 0, CO_SIMULATION = 1 };
 
-/* All that a saved state must hold. Without padding, since it is written byte by byte. The second
- * places of `input`, `rates` and `memory` are free for a rate and what a law may remember of it. */
+/* All that a saved state must hold. Without padding, since it is written byte by byte; up to 128 bytes are
+ * copied without a call of the C library, which the Windows library lacks. */
 typedef struct {
     uint64_t table_sum; /* a state of another curve is refused */
     uint32_t layout;
@@ -52,11 +53,12 @@ typedef struct {
     uint32_t events_used; /* FMI 3 co-simulation with event mode */
     double time;
     double stop_time;   /* beyond all times where none was given */
-    double input[2];    /* deflection */
-    double rates[2][2]; /* first and second derivative of each input, for the next step */
-    double memory[2];   /* maximum deflection at an accepted point, 0 at least */
+    double deflection;
+    double rates[2];    /* its first and second derivative, for the next step */
+    double largest;     /* maximum deflection at an accepted point, 0 at least */
     law_piece_t piece;  /* of the last event of model exchange: its ends are the next events */
     double force_scale;
+    double unloading_stiffness;
 } state_t;
 
 typedef struct spring spring_t;
@@ -69,6 +71,7 @@ typedef void (*say_t)(spring_t *spring, int status, const char *message);
 
 struct spring {
     state_t now;
+    law_t law; /* with the unloading stiffness of the state */
     say_t say;
     int is_logging;
     /* The importer's. */
@@ -111,6 +114,12 @@ int spring_set(spring_t *spring, const char *function, const uint32_t *vr, size_
 /* Derivatives of inputs over time for the next step; order 1 or 2. */
 int spring_set_rates(spring_t *spring, const char *function, const uint32_t *vr, size_t n,
                      const int32_t *order, const double *values);
+
+/* Whether the curve unloads along branches of its own. */
+int spring_has_memory(void);
+
+/* After the unloading stiffness of the state has changed. */
+void spring_follow_stiffness(spring_t *spring);
 
 /* The present point is accepted: the memory moves here and nowhere else. */
 void spring_remember(spring_t *spring);

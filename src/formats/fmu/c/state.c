@@ -7,7 +7,8 @@
 /* A state of another curve or kind, or none at all. */
 static int is_fit(const spring_t *spring, const state_t *state) {
     return state->table_sum == spring->now.table_sum && state->layout == STATE_LAYOUT &&
-           state->kind == spring->now.kind && state->events_used == spring->now.events_used;
+           state->kind == spring->now.kind && state->events_used == spring->now.events_used &&
+           state->unloading_stiffness > 0.0;
 }
 
 /* Byte by byte: what is given may lie anywhere. */
@@ -42,9 +43,10 @@ int state_put(spring_t *spring, const char *function, const void *state) {
     }
     if (state == NULL || !is_fit(spring, state)) {
         return spring_say(spring, SAID_ERROR, function,
-                          "no state, or one of another kind of instance");
+                          "the state is missing, or of another kind of instance");
     }
     spring->now = *(const state_t *)state;
+    spring_follow_stiffness(spring);
     return SAID_OK;
 }
 
@@ -65,7 +67,7 @@ int state_write(spring_t *spring, const char *function, const void *state, uint8
         return SAID_ERROR;
     }
     if (state == NULL || bytes == NULL || n < sizeof(state_t)) {
-        return spring_say(spring, SAID_ERROR, function, "no state, or no room for its bytes");
+        return spring_say(spring, SAID_ERROR, function, "the state is missing, or the room for its bytes is too small");
     }
     copy(bytes, state, sizeof(state_t));
     return SAID_OK;
@@ -78,11 +80,11 @@ int state_read(spring_t *spring, const char *function, const uint8_t *bytes, siz
         return SAID_ERROR;
     }
     if (state == NULL || bytes == NULL || n < sizeof read) {
-        return spring_say(spring, SAID_ERROR, function, "these bytes are no state of this curve");
+        return spring_say(spring, SAID_ERROR, function, "these bytes are not a state of this curve");
     }
     copy((uint8_t *)&read, bytes, sizeof read);
     if (!is_fit(spring, &read)) {
-        return spring_say(spring, SAID_ERROR, function, "these bytes are no state of this curve");
+        return spring_say(spring, SAID_ERROR, function, "these bytes are not a state of this curve");
     }
     if (*state == NULL) {
         *state = calloc(1, sizeof read);

@@ -34,13 +34,12 @@ uint64_t crumple_table_sum(const crumple_table_t *t) {
         sum = mix(sum, (unsigned char)t->token[i]);
     }
     sum = mix_all(sum, &t->stiffness, 1);
-    sum = mix_all(sum, &t->steepest, 1);
+    sum = mix_all(sum, &t->scale, 1);
     sum = mix_all(sum, &t->largest_share, 1);
     sum = mix_all(sum, t->deflection, t->points);
     sum = mix_all(sum, t->force, t->points);
     sum = mix_all(sum, t->slope, t->points);
     sum = mix_all(sum, t->work, t->points);
-    sum = mix_all(sum, t->dissipated, t->points);
     sum = mix_all(sum, t->shape_length, t->shape_points);
     sum = mix_all(sum, t->shape_force, t->shape_points);
     sum = mix_all(sum, t->shape_rest, t->shape_points);

@@ -8,7 +8,7 @@
 
 #include "names.h"
 
-#define CRUMPLE_TABLE_VERSION 1
+#define CRUMPLE_TABLE_VERSION 2
 #define CRUMPLE_POINTS 4096
 #define CRUMPLE_SHAPE 1024
 
@@ -29,14 +29,13 @@ typedef struct {
     uint32_t flags;
     char token[64];       /* GUID or instantiation token, ended by 0 */
     double stiffness;     /* unloading stiffness */
-    double steepest;      /* steepest rise of the envelope, or the stiffness if that is more */
+    double scale;         /* of the stiffness, where energy is stored by the mean force; else 1 */
     double largest_share; /* of force times deflection that a branch can store */
     /* One per point of the envelope; `slope` is that of the piece from there on. */
     double deflection[CRUMPLE_POINTS];
     double force[CRUMPLE_POINTS];
     double slope[CRUMPLE_POINTS];
     double work[CRUMPLE_POINTS];
-    double dissipated[CRUMPLE_POINTS];
     /* Unloading branch: shares of its length and force, and the integral from each point to the
      * end. */
     double shape_length[CRUMPLE_SHAPE];
