@@ -435,7 +435,7 @@ fn a_saved_model_predicts_the_same_bits() {
     use crumple::database::Database;
     use crumple::dataset::TrainingSet;
     use crumple::surrogate::ForestOptions;
-    use crumple::surrogate::{Model, ModelKind, QueryPoint};
+    use crumple::surrogate::{Model, ModelKind, Query, predict};
     let folder = tempfile::tempdir().unwrap();
     let path = build_fixture(folder.path(), WALL);
     let database = Database::read(&path).unwrap();
@@ -452,16 +452,11 @@ fn a_saved_model_predicts_the_same_bits() {
         model.write(&file).unwrap();
         let read = Model::read(&file).unwrap();
         assert_eq!(read.to_json().unwrap(), model.to_json().unwrap());
-        let d: Vec<f64> = (0..500).map(|i| f64::from(i) * 0.003).collect();
         for v in [7.0, 13.3, 14.9, 15.1, 25.0] {
-            let at = QueryPoint {
-                speed_m_per_s: v,
-                features: &[],
-                mass_kg: 24e3,
-                closing_m_per_s: None,
-            };
             let bits = |m: &Model| -> Vec<u64> {
-                let forces = [m.force_n(&at, &d), m.body_force_n(&at, &d)];
+                let curve = predict(m, &Query::at(v)).unwrap();
+                let body = curve.body_force_n.clone().unwrap();
+                let forces = [curve.deflection_m, curve.force_n, body];
                 forces.concat().iter().map(|f| f.to_bits()).collect()
             };
             assert_eq!(bits(&model), bits(&read), "{}", options.name());

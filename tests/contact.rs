@@ -140,6 +140,23 @@ fn crush(extracted: &Extracted) -> f64 {
     extracted.curves.original.deflection_m().iter().copied().fold(0.0, f64::max)
 }
 
+/// What no manifest and no file can hold, a program can give.
+#[test]
+fn impossible_arguments_are_refused() {
+    let refused = |change: &dyn Fn(&mut Run), recipe: &str, expected: &str| {
+        let mut run = Run::read(48);
+        change(&mut run);
+        let error = run.extract_with(recipe, Stated::default()).unwrap_err().to_string();
+        says(&error, expected);
+    };
+    for mass_kg in [0.0, -24e3, f64::NAN, f64::INFINITY] {
+        let expected = format!("the mass is {mass_kg}: expected a finite number above 0");
+        refused(&|run| run.mass_kg = mass_kg, CONTACT_RECIPE, &expected);
+    }
+    let cut = |run: &mut Run| run.velocity.values.truncate(50);
+    refused(&cut, CONTACT_RECIPE, "x_velocity[900001] has 50 values for 400 times");
+}
+
 #[test]
 fn a_noisy_state_before_the_impact_does_not_move_the_contact() {
     for speed in [25, 36, 48, 60, 72] {

@@ -327,6 +327,19 @@ pub fn a_damped_spring_follows_its_closed_form() {
 
 /// Damped energy is in the ledger, by both methods the same.
 #[test]
+fn an_unloading_stiffness_is_above_zero() {
+    for stiffness_n_per_m in [0.0, -1.0, f64::NAN] {
+        let unloading = Unloading::Memory { stiffness_n_per_m };
+        let envelope = Envelope::new(vec![0.0, 0.1], vec![0.0, 1e6]).unwrap();
+        let law = ForceLaw::new(envelope, unloading, EnvelopeEnd::Hold);
+        let body = Body::new("A1", 20.0 * TONNES, 10.0);
+        let error = Chain::new(vec![body], vec![Interface::new("A1|wall", law, 0.0)]).unwrap_err();
+        let expected = format!("the unloading stiffness of A1|wall is {stiffness_n_per_m} N/m");
+        assert!(error.to_string().starts_with(&expected), "{error}");
+    }
+}
+
+#[test]
 fn what_dampers_take_is_in_the_ledger() {
     let damping = Damping::new(vec![0.0, 2.0, 20.0], vec![4e5, 2e5, 1e5]).unwrap();
     let bodies: Vec<Body> =

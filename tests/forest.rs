@@ -213,6 +213,20 @@ fn out_of_bag_error_is_like_a_held_out_error() {
     assert!(oob.r2.unwrap() > 0.9);
 }
 
+/// One target for all samples: nothing is explained, and many trees give that target, in either precision.
+#[test]
+fn one_target_is_predicted_as_it_is() {
+    let x = data().records().clone();
+    let y = Array1::from_elem(x.nrows(), 0.1);
+    let params = ForestParams::new(20).out_of_bag(true);
+    let forest = params.fit(&Dataset::new(x.clone(), y)).unwrap();
+    assert_eq!(forest.out_of_bag().unwrap().r2, None);
+    let (x, y) = (x.mapv(|v| v as f32), Array1::from_elem(x.nrows(), 0.1_f32));
+    let forest = ForestParams::<f32>::new(2000).fit(&Dataset::new(x.clone(), y)).unwrap();
+    let p: Array1<f32> = forest.predict(&x);
+    assert!(p.iter().all(|p| *p == 0.1) && forest.predict_one(&x.row(0)) == 0.1);
+}
+
 #[test]
 fn f32_and_views_work() {
     let all = data();

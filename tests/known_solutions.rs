@@ -237,7 +237,7 @@ fn a_gap_is_closed_before_time_begins() {
 #[test]
 fn a_curve_never_pulls() {
     let wavy = Envelope::new(vec![0.0, 0.1, 0.2, 1.0], vec![0.0, MEGA, -MEGA, MEGA]).unwrap();
-    let run = run(&chain(&[(24.0 * TONNES, 5.0)], &[memory(wavy, 0.0)]), 0.3, Method::Verlet);
+    let run = run(&chain(&[(24.0 * TONNES, 5.0)], &[memory(wavy, MEGA)]), 0.3, Method::Verlet);
     assert!(run.interfaces[0].force_n.iter().all(|&f| f >= 0.0));
 }
 

@@ -19,7 +19,7 @@ use crumple::dataset::{TrainingCase, TrainingSet};
 use crumple::surrogate::ForestOptions;
 use crumple::surrogate::MaxCrushRule;
 use crumple::surrogate::{Means, Validation};
-use crumple::surrogate::{Model, ModelKind, PredictedCurve, Query, QueryPoint, predict};
+use crumple::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
 use crumple::unit::{Speed, SpeedKind};
 use serde_json::Value;
 
@@ -523,25 +523,67 @@ fn forests_at_a_midpoint() {
         .cloned()
         .collect();
     let set = TrainingSet::new("lead-car-wall", &cases).unwrap();
-    let d: Vec<f64> = (0..1_200).map(|i| f64::from(i) * 1e-3).collect();
     let step = |options: ModelKind| {
         let model = Model::fit(&set, options).unwrap();
         let at = |km_per_h: f64| {
-            let at = QueryPoint {
-                speed_m_per_s: km_per_h / 3.6,
-                features: &[],
-                mass_kg: 24e3,
-                closing_m_per_s: None,
-            };
-            model.force_n(&at, &d)
+            let curve = predict(&model, &Query::at(km_per_h / 3.6)).unwrap();
+            Envelope::new(curve.deflection_m, curve.force_n).unwrap()
         };
         let (below, above) = (at(47.99), at(48.01));
-        let largest = below.iter().copied().fold(0.0, f64::max);
-        let steps = below.iter().zip(&above).map(|(a, b)| (a - b).abs());
-        steps.fold(0.0, f64::max) / largest
+        let end_m = below.end_m().min(above.end_m());
+        let steps = (0..1_000).map(|i| f64::from(i) * 1e-3 * end_m);
+        let steps = steps.map(|d| (below.force_at(d) - above.force_at(d)).abs());
+        steps.fold(0.0, f64::max) / below.peak_force_n()
     };
     assert!(step(ModelKind::forest(ForestOptions::default())) > 0.05);
     assert!(step(ModelKind::extra(ForestOptions::extra())) <= 0.01);
+}
+
+/// Cases and queries that no file can hold.
+#[test]
+fn impossible_cases_and_queries_are_refused() {
+    let cases = family(&[7.0, 10.0, 13.0]);
+    type Change = &'static dyn Fn(&mut Case);
+    let wrong: [(Change, &str); 6] = [
+        (
+            &|c| c.conditions.speed.m_per_s = -1.0,
+            "the speed is -1: expected a finite number above 0",
+        ),
+        (
+            &|c| c.conditions.masses.body_kg = f64::NAN,
+            "the mass is NaN: expected a finite number above 0",
+        ),
+        (&|c| c.conditions.masses.other_kg = Some(0.0), "the mass of the other body is 0"),
+        (&|c| c.curves.contact_time_s = f64::NAN, "the time of contact is NaN"),
+        (&|c| c.curves.closing_speed_m_per_s.truncate(2), "there are 2 closing speeds for "),
+        (&|c| c.curves.closing_speed_m_per_s[3] = f64::NAN, "a closing speed is NaN"),
+    ];
+    for (change, expected) in wrong {
+        let mut changed = cases.clone();
+        change(&mut changed[1]);
+        let learned = TrainingSet::new("made", &changed).unwrap_err().to_string();
+        let kept = Database::default().put(changed.remove(1)).unwrap_err().to_string();
+        let expected = format!("case \"v10\": {expected}");
+        assert!(learned.starts_with(&expected) && kept.starts_with(&expected), "{learned}; {kept}");
+    }
+    for name in ["", "a/b", "."] {
+        let mut case = cases[0].clone();
+        case.id.name = name.into();
+        let error = Database::default().put(case).unwrap_err().to_string();
+        assert!(error.contains("cannot name a case"), "{error}");
+    }
+    let set = TrainingSet::new("made", &cases).unwrap();
+    let model = Model::fit(&set, ModelKind::rate()).unwrap();
+    for mass_kg in [f64::NAN, -5.0, 0.0] {
+        let query = Query { mass_kg: Some(mass_kg), ..Query::at(8.0) };
+        let error = predict(&model, &query).unwrap_err().to_string();
+        assert_eq!(error, format!("the mass is {mass_kg}: expected a finite number above 0"));
+    }
+    let mut curve = predict(&model, &Query::at(8.0)).unwrap();
+    curve.force_n[7] = f64::NAN;
+    let json = crumple::formats::by_name("json").unwrap();
+    let error = json.export(&[curve], &crumple::formats::Options::default()).unwrap_err();
+    assert!(error.to_string().contains("the predicted curve is invalid"), "{error}");
 }
 
 #[test]

@@ -377,6 +377,19 @@ fn a_restart_goes_on_where_the_run_ended() {
         joined.problems
     );
     assert!(joined.problems.iter().all(|p| !p.message.contains("will change")));
+    // So is one that is damaged, and one whose time goes back.
+    for (at_byte, number, expected) in [
+        (0, [0x7f, 0, 0, 0], expected.as_str()),
+        (4, 0.0009765625_f32.to_be_bytes(), "the state at time 0.0009765625 is left out"),
+    ] {
+        let mut damaged = bytes.clone();
+        damaged[header + 99 * STATE + at_byte..][..4].copy_from_slice(&number);
+        fs::write(at("damagedT01"), damaged).unwrap();
+        let read = section(&at("damagedT01"), "rwforc");
+        assert_eq!(read.time.len(), section(&at("wholeT01"), "rwforc").time.len() - 1);
+        let is_said = read.problems.iter().any(|p| p.message.starts_with(expected));
+        assert!(is_said, "{expected}: {:?}", read.problems);
+    }
     let [first, second] = restarted(&bytes, header, 100, 20);
     fs::write(at("runT01"), first).unwrap();
     fs::write(at("runT02"), second).unwrap();

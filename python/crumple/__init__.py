@@ -27,7 +27,6 @@ import math
 import os
 import re
 import tempfile
-import warnings
 from collections.abc import Mapping
 from itertools import islice
 from numbers import Number
@@ -36,7 +35,7 @@ from pathlib import Path
 import numpy as np
 
 from crumple import _crumple
-from crumple._commands import Warned, add, build, init, rate, run, sweep, train, validate
+from crumple._commands import Warned, _warn, add, build, init, rate, run, sweep, train, validate
 from crumple._errors import Error
 
 __version__ = _crumple.__version__
@@ -334,7 +333,7 @@ def read(path, ids=None, components=None, section=None, format=None):
                 raise
             # A file that can be read lacks what is selected, unless that lies in a part that is damaged.
             if any(problems for _, _, _, problems, *_ in _crumple.read(os.fspath(file), [], None, None, format)):
-                warnings.warn(f"{unread}; the file is damaged, and left out", Warned, stacklevel=2)
+                _warn(f"{unread}; the file is damaged, and left out")
             error = unread
     if not found:
         raise error
@@ -455,7 +454,6 @@ class Model:
     """A trained model: curves at speeds that were never run."""
 
     def __init__(self, path):
-        # A copy is read later, perhaps from another folder.
         self.path = Path(path).resolve()
         self._model = _crumple.TrainedModel(os.fspath(path))
         self.group, self.name, self.range = self._model.facts()
@@ -489,11 +487,15 @@ class Model:
         document = self._model.predict(speed, crush, extrapolate, mass, max_crush, further, energy_correct)
         curve = Curve(json.loads(document))
         for warning in curve.warnings:
-            warnings.warn(warning["message"], Warned, stacklevel=2)
+            _warn(warning["message"])
         return curve
 
-    def __reduce__(self):
-        return (type(self), (self.path,))
+    # A copy is the same model, whatever has become of its file.
+    def __getstate__(self):
+        return {**self.__dict__, "_model": self._model.to_json()}
+
+    def __setstate__(self, state):
+        self.__dict__.update(state, _model=_crumple.TrainedModel.of_json(os.fspath(state["path"]), state["_model"]))
 
     def __repr__(self):
         low, high = (3.6 * speed for speed in self.range)

@@ -22,6 +22,14 @@ class Warned(UserWarning):
     """A warning of the program."""
 
 
+def _warn(text):
+    """A warning at the line of the user that led to it."""
+    level, frame = 1, sys._getframe(0)
+    while frame.f_back is not None and frame.f_globals.get("__name__", "").partition(".")[0] == "crumple":
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, Warned, stacklevel=level)
+
+
 class Document(dict):
     """What a command prints with `--json`. Notebooks show the lists of rows in it as tables, where pandas is installed."""
 
@@ -176,9 +184,9 @@ def run(*arguments, check=True):
         # Errors besides a document are of parts: a run of a study, a group.
         kind, _, text = line.partition(": ")
         if kind == "warning" or (kind == "error" and document is not None and not failed):
-            warnings.warn(text, Warned, stacklevel=3)
+            _warn(text)
     for left in document.get("left_out", ()) if isinstance(document, dict) else ():
-        warnings.warn(f"{left['path']} is left out: {left['message']}", Warned, stacklevel=3)
+        _warn(f"{left['path']} is left out: {left['message']}")
     if check and "--strict" in words and child.returncode and not failed:
         error = Error("there were warnings, damage or failures, which strict does not allow; what could be done is done, and in the error's document")
         error.document = document
@@ -186,9 +194,9 @@ def run(*arguments, check=True):
     if check and failed:
         error = Error.of_document(printed)
         if re.search(r"(^|[\s'(])--[a-z]", str(error)):
-            error.add_note("In Python, options are keyword arguments: --nsdm-seeds 3 is nsdm_seeds=3, --overwrite is overwrite=True.")
+            error.add_note("Options are words of crumple.run; of other functions they are keyword arguments: --nsdm-seeds 3 is nsdm_seeds=3, --overwrite is overwrite=True.")
         raise error
-    if check and document is None and child.returncode == 0 and printed:
+    if document is None and child.returncode == 0 and printed:
         # Of --version and --help.
         return printed.decode()
     if check and document is None:

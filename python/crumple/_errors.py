@@ -7,13 +7,15 @@ class Error(Exception):
     """What the program would have said.
 
     Attributes: `code` (a word that never changes its meaning, see docs/error-codes.md), `file`, `line` and `column`
-    (counted from 1; None where they are not known), `hint`, and `causes`, a list of texts.
+    (counted from 1; None where they are not known), `hint`, and `causes`, a list of texts; `document`, what a command has
+    printed that failed by `strict` alone, else None.
     """
 
     def __init__(self, message, code=None, file=None, line=None, column=None, hint=None, causes=()):
         super().__init__(message)
         self.code, self.file, self.line, self.column = code, file, line, column
         self.hint, self.causes = hint, list(causes)
+        self.document = None
 
     @classmethod
     def of_document(cls, document):
@@ -22,4 +24,4 @@ class Error(Exception):
 
     def __reduce__(self):
         args = (str(self), self.code, self.file, self.line, self.column, self.hint, self.causes)
-        return (type(self), args)
+        return (type(self), args, self.__dict__)

@@ -1,5 +1,5 @@
 from collections.abc import Iterable
-from typing import Self
+from typing import Any, Self
 
 class Error(Exception):
     code: str | None
@@ -8,6 +8,7 @@ class Error(Exception):
     column: int | None
     hint: str | None
     causes: list[str]
+    document: dict[str, Any] | list[Any] | None
     def __init__(
         self,
         message: str,
@@ -20,4 +21,4 @@ class Error(Exception):
     ) -> None: ...
     @classmethod
     def of_document(cls, document: str | bytes) -> Self: ...
-    def __reduce__(self) -> tuple[type[Self], tuple[object, ...]]: ...
+    def __reduce__(self) -> tuple[type[Self], tuple[object, ...], dict[str, Any]]: ...

@@ -5,8 +5,8 @@
 use std::collections::HashMap;
 use std::ffi::c_int;
 use std::path::PathBuf;
-use std::sync::Arc;
 use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 use crumple::curve::{Case, Parameter};
@@ -25,7 +25,8 @@ use ndarray::{Array1, Array2};
 use pyo3::exceptions::{PyBufferError, PyRuntimeError, PyValueError};
 use pyo3::ffi;
 use pyo3::prelude::*;
-use pyo3::types::PyModule;
+use pyo3::types::{PyBytes, PyModule};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 
 /// Numbers that NumPy shows without a copy.
@@ -69,6 +70,25 @@ fn floats(values: Vec<f64>) -> Floats {
     Floats(Numbers::Own(values))
 }
 
+/// Work in the threads of this process: a fork has none of its parent's, and would wait for them.
+fn in_threads<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+    let pool = {
+        let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+        let process = std::process::id();
+        if pool.as_ref().is_none_or(|(of, _)| *of != process) {
+            // To end the parent's is not the child's.
+            std::mem::forget(pool.take());
+            *pool = ThreadPoolBuilder::new().build().ok().map(|pool| (process, Arc::new(pool)));
+        }
+        pool.as_ref().map(|(_, pool)| pool.clone())
+    };
+    match pool {
+        Some(pool) => pool.install(work),
+        None => work(),
+    }
+}
+
 /// Work without Python's lock. A signal, such as Ctrl-C, ends the wait for it at once; what it has read is dropped when it
 /// ends by itself.
 fn interruptible<T: Send + 'static>(
@@ -76,7 +96,7 @@ fn interruptible<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
     let (done, mut result) = mpsc::channel();
-    let worker = std::thread::spawn(move || done.send(work()));
+    let worker = std::thread::spawn(move || done.send(in_threads(work)));
     loop {
         let waited;
         (waited, result) =
@@ -272,6 +292,18 @@ impl TrainedModel {
         model.map(Self).map_err(|error| failed(py, &error))
     }
 
+    /// What its file holds.
+    fn to_json<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let bytes = self.0.to_json().map_err(|e| PyValueError::new_err(e.to_string()))?;
+        Ok(PyBytes::new(py, &bytes))
+    }
+
+    /// The model of such bytes; errors name the path.
+    #[staticmethod]
+    fn of_json(py: Python<'_>, path: PathBuf, json: &[u8]) -> PyResult<Self> {
+        Model::parse(&path, json).map(Self).map_err(|error| failed(py, &error))
+    }
+
     /// Name of the group, of the model, and its slowest and fastest speed in m/s.
     fn facts(&self) -> (String, &'static str, (f64, f64)) {
         (self.0.group.clone(), self.0.kind.name(), self.0.range_m_per_s())
@@ -315,7 +347,8 @@ impl TrainedModel {
             let speed_m_per_s = found.map_or(query.speed_m_per_s, |found| found.speed_m_per_s);
             Ok((predict(&self.0, &Query { speed_m_per_s, ..query.clone() })?, found))
         };
-        let (curve, found_by_crush) = py.detach(predicted).map_err(|error| failed(py, &error))?;
+        let (curve, found_by_crush) =
+            py.detach(|| in_threads(predicted)).map_err(|error| failed(py, &error))?;
         let document = Predicted { curve, found_by_crush };
         serde_json::to_string(&document).map_err(|error| PyValueError::new_err(error.to_string()))
     }
@@ -375,7 +408,7 @@ impl Forest {
 
     fn predict(&self, py: Python<'_>, x: &[u8], features: usize) -> PyResult<Floats> {
         let records = records(x, features)?;
-        let predicted: Array1<f64> = py.detach(|| self.0.predict(&records));
+        let predicted: Array1<f64> = py.detach(|| in_threads(|| self.0.predict(&records)));
         Ok(floats(predicted.to_vec()))
     }
 

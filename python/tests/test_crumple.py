@@ -3,6 +3,7 @@
 import copy
 import json
 import math
+import multiprocessing
 import os
 import pickle
 import re
@@ -339,6 +340,13 @@ def test_databases_models_and_curves(tmp_path):
     assert crumple.run("db", "diff", DEMO / "curves.h5", DEMO / "curves.h5")._repr_html_() is None
     trained = database.train(tmp_path / "own.model", "lead-car-wall", model="linear")
     assert trained.name == "linear" and trained.predict(50 / 3.6).force.shape == (trained.predict(50 / 3.6).deflection.shape)
+    # A copy is the same model when its file is another.
+    kept = pickle.dumps(trained)
+    with pytest.warns(crumple.Warned) as warned:
+        database.train(tmp_path / "own.model", "lead-car-wall", model="nearest").predict(95 / 3.6)
+    assert {warning.filename for warning in warned} == {__file__}
+    for copied in (pickle.loads(kept), copy.deepcopy(trained), copy.copy(trained)):
+        assert copied.name == "linear" and copied.predict(12.0).document == trained.predict(12.0).document
 
 
 def test_commands_are_functions(tmp_path):
@@ -354,9 +362,29 @@ def test_commands_are_functions(tmp_path):
     error = raised.value
     assert (error.code, error.file, error.line, error.column) == ("toml", str(bad), 2, 12)
     again = pickle.loads(pickle.dumps(error))
-    assert str(again) == str(error) and again.line == 2
+    assert str(again) == str(error) and again.line == 2 and again.document is None
+    with pytest.raises(crumple.Error, match="strict") as raised:
+        crumple.run("simulate", DEMO / "train-set.toml", "--strict")
+    again = pickle.loads(pickle.dumps(raised.value))
+    assert again.document == raised.value.document and "summary" in again.document
+    assert crumple.run("--version", check=False).startswith("crumple ")
     with pytest.warns(crumple.Warned, match="beyond the end of its curve's data"):
         crumple.simulate(DEMO / "train-set.toml")
+
+
+def _fitted(seed):
+    from crumple.sklearn import RegressionForest
+
+    x = np.linspace(0, 1, 500).reshape(-1, 1)
+    return RegressionForest(20, random_state=seed).fit(x, x[:, 0]).predict(x)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_process_has_threads_of_its_own():
+    expected = _fitted(1)
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        assert np.array_equal(pool.map_async(_fitted, [1]).get(timeout=60)[0], expected)
 
 
 def test_the_program_comes_along():

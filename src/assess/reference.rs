@@ -170,7 +170,7 @@ impl Reference {
     }
 
     /// Errors of speeds at `time_s`.
-    pub fn errors_of(&self, velocity: &[f64]) -> MotionErrors {
+    pub(crate) fn errors_of(&self, velocity: &[f64]) -> MotionErrors {
         let acceleration = derivative(&self.time_s, velocity);
         let smooth = filtered(&self.time_s, acceleration.clone());
         let inside =

@@ -180,7 +180,7 @@ fn add_prediction(panel: &mut Panel, curve: &PredictedCurve) {
     // A band is known, and a line is whole, as far as the runs were crushed, within the line's own scatter.
     let end_m = curve.data_end_m() * (1.0 + SAME_CRUSH);
     let known = curve.deflection_m.partition_point(|d| *d <= end_m);
-    let to_end = |values: &[f64]| values[..known].to_vec();
+    let to_end = |values: &[f64]| values.iter().copied().take(known).collect::<Vec<_>>();
     let d = &curve.deflection_m;
     if let (Some(low), Some(high)) = (&curve.force_low_n, &curve.force_high_n) {
         let (low, high) = (to_end(low), to_end(high));

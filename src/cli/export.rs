@@ -9,7 +9,7 @@ use super::{CommandResult, Failure, GlobalOptions, keep_input, output, usage, us
 use crate::curve::{ForceKind, Parameter, Tail};
 use crate::error::Error;
 use crate::file::{not_written, write_all_whole};
-use crate::formats::{self, Exported, FORMATS, Format, Material, Options};
+use crate::formats::{self, Exported, FORMATS, Format, IDS, Material, Options};
 use crate::plural::counted;
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{PredictedCurve, Query, WarningCode};
@@ -96,7 +96,7 @@ pub(super) struct Target {
     #[arg(long, value_parser = one_of(FORCES))]
     force: Option<ForceKind>,
     /// Number of the first curve in the target's deck [default: 101]
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=99_999_000))]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(i64::from(*IDS.start())..=i64::from(*IDS.end())))]
     curve_id: Option<u32>,
     /// How the curve continues beyond the maximum crush [default: bottom for multi-body tools]
     #[arg(long, value_parser = one_of(TAILS))]

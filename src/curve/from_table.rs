@@ -14,7 +14,7 @@ use std::ops::RangeInclusive;
 use super::extract::{self, ExtractError, Extracted, Record, Setup, Stated, StatedContact};
 use super::recipe::{Filter, Sampling};
 use super::retrace::{Impact, Table, retrace};
-use super::{Curve, EnergyAudit, Quality, RecordedCurves, contact, energy, loading};
+use super::{Curve, EnergyAudit, Quality, RecordedCurves, above_0, contact, energy, loading};
 use crate::error::{Error, ErrorCode, error};
 use crate::plural::counted;
 use crate::signal::interpolate;
@@ -71,6 +71,8 @@ pub fn from_table(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves,
             force = force.min(body)
         ));
     }
+    above_0("the speed", impact.speed.m_per_s)?;
+    impact.masses.check()?;
     if deflection < 2 {
         return Err(error!(Other, "a curve needs at least 2 states, found {deflection}"));
     }

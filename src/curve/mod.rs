@@ -142,7 +142,21 @@ pub struct Masses {
     pub other_kg: Option<f64>,
 }
 
+/// Whether a number of a case is above 0; what is wrong with it, if not.
+pub(crate) fn above_0(what: &str, value: f64) -> Result<(), Error> {
+    if value > 0.0 && value.is_finite() {
+        return Ok(());
+    }
+    Err(error!(Other, "{what} is {value}: expected a finite number above 0"))
+}
+
 impl Masses {
+    /// Whether both are above 0.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        above_0("the mass", self.body_kg)?;
+        self.other_kg.map_or(Ok(()), |other| above_0("the mass of the other body", other))
+    }
+
     /// The mass that moves along the deflection: the body's against a wall, the reduced
     /// mass `m_a m_b / (m_a + m_b)` of a pair.
     pub fn effective_kg(&self) -> f64 {
@@ -328,6 +342,37 @@ pub struct Case {
 }
 
 impl Case {
+    /// Whether a database can keep it, and a model learn from it.
+    pub(crate) fn check(&self) -> Result<(), Error> {
+        let (of, curves) = (&self.conditions, &self.curves);
+        let finite = |what: &str, value: f64| match value.is_finite() {
+            true => Ok(()),
+            false => Err(error!(Other, "{what} is {value}: expected a finite number")),
+        };
+        let found = || {
+            above_0("the speed", of.speed.m_per_s)?;
+            of.masses.check()?;
+            above_0("the kinetic energy", self.quality.audit.kinetic_j)?;
+            finite("the work", self.quality.audit.work_j)?;
+            finite("the time of contact", curves.contact_time_s)?;
+            curves
+                .unloading_stiffness_n_per_m
+                .map_or(Ok(()), |k| finite("the unloading stiffness", k))?;
+            for (name, parameter) in &of.parameters {
+                if let Parameter::Number(number) = parameter {
+                    finite(name, *number)?;
+                }
+            }
+            let (speeds, times) = (&curves.closing_speed_m_per_s, curves.sampled.time_s().len());
+            if speeds.len() != times {
+                let speeds = speeds.len();
+                return Err(error!(Other, "there are {speeds} closing speeds for {times} times"));
+            }
+            speeds.iter().try_for_each(|v| finite("a closing speed", *v))
+        };
+        found().map_err(|e| error!(Dataset, "case \"{}\": {e}", self.id.name))
+    }
+
     /// The force that slows the body, at the sampled times, in N: its effective mass times its deceleration, filtered and
     /// scaled to the energy that it loses; of a table without times, its own force.
     pub fn body_force_n(&self) -> Vec<f64> {

@@ -362,16 +362,8 @@ impl TryFrom<SamplingTable> for Sampling {
     type Error = String;
 
     fn try_from(table: SamplingTable) -> Result<Self, String> {
-        if !(2..=MAX_STATES).contains(&table.states) {
-            return Err(format!(
-                "sampling needs states from 2 to {MAX_STATES}, found {}",
-                table.states
-            ));
-        }
-        if !(table.interval_ms > 0.0 && table.interval_ms.is_finite()) {
-            return Err(format!("sampling needs interval_ms above 0, found {}", table.interval_ms));
-        }
-        Ok(Self { states: table.states, interval_s: table.interval_ms * 1e-3 })
+        let sampling = Self { states: table.states, interval_s: table.interval_ms * 1e-3 };
+        sampling.check().map(|()| sampling)
     }
 }
 
@@ -387,6 +379,18 @@ impl From<Sampling> for SamplingTable {
 pub(crate) const LEAST_STATES: f64 = 40.0;
 
 impl Sampling {
+    /// Whether both numbers are possible.
+    pub(super) fn check(&self) -> Result<(), String> {
+        let SamplingTable { states, interval_ms } = (*self).into();
+        if !(2..=MAX_STATES).contains(&states) {
+            return Err(format!("sampling needs states from 2 to {MAX_STATES}, found {states}"));
+        }
+        if !(interval_ms > 0.0 && interval_ms.is_finite()) {
+            return Err(format!("sampling needs interval_ms above 0, found {interval_ms}"));
+        }
+        Ok(())
+    }
+
     /// The default's interval in s, or for a shorter crush the round one (1, 2 or 5 of a decade) of which it has at least
     /// [`LEAST_STATES`], if the states of the record are no further apart than that.
     pub(crate) fn interval_for(crush_s: f64, apart_s: f64) -> f64 {

@@ -268,7 +268,7 @@ impl Database {
     /// Adds a case or replaces the one of the same group, name and study.
     ///
     /// # Errors
-    /// If the name is taken by another study.
+    /// If its numbers or names are not possible, and if the name is taken by another study.
     pub fn put(&mut self, case: Case) -> Result<(), Error> {
         self.put_all([case])
     }
@@ -278,6 +278,12 @@ impl Database {
     pub(crate) fn put_all(&mut self, cases: impl IntoIterator<Item = Case>) -> Result<(), Error> {
         let mut places: BTreeMap<String, HashMap<String, usize>> = BTreeMap::new();
         for case in cases {
+            case.check()?;
+            for (what, name) in [("group", &case.id.group), ("case", &case.id.name)] {
+                check_name(name).map_err(|why| {
+                    error!(Database, "\"{}\" cannot name a {what}: {why}", shown(name))
+                })?;
+            }
             let there = self.groups.entry(case.id.group.clone()).or_default();
             let places = places.entry(case.id.group.clone()).or_insert_with(|| {
                 there.iter().enumerate().map(|(k, case)| (case.id.name.clone(), k)).collect()

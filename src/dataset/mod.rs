@@ -385,6 +385,7 @@ impl TrainingSet {
         let mut cases: Vec<&Case> = cases.into_iter().collect();
         let first = *cases.first().ok_or(error!(Dataset, "the group is empty: build it first"))?;
         of_one_kind(cases.iter().copied())?;
+        cases.iter().try_for_each(|case| case.check())?;
         cases.sort_by(|a, b| a.id.name.cmp(&b.id.name));
         let features = features(&cases)?;
         let training: Vec<Result<TrainingCase, Error>> = replicates(&cases, &features)?

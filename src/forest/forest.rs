@@ -104,8 +104,9 @@ impl<F: Float> RegressionForest<F> {
 
     /// Mean over the trees for one record: a value for each feature of the training samples.
     pub fn predict_one(&self, record: &ArrayView1<'_, F>) -> F {
-        let sum = self.trees.iter().fold(F::zero(), |sum, tree| sum + tree.predict(record));
-        sum / F::cast(self.trees.len())
+        // Of many trees single precision would lose digits.
+        let sum: f64 = self.trees.iter().map(|tree| as_f64(tree.predict(record))).sum();
+        F::cast(sum / self.trees.len() as f64)
     }
 }
 
@@ -271,7 +272,8 @@ fn out_of_bag<F: Float>(
         samples += 1;
     }
     let count = f64::from(samples.max(1));
-    let r2 = (spread > 0.0).then(|| 1.0 - error / spread);
+    let differ = table.targets.windows(2).any(|pair| pair[0] != pair[1]);
+    let r2 = differ.then(|| 1.0 - error / spread);
     OutOfBag { rmse: (error / count).sqrt(), r2, samples: samples as usize }
 }
 
@@ -332,7 +334,7 @@ where
     fn predict_inplace<'a>(&'a self, x: &'a ArrayBase<D, Ix2>, y: &mut Array1<F>) {
         assert_eq!(x.ncols(), self.features, "the forest was fitted to another number of features");
         assert_eq!(x.nrows(), y.len(), "one target is needed per record");
-        let trees = F::cast(self.trees.len());
+        let trees = self.trees.len() as f64;
         let x = x.view();
         let mut rows: Vec<F> = x.iter().copied().collect();
         let order = (self.trees.len() >= TREES_WORTH_ORDERING).then(|| {
@@ -346,11 +348,11 @@ where
             let row = |&(_, row): &(usize, usize)| &rows[row * self.features..][..self.features];
             rows = order.iter().flat_map(row).copied().collect();
         }
-        let mut sums = vec![F::zero(); x.nrows()];
+        let mut sums = vec![0.0; x.nrows()];
         visit(&self.trees, &rows, self.features, &mut sums, |sum, tree, leaf| {
-            *sum += tree.value(leaf);
+            *sum += as_f64(tree.value(leaf));
         });
-        let means = sums.into_iter().map(|sum| sum / trees);
+        let means = sums.into_iter().map(|sum| F::cast(sum / trees));
         match order {
             Some(order) => order.iter().zip(means).for_each(|(&(_, row), mean)| y[row] = mean),
             None => y.iter_mut().zip(means).for_each(|(y, mean)| *y = mean),

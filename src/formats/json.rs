@@ -6,6 +6,7 @@ use crate::error::{Error, error};
 use crate::surrogate::PredictedCurve;
 
 pub(crate) fn write(curve: &PredictedCurve) -> Result<Exported, Error> {
+    curve.envelope()?;
     let mut bytes = serde_json::to_vec_pretty(curve)
         .map_err(|e| error!(Export, "cannot encode the curve: {e}").caused_by(e))?;
     bytes.push(b'\n');

@@ -35,7 +35,7 @@ use crate::unit::{Shown, UnitSystem};
 pub use export_curve::ExportCurve;
 pub(crate) use export_curve::TargetUnloading;
 pub use fmu::{FmiVersion, Spring, archive, binaries};
-pub(crate) use lsdyna::Material;
+pub use lsdyna::Material;
 pub use read::{ReadCurve, ReadOptions, read, readers};
 pub(crate) use read::{history, is_run, run_table};
 
@@ -404,6 +404,10 @@ impl Format {
     }
 
     fn check(&self, options: &Options) -> Result<(), Error> {
+        if !IDS.contains(&options.id) {
+            let (id, last) = (options.id, IDS.end());
+            return Err(error!(Usage, "the id is {id}: expected 1 to {last}"));
+        }
         if options.units.is_none() || self.units {
             return Ok(());
         }
@@ -419,6 +423,9 @@ impl Format {
         error!(Export, "{format} takes {needs}", format = self.name)
     }
 }
+
+/// First ids of a deck's keywords: eight digits, with room for those of the curves that follow.
+pub(crate) const IDS: std::ops::RangeInclusive<u32> = 1..=99_999_000;
 
 /// States of a deck's histories, as in the reference data.
 const NUMBER_OF_STATES: f64 = 400.0;

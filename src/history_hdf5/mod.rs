@@ -82,7 +82,7 @@ pub(crate) fn is_other_hdf5(path: &Path) -> bool {
 /// has the attribute `units`.
 ///
 /// # Errors
-/// If HDF5 cannot hold them.
+/// If HDF5 cannot hold them, or a history has another number of values than there are times.
 pub fn encode(
     file: &SolverFile,
     units: Option<UnitSystem>,
@@ -148,6 +148,10 @@ pub(crate) fn encode_in(
     deck: Option<&Deck>,
     source: Option<&Path>,
 ) -> Result<Vec<u8>, Error> {
+    if let Some(history) = file.histories.iter().find(|h| h.values.len() != file.time.len()) {
+        let (label, values, times) = (history.label(), history.values.len(), file.time.len());
+        return Err(not_encoded(format!("{label} has {values} values for {times} times")));
+    }
     let mut layout = Layout::of(file, units, deck, source);
     let mut components: Vec<(&Arc<str>, Vec<&History>)> = Vec::new();
     let mut index: HashMap<&Arc<str>, usize> = HashMap::new();

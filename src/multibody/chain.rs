@@ -226,6 +226,16 @@ impl Chain {
                 let key = KeyPath::of("interfaces").item(k);
                 return Err(error!(Other, "{name} has {fault}").at(key));
             }
+            let laws = [Some(&interface.law), interface.tension.as_ref().map(|t| &t.law)];
+            for memory in laws.into_iter().flatten().filter_map(|law| law.memory.as_ref()) {
+                let stiffness = memory.stiffness_n_per_m;
+                if !(stiffness > 0.0 && stiffness.is_finite()) {
+                    return Err(error!(
+                        Other,
+                        "the unloading stiffness of {name} is {stiffness} N/m: expected more than 0"
+                    ));
+                }
+            }
             let slack = interface.tension.as_ref().map_or(0.0, |t| t.slack_m);
             for (what, length_m) in [("gap", interface.gap_m), ("slack", slack)] {
                 if !(length_m >= 0.0 && length_m.is_finite()) {

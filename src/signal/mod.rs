@@ -25,9 +25,12 @@ pub(crate) fn integral(time: &[f64], values: &[f64]) -> Vec<f64> {
 
 /// `Σ|p − r| / Σ|r|`: the headline error for velocity, acceleration and force.
 ///
-/// Equal lengths, same times or deflections. Infinite if the reference is all zero and
+/// At the same times or deflections; NaN if their numbers differ. Infinite if the reference is all zero and
 /// the prediction is not; 0 if both are.
 pub fn l1_ratio(reference: &[f64], prediction: &[f64]) -> f64 {
+    if reference.len() != prediction.len() {
+        return f64::NAN;
+    }
     let difference: f64 = reference.iter().zip(prediction).map(|(r, p)| (p - r).abs()).sum();
     let scale: f64 = reference.iter().map(|r| r.abs()).sum();
     if difference == 0.0 { 0.0 } else { difference / scale }
@@ -37,8 +40,11 @@ pub fn l1_ratio(reference: &[f64], prediction: &[f64]) -> f64 {
 ///
 /// `time`: strictly increasing, at least two. Over an output interval `h` the result is
 /// a mean over `2 h`, as the contact forces derived from impulses are.
+///
+/// # Panics
+/// If there are fewer times than values.
 pub fn derivative(time: &[f64], values: &[f64]) -> Vec<f64> {
-    let last = values.len() - 1;
+    let last = values.len().saturating_sub(1);
     (0..values.len())
         .map(|i| {
             let (a, b) = (i.saturating_sub(1), (i + 1).min(last));

@@ -5,6 +5,7 @@
 //! end of its file kills the process. Data written after opening are ignored by a
 //! reader: its end would move while it reads, and half a line would be followed by another.
 
+use std::borrow::Cow;
 use std::fs::File;
 use std::io::{self, BufRead, Read};
 use std::path::Path;
@@ -126,9 +127,17 @@ pub(crate) fn encoded(head: &[u8]) -> Option<&'static str> {
 
 const UTF_16: &str = "this is UTF-16 text (convert it with iconv -f UTF-16 -t UTF-8)";
 
+/// A title: UTF-8, or else Latin-1, as in decks that were written on Windows.
+pub(super) fn title(bytes: &[u8]) -> Cow<'_, str> {
+    match std::str::from_utf8(bytes) {
+        Ok(text) => text.into(),
+        Err(_) => bytes.iter().map(|&byte| char::from(byte)).collect::<String>().into(),
+    }
+}
+
 /// The text of a field of a binary file without its padding; `None` if there is nothing else.
 pub(super) fn unpadded(bytes: &[u8]) -> Option<String> {
-    let text = String::from_utf8_lossy(bytes);
+    let text = title(bytes);
     let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0');
     (!text.is_empty()).then(|| text.to_string())
 }

@@ -56,7 +56,7 @@ pub(crate) mod warning;
 
 /// Where a surrogate is used.
 #[derive(Clone, Copy, Debug)]
-pub struct QueryPoint<'a> {
+pub(crate) struct QueryPoint<'a> {
     /// Impact speed, of the training cases' kind.
     pub speed_m_per_s: f64,
     /// Values of the training set's further features.

@@ -322,14 +322,13 @@ impl Model {
         })
     }
 
-    /// The declared forces in N at increasing deflections.
-    pub fn force_n(&self, at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
+    /// The declared forces in N at increasing deflections from 0 on that are close enough to follow the body's motion.
+    pub(crate) fn force_n(&self, at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         self.fitted.force_n(&self.curves.declared, at, deflection_m)
     }
 
-    /// The forces in N that move the body, at deflections from 0 on that are close enough to follow its motion: of its motion, or
-    /// the declared ones if the model has no others.
-    pub fn body_force_n(&self, at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
+    /// The forces in N that move the body, at such deflections: of its motion, or the declared ones if the model has no others.
+    pub(crate) fn body_force_n(&self, at: &QueryPoint<'_>, deflection_m: &[f64]) -> Vec<f64> {
         match &self.fitted_body {
             Some(body) if body.crush_law().is_some() => {
                 let law_n =

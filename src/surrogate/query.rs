@@ -9,7 +9,7 @@ use super::predicted::{Rebound, stopping_force_n};
 use super::warning::{Warning, is_far_outside, outside_of};
 use super::{CaseCurve, Model, QueryPoint};
 use crate::curve::body::rebound_stiffness_n_per_m;
-use crate::curve::{EnergyAudit, Envelope, Masses, Parameter};
+use crate::curve::{EnergyAudit, Envelope, Masses, Parameter, above_0};
 use crate::dataset::{MASS, OTHER_MASS, SAME_MASS, feature_values};
 use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::unit::Speed;
@@ -108,6 +108,9 @@ impl<'a> ResolvedQuery<'a> {
                 "{MASS} is {other}, but the mass is given as {mass} kg: give one of them"
             )
             .at(KeyPath::of("parameters").key(MASS)));
+        }
+        if let Some(mass) = query.mass_kg {
+            above_0("the mass", mass).map_err(|e| e.coded_as(ErrorCode::Prediction))?;
         }
         let asked_kg = query.mass_kg.or(as_parameter);
         let masses = match asked_kg {

@@ -298,8 +298,11 @@ impl Sweep {
         !self.design.spreads.iter().any(|spread| matches!(spread, Spread::Drawn(_)))
     }
 
-    /// The varied values of an item, as they are in its row.
+    /// The varied values of an item, as they are in its row; none if there is no such item.
     pub fn values(&self, item: u64) -> Vec<String> {
+        if item >= self.items() {
+            return Vec::new();
+        }
         let mut values = Vec::new();
         self.design.values(item, &mut values);
         let texts = values.iter().enumerate();

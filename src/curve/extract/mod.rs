@@ -14,7 +14,7 @@ mod start;
 
 use super::recipe::{Filter, RecordedMotion, Sampling};
 use super::{Curve, EnergyAudit, ForceKind, Masses, Quality, RecordedCurves, energy, loading};
-use crate::error::{Error, ErrorCode};
+use crate::error::{Error, ErrorCode, error};
 use crate::history::History;
 use crate::plural::counted;
 use crate::signal::cfc;
@@ -46,6 +46,19 @@ pub struct Extracted {
 /// # Errors
 /// It says which history cannot be used and what to change.
 pub fn extract(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<Extracted, Error> {
+    let impossible = |error: Error| error.coded_as(ErrorCode::Run);
+    setup.masses.check().map_err(impossible)?;
+    setup.sampling.check().map_err(|e| error!(Run at "sampling", "{e}"))?;
+    let (MeasuredForce::Contact(force) | MeasuredForce::Body(force, _)) = measured.force;
+    let Measured { displacement, minus_displacement, velocity, minus_velocity, contact, .. } =
+        *measured;
+    let further = [minus_displacement, velocity, minus_velocity, contact].into_iter().flatten();
+    for history in [displacement, force].into_iter().chain(further) {
+        let (values, times) = (history.values.len(), history.time.len());
+        if values != times {
+            return Err(error!(Run, "{} has {values} values for {times} times", history.label()));
+        }
+    }
     of_run(measured, setup).map_err(|reason| Error::below(ErrorCode::Run, reason))
 }
 

@@ -213,6 +213,7 @@ impl ForceLaw {
     /// Stored and dissipated energy in J at `deflection_m` after the deflection has once been
     /// `largest_m`. Their sum is the work done so far.
     pub fn energies_j(&self, deflection_m: f64, largest_m: f64) -> (f64, f64) {
+        let largest_m = largest_m.max(deflection_m);
         if largest_m <= 0.0 {
             return (0.0, 0.0); // never in contact
         }

@@ -21,7 +21,7 @@ use std::io;
 use super::leap::Leaps;
 use super::line::{Line, Lines, legend_entry, version};
 use crate::solver::problem::ProblemCode;
-use crate::solver::source::{Source, Stream};
+use crate::solver::source::{self, Source, Stream};
 use crate::solver::states::StateReader;
 use crate::solver::{Format, NoDataReason, Selection, SolverFile, WithoutData};
 
@@ -193,7 +193,7 @@ impl<'a> AsciiReader<'a> {
             states.note(ProblemCode::BadLine, &line, message);
         }
         if line.number == 1 {
-            let text = String::from_utf8_lossy(line.text).trim().to_string();
+            let text = source::title(line.text).trim().to_string();
             self.title = (!text.is_empty()).then_some(text);
         } else if line.number == 2 {
             self.version = version(line.text);

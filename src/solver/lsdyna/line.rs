@@ -3,7 +3,7 @@
 use std::io::{self, BufRead};
 
 use crate::solver::problem::Place;
-use crate::solver::source::Stream;
+use crate::solver::source::{self, Stream};
 
 /// Bytes kept of one line. The longest line of any known file has 170; what lies
 /// beyond is skipped, so that a file without line ends cannot fill the memory.
@@ -265,7 +265,7 @@ pub(crate) fn legend_entry(line: &[u8]) -> Option<(i64, Option<String>)> {
     let text = &line[blanks(line)..];
     let is_of_id = |k: usize, b: u8| b.is_ascii_digit() || k == 0 && matches!(b, b'+' | b'-');
     let end = (0..text.len()).find(|&k| !is_of_id(k, text[k])).unwrap_or(text.len());
-    let title = String::from_utf8_lossy(&text[end..]).trim().to_string();
+    let title = source::title(&text[end..]).trim().to_string();
     Some((integer(&text[..end])?, (!title.is_empty()).then_some(title)))
 }
 

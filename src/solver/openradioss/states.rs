@@ -223,6 +223,7 @@ impl StateReader {
                 }
             }
             if state.len() == self.lengths.len() {
+                self.cut_after.extend(self.time.last().filter(|_| damaged.is_some()));
                 self.leave_out(damaged.take(), number);
                 self.look_for_zeros(header, &above, Some(&state));
                 self.store(&state, start);
@@ -337,6 +338,13 @@ impl StateReader {
         let mut last = f64::NEG_INFINITY;
         kept.retain(|&i| {
             let rises = self.time[i] > last;
+            if !rises {
+                let at = self.time[i];
+                let message = format!(
+                    "the state at time {at:?} is left out: forces are rates of impulses, which need times that rise"
+                );
+                self.problems.add(ProblemCode::IncompleteState, self.starts.get(i).copied(), message);
+            }
             last = last.max(self.time[i]);
             rises
         });
