@@ -62,6 +62,12 @@ impl Table {
         let rows = vec![Vec::new(); items.len()];
         TableOf { items, table: Self { heading: Vec::new(), rows } }
     }
+
+    /// Apart from what is generic, which is compiled for every column.
+    fn add_column(&mut self, name: String, cell: &dyn Fn(usize) -> Cell) {
+        self.heading.push(name);
+        self.rows.iter_mut().enumerate().for_each(|(k, row)| row.push(cell(k)));
+    }
 }
 
 impl<T> TableOf<T> {
@@ -74,10 +80,8 @@ impl<T> TableOf<T> {
         name: impl Into<String>,
         cell: impl Fn(&T) -> C,
     ) -> Self {
-        self.table.heading.push(name.into());
-        for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
-            row.push(cell(item).into());
-        }
+        let items = &self.items;
+        self.table.add_column(name.into(), &|row| cell(&items[row]).into());
         self
     }
 

@@ -80,8 +80,8 @@ pub(super) fn write_in_parts(
 ) -> Result<(), Error> {
     let failed = |source| not_written(path, source);
     let written = write_by_path(path, |draft| {
-        let first = fs::File::create(draft).map_err(failed)?;
-        layout::encode(database, at_once)?.finish_to(first)?;
+        let mut first = fs::File::create(draft).map_err(failed)?;
+        hdf5::write_to(layout::encode(database, at_once)?, &mut first)?;
         let (mut there, mut room) = (at_once, at_once);
         let mut file = open(draft)?;
         for name in database.groups() {

@@ -182,8 +182,8 @@ impl Database {
         if is_device {
             return write_whole(path, &file.finish().map_err(layout::not_encoded)?);
         }
-        write_at(path, |draft| {
-            file.finish_to(draft).map_err(|error| match error {
+        write_at(path, |mut draft| {
+            hdf5::write_to(file, &mut draft).map_err(|error| match error {
                 hdf5::Error::Io(source) => source,
                 other => io::Error::other(other),
             })?;

@@ -163,6 +163,11 @@ pub(crate) fn open(path: &Path) -> Result<(File, Fault), OpenError> {
     }
 }
 
+/// Writes a file; to any place through one type, since the library would be compiled once more for each.
+pub(crate) fn write_to(file: FileBuilder, mut place: &mut dyn Write) -> Result<(), Error> {
+    file.finish_to(&mut place)
+}
+
 /// Bytes of a dataset's values, at least as many as they take as doubles.
 pub(crate) fn declared_bytes(dataset: &Dataset) -> Result<u64, Error> {
     let size = dataset.element_size()?.max(8);
@@ -217,7 +222,7 @@ impl Skeleton {
     ) -> io::Result<Option<Vec<u64>>> {
         let offsets = vec![None; self.lengths.len()];
         let mut sink = Sink { lengths: &self.lengths, file, at: 0, offsets, others: Vec::new() };
-        builder.finish_to(&mut sink).map_err(io::Error::other)?;
+        write_to(builder, &mut sink).map_err(io::Error::other)?;
         for (number, offset) in sink.offsets.iter_mut().enumerate() {
             let find = |(at, bytes): &(u64, Vec<u8>)| {
                 memchr::memmem::find(bytes, &mark(number)).map(|found| at + found as u64)
