@@ -1319,6 +1319,19 @@ fn the_peak_at_the_contact_is_kept() {
     }
 }
 
+/// Speeds that nearly repeat one another are left out together: they are one end of a gap, and no gap themselves.
+#[test]
+fn gaps_are_between_speeds_that_differ() {
+    let cases = family(&[7.0, 10.0, 10.04, 17.0, 20.0]);
+    let set = TrainingSet::new("made", &cases).unwrap();
+    let kinds = [ModelKind::linear(), ModelKind::rate()];
+    let found = validate("made", &cases, &kinds, Selection::Named("linear")).unwrap();
+    let between: Vec<(f64, f64)> = gaps(&set, &found).iter().map(|g| g.between_m_per_s).collect();
+    let gap = |low, high| between.iter().position(|of| *of == (low, high));
+    assert!(between.len() == 3 && gap(7.0, 10.0).is_some() && gap(17.0, 20.0).is_some());
+    assert_eq!(gap(10.04, 17.0), Some(0), "the widest takes most: {between:?}");
+}
+
 /// A front whose second stage begins at another deflection at each speed.
 #[test]
 fn a_front_in_two_stages_is_predicted_by_its_events() {

@@ -36,6 +36,32 @@ fn target_of(law: &Nsdm) -> Target {
     Target::new(MASS_KG, SPEED_M_PER_S, time_s, motion.v_m_per_s, motion.a_m_per_s2).unwrap()
 }
 
+/// The bounds are those of rail vehicles; a toy that moves alike in a tenth of the time is fitted as one of them.
+#[test]
+fn light_masses_are_fitted_as_heavy_ones() {
+    let (law, settings) = (known(), short());
+    let heavy = fit(&target_of(&law), &settings, 7).unwrap();
+    let (mass, rate) = (1e-4, 10.0);
+    let time_s = times(200);
+    let of = law.run(MASS_KG, SPEED_M_PER_S, &time_s).unwrap();
+    let times = |values: &[f64], by: f64| values.iter().map(|value| value * by).collect::<Vec<_>>();
+    let light = Target::new(
+        MASS_KG * mass,
+        SPEED_M_PER_S * rate,
+        times(&time_s, 1.0 / rate),
+        times(&of.v_m_per_s, rate),
+        times(&of.a_m_per_s2, rate * rate),
+    );
+    let light = fit(&light.unwrap(), &settings, 7).unwrap();
+    let close = |a: &[f64], b: &[f64], by: f64| {
+        a.iter().zip(b).all(|(a, b)| (a - b * by).abs() <= 1e-3 * (b * by).abs())
+    };
+    let (a, b) = (&light.model, &heavy.model);
+    assert!(close(a.stiffness.values(), b.stiffness.values(), mass * rate * rate), "{a:?} {b:?}");
+    assert!(close(a.damping.values(), b.damping.values(), mass * rate), "{a:?} {b:?}");
+    assert!((light.acceleration_l1 / heavy.acceleration_l1 - 1.0).abs() < 1e-3);
+}
+
 fn short() -> FitSettings {
     FitSettings {
         population: 40,

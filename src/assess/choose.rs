@@ -13,7 +13,7 @@
 use schemars::JsonSchema;
 use serde::Serialize;
 
-use crate::dataset::TrainingSet;
+use crate::dataset::{TrainingSet, is_within, nearly_same};
 use crate::plural::counted;
 use crate::surrogate::leave_one_out::{LeftOut, Means, Validation};
 use crate::surrogate::max_crush::MaxCrushRule;
@@ -201,34 +201,35 @@ impl Gap {
 ///
 /// A left-out speed is predicted over the gap that its absence leaves; the error expected
 /// in the middle of a gap is that of the speeds at its ends, relative to the gaps. Gaps at
-/// the ends of the range have one such speed.
+/// the ends of the range have one such speed. Speeds that nearly repeat one another, which are left out together, are one.
 pub fn gaps(set: &TrainingSet, validation: &Validation) -> Vec<Gap> {
-    let mut speeds: Vec<f64> = set.cases.iter().map(|c| c.speed_m_per_s).collect();
-    speeds.dedup();
-    let error_at = |v: f64| {
+    let speeds = set.speeds_m_per_s();
+    let mut ends: Vec<(f64, f64)> = speeds.iter().map(|v| nearly_same(&speeds, *v)).collect();
+    ends.dedup_by(|next, before| is_within(next.0, *before));
+    let error_at = |of: (f64, f64)| {
         let rows = validation.rows.iter();
         let of_chosen = rows.filter(|r| r.model == validation.chosen && r.inner);
         let errors: Vec<f64> =
-            of_chosen.filter(|r| r.speed_m_per_s == v).map(|r| r.force_l1).collect();
+            of_chosen.filter(|r| is_within(r.speed_m_per_s, of)).map(|r| r.force_l1).collect();
         (!errors.is_empty()).then(|| errors.iter().sum::<f64>() / errors.len() as f64)
     };
     let switches = Model::fit(set, ModelKind::linear());
     let switches = switches.map(|model| model.mode_switches_m_per_s).unwrap_or_default();
     let gap = |i: usize| {
-        let width = speeds[i + 1] - speeds[i];
+        let (low, high) = (ends[i].1, ends[i + 1].0);
         let from = |k: usize| {
-            let whole = speeds.get(k + 1)? - speeds[k.checked_sub(1)?];
-            Some(error_at(speeds[k])? * width / whole)
+            let whole = ends.get(k + 1)?.0 - ends[k.checked_sub(1)?].1;
+            Some(error_at(ends[k])? * (high - low) / whole)
         };
-        let ends: Vec<f64> = [from(i), from(i + 1)].into_iter().flatten().collect();
+        let known: Vec<f64> = [from(i), from(i + 1)].into_iter().flatten().collect();
         Gap {
-            between_m_per_s: (speeds[i], speeds[i + 1]),
-            expected_force_l1: (!ends.is_empty())
-                .then(|| ends.iter().sum::<f64>() / ends.len() as f64),
-            mode_switch: switches.contains(&(speeds[i], speeds[i + 1])),
+            between_m_per_s: (low, high),
+            expected_force_l1: (!known.is_empty())
+                .then(|| known.iter().sum::<f64>() / known.len() as f64),
+            mode_switch: switches.contains(&(low, high)),
         }
     };
-    let mut gaps: Vec<Gap> = (0..speeds.len().saturating_sub(1)).map(gap).collect();
+    let mut gaps: Vec<Gap> = (0..ends.len().saturating_sub(1)).map(gap).collect();
     gaps.sort_by(|a, b| {
         let (a, b) = (a.rank(), b.rank());
         (b.0, b.1).cmp(&(a.0, a.1)).then(b.2.total_cmp(&a.2))
@@ -247,7 +248,7 @@ pub(crate) fn next_run(set: &TrainingSet, validation: &Validation) -> Option<Nex
             km_per_h(high)
         ),
         Some(error) => format!(
-            "of all intervals between training speeds, the one from {} to {} has the largest expected force error ({:.1} %), estimated from the errors at its two ends when left out",
+            "of all intervals between training speeds, the one from {} to {} has the largest expected force error ({:.1} %), estimated from the errors at those of its ends that were left out between others",
             km_per_h(low),
             km_per_h(high),
             error * 100.0

@@ -33,6 +33,9 @@ pub struct Reference {
     acceleration_filtered: Vec<f64>,
 }
 
+/// A body that has not stopped after so many windows is not followed further.
+pub(super) const MOST_WINDOWS: f64 = 16.0;
+
 /// Errors of a multi-body run against FE, from contact to 30 ms after FE's maximum
 /// deflection, as `Σ|p − r|/Σ|r|`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -87,7 +90,8 @@ impl Reference {
         self.is_cut
     }
 
-    /// Runs one body of the case's effective mass against a wall with a force curve.
+    /// Runs one body of the case's effective mass against a wall with a force curve, until the window is over and the body has
+    /// stopped, or for 16 windows.
     ///
     /// # Errors
     /// If the curve makes no run.
@@ -98,8 +102,16 @@ impl Reference {
         let chain = Chain::new(vec![body], vec![interface])?;
         let output_interval_s = self.time_s[1] - self.time_s[0];
         // One output more than is compared, so that rounding cannot make it too short.
-        let duration_s = self.time_s[self.time_s.len() - 1] + 1.5 * output_interval_s;
-        simulate(&chain, &RunSettings::new(duration_s, output_interval_s))
+        let mut duration_s = self.time_s[self.time_s.len() - 1] + 1.5 * output_interval_s;
+        let most_s = MOST_WINDOWS * duration_s;
+        loop {
+            let run = simulate(&chain, &RunSettings::new(duration_s, output_interval_s))?;
+            let is_closing = run.bodies[0].v_m_per_s.last().is_some_and(|v| *v > 0.0);
+            if !is_closing || duration_s >= most_s {
+                return Ok(run);
+            }
+            duration_s *= 2.0;
+        }
     }
 
     /// Errors of the one-mass run that a force curve gives.

@@ -7,10 +7,11 @@ use serde::Serialize;
 
 use super::left_out::{STEPS, forces_n};
 use super::methods::{FittedNsdm, Method, Times};
-use super::reference::Reference;
+use super::reference::{MOST_WINDOWS, Reference};
 use crate::curve::{ForceKind, is_beyond};
 use crate::dataset::grid;
 use crate::error::Error;
+use crate::nsdm::{self, Nsdm};
 use crate::rating::acceptance::Acceptance;
 use crate::rating::{Quantity, Rating, RatingSettings, Signal, rate};
 use crate::signal::l1_ratio;
@@ -83,9 +84,14 @@ struct Motion<'a> {
     velocity: &'a [f64],
     peak_force_n: f64,
     max_crush_m: f64,
+    /// Kinetic and stored energy at the end of the window, or when the body stops if that is later, over the initial energy.
+    left: f64,
     /// Time of the run, in s.
     simulation_s: f64,
 }
+
+/// The motion on spring and damper is looked at so many times in each interval of the reference.
+const FINER: usize = 8;
 
 impl RowBuilder<'_> {
     /// The row of a method with a curve.
@@ -96,10 +102,14 @@ impl RowBuilder<'_> {
         let data_end_m = Some(curve.data_end_m.unwrap_or(curve.loading.end_m()));
         let simulation_s = start.elapsed().as_secs_f64();
         let velocity = self.reference.velocity_of(&run)?;
+        let (v, stored_j) = (&run.bodies[0].v_m_per_s, &run.interfaces[0].stored_j);
+        let window = run.time_s.partition_point(|t| *t < self.reference.window_s());
+        let at = (window..v.len() - 1).find(|k| v[*k] <= 0.0).unwrap_or(v.len() - 1);
         let motion = Motion {
             velocity: &velocity,
             peak_force_n: run.interfaces[0].peak_force_n,
             max_crush_m: run.interfaces[0].max_deflection_m,
+            left: self.left(v[at], stored_j[at]),
             simulation_s,
         };
         let along = grid(truth.end_m(), STEPS);
@@ -113,12 +123,16 @@ impl RowBuilder<'_> {
         let reference = self.reference;
         let start = Instant::now();
         let (mass, speed) = (reference.mass_kg(), reference.speed_m_per_s());
-        let motion = fitted.best().model.run(mass, speed, reference.time_s())?;
+        let law = &fitted.best().model;
+        let motion = law.run(mass, speed, reference.time_s())?;
+        let simulation_s = start.elapsed().as_secs_f64();
+        let (finer, at) = self.until_it_stops(law)?;
         let motion = Motion {
             velocity: &motion.v_m_per_s,
-            peak_force_n: motion.a_m_per_s2.iter().map(|a| -a * mass).fold(0.0, f64::max),
-            max_crush_m: motion.x_m.iter().copied().fold(0.0, f64::max),
-            simulation_s: start.elapsed().as_secs_f64(),
+            peak_force_n: finer.a_m_per_s2.iter().map(|a| -a * mass).fold(0.0, f64::max),
+            max_crush_m: finer.x_m.iter().copied().fold(0.0, f64::max),
+            left: self.left(finer.v_m_per_s[at], law.envelope()?.work_to(finer.x_m[at].abs())),
+            simulation_s,
         };
         let times = Times {
             // All seeds: one alone would not say which is best.
@@ -129,13 +143,36 @@ impl RowBuilder<'_> {
         self.rated("nsdm", fitted.made_from.clone(), None, motion, times)
     }
 
-    /// Of one mass, which has all of the energy at first; the force is the mean that stops it.
-    fn acceptance(&self, velocity: &[f64], max_crush_m: f64) -> Acceptance {
+    /// The motion on spring and damper, and its state at the end of the window, or where the body stops if that is later.
+    fn until_it_stops(&self, law: &Nsdm) -> Result<(nsdm::Motion, usize), Error> {
         let reference = self.reference;
-        let last = |speeds: &[f64]| speeds.last().map_or(0.0, |v| v / reference.speed_m_per_s());
-        let (fe, ours) = (last(&reference.velocity()[..velocity.len()]), last(velocity));
+        let (mass, speed) = (reference.mass_kg(), reference.speed_m_per_s());
+        let interval_s = (reference.time_s()[1] - reference.time_s()[0]) / FINER as f64;
+        let window = (reference.window_s() / interval_s).round() as usize;
+        let mut states = window + 1;
+        loop {
+            let time_s: Vec<f64> = (0..=states).map(|k| k as f64 * interval_s).collect();
+            let motion = law.run(mass, speed, &time_s)?;
+            let stops = (window..=states).find(|k| motion.v_m_per_s[*k] <= 0.0);
+            if stops.is_some() || states as f64 > MOST_WINDOWS * window as f64 {
+                return Ok((motion, stops.unwrap_or(states)));
+            }
+            states *= 2;
+        }
+    }
+
+    /// Kinetic and stored energy over the initial energy.
+    fn left(&self, v_m_per_s: f64, stored_j: f64) -> f64 {
+        let speed = self.reference.speed_m_per_s();
+        let initial_j = 0.5 * self.reference.mass_kg() * speed * speed;
+        (v_m_per_s / speed).powi(2) + stored_j / initial_j
+    }
+
+    /// Of one mass, which has all of the energy at first; the force is the mean that stops it. FE's structure gives nothing more back.
+    fn acceptance(&self, left: f64, max_crush_m: f64) -> Acceptance {
+        let fe = self.left(self.reference.velocity()[self.reference.inside() - 1], 0.0);
         let crush = max_crush_m / self.max_crush_m;
-        Acceptance::of(fe * fe - ours * ours, crush - 1.0, 1.0 / crush - 1.0)
+        Acceptance::of(fe - left, crush - 1.0, 1.0 / crush - 1.0)
     }
 
     fn rated(
@@ -146,7 +183,7 @@ impl RowBuilder<'_> {
         motion: Motion<'_>,
         times: Times,
     ) -> Result<Row, Error> {
-        let Motion { velocity, peak_force_n, max_crush_m, simulation_s } = motion;
+        let Motion { velocity, peak_force_n, max_crush_m, left, simulation_s } = motion;
         let reference = self.reference;
         let inside = reference.inside();
         let errors = reference.errors_of(velocity);
@@ -171,7 +208,7 @@ impl RowBuilder<'_> {
             peak_force_n,
             max_crush_m,
             data_end_m: None,
-            acceptance: self.acceptance(&velocity[..inside], max_crush_m),
+            acceptance: self.acceptance(left, max_crush_m),
             fit_time_s: times.fit_s,
             predict_time_s: times.predict_s,
             simulation_time_s: simulation_s,

@@ -164,8 +164,8 @@ pub(crate) fn open(path: &Path) -> Result<(File, Fault), OpenError> {
 }
 
 /// Writes a file; to any place through one type, since the library would be compiled once more for each.
-pub(crate) fn write_to(file: FileBuilder, mut place: &mut dyn Write) -> Result<(), Error> {
-    file.finish_to(&mut place)
+pub(crate) fn write_to(file: FileBuilder, place: &mut dyn Write) -> Result<(), Error> {
+    file.finish_to(place)
 }
 
 /// Bytes of a dataset's values, at least as many as they take as doubles.

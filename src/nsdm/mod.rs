@@ -40,10 +40,15 @@ pub use law::{Identifiability, Nsdm, PiecewiseLinear};
 pub use motion::Motion;
 use motion::Steps;
 
-/// Bounds of the stiffness at its nodes, in N/m; searched evenly in the logarithm.
+/// Bounds of the stiffness at its nodes, in N/m, for rail vehicles; searched evenly in the logarithm. A mass below 7.6 or above 75 t, or a
+/// speed over crush below 6.4 or above 63 1/s, is fitted as one of 24 t and 20 1/s with so many tens less or more, and the law
+/// scaled back.
 pub const STIFFNESS_N_PER_M: [f64; 2] = [1e5, 1e8];
-/// Bounds of the damping at its nodes, in N s/m.
+/// Bounds of the damping at its nodes, in N s/m, for the same.
 pub const DAMPING_N_S_PER_M: [f64; 2] = [0.0, 5e5];
+/// Mass, and speed over crush, that the bounds are meant for: the lead car's.
+const USUAL_MASS_KG: f64 = 24e3;
+const USUAL_RATE_PER_S: f64 = 20.0;
 /// Objective of a law that diverges: larger than any other, and comparable.
 const PENALTY: f64 = f64::MAX;
 /// One in this many of the first population begins at least squares, if requested.
@@ -122,6 +127,19 @@ impl Target {
             displacement_m,
             largest_m,
         })
+    }
+
+    /// The same motion of a mass that is so many times lighter, in a time that runs so many times slower.
+    fn scaled(&self, mass: f64, rate: f64) -> Self {
+        let over = |values: &[f64], by: f64| values.iter().map(|value| value / by).collect();
+        Self {
+            mass_kg: self.mass_kg / mass,
+            speed_m_per_s: self.speed_m_per_s / rate,
+            time_s: self.time_s.iter().map(|t| t * rate).collect(),
+            velocity: over(&self.velocity, rate),
+            acceleration: over(&self.acceleration, rate * rate),
+            ..self.clone()
+        }
     }
 
     /// Displacement at each time, in m.
@@ -235,6 +253,11 @@ pub fn fit(target: &Target, settings: &FitSettings, seed: u64) -> Result<Fit, Er
             "the weight of the velocity is {weight_per_s2} 1/s²: expected a finite number of 0 or more"
         ));
     }
+    let tens = |ratio: f64| libm::pow(10.0, libm::round(libm::log10(ratio)));
+    let mass = tens(target.mass_kg / USUAL_MASS_KG);
+    let rate = tens(target.speed_m_per_s / target.largest_m / USUAL_RATE_PER_S);
+    let (asked, target) = (target, &target.scaled(mass, rate));
+    let weight_per_s2 = weight_per_s2 / (rate * rate);
     let steps = Steps::new(&target.time_s)?;
     let objective = |genes: &Genes| target.objective(genes, &steps, weight_per_s2);
     let start = first_individuals(target, settings, seed);
@@ -244,20 +267,21 @@ pub fn fit(target: &Target, settings: &FitSettings, seed: u64) -> Result<Fit, Er
         return Err(error!(
             Comparison,
             "the motion of {mass_kg} kg is not finite: it is too light for this spring or damper",
-            mass_kg = target.mass_kg
+            mass_kg = asked.mass_kg
         ));
     }
-    let model = target.scales().law(&best.genes)?;
-    let motion = model.run(target.mass_kg, target.speed_m_per_s, &target.time_s)?;
+    let model = target.scales().law(&best.genes)?.scaled(mass, rate);
+    let motion = model.run(asked.mass_kg, asked.speed_m_per_s, &asked.time_s)?;
+    let in_m2_per_s4 = |of: f64| (of * (rate * rate * rate * rate)).min(PENALTY);
     Ok(Fit {
         model,
         seed,
-        objective: best.objective,
-        velocity_l1: l1_ratio(&target.velocity, &motion.v_m_per_s),
-        acceleration_l1: l1_ratio(&target.acceleration, &motion.a_m_per_s2),
+        objective: in_m2_per_s4(best.objective),
+        velocity_l1: l1_ratio(&asked.velocity, &motion.v_m_per_s),
+        acceleration_l1: l1_ratio(&asked.acceleration, &motion.a_m_per_s2),
         evaluations: evolved.evaluations + used,
         generations,
-        history: evolved.history,
+        history: evolved.history.into_iter().map(in_m2_per_s4).collect(),
     })
 }
 

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use super::figure::Figure;
 use super::{
     Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, ToDo, Verdict, energy, force,
-    mass, metres, percent, signed_percent,
+    mass, metres, percent,
 };
 use crate::assess::choose::{Purpose, Selection, next_run};
 use crate::assess::compare::{Comparison, case_named, compare, has_all, inner_cases, mean};
@@ -150,7 +150,10 @@ fn runs(cases: &[Case]) -> impl Into<Table> {
     });
     table
         .column("peak force", |case| force(case.peak_force_n()))
-        .column("maximum crush", |case| metres(case.max_deflection_m()))
+        .column("maximum crush", |case| {
+            let truncated = if case.is_truncated() { " (truncated)" } else { "" };
+            metres(case.max_deflection_m()) + truncated
+        })
         .column("work", |case| energy(case.quality.audit.work_j))
         .column("work / energy", |case| format!("{:.3}", case.quality.audit.ratio()))
         .column("warnings", |case| {
@@ -389,15 +392,13 @@ impl Validated<'_> {
         let rows = first.rows.iter().filter(|row| has_all(&comparisons, &row.method));
         let rows: Vec<&Row> = rows.collect();
         let mean = |row: &Row, of: fn(&Row) -> f64| mean(&comparisons, &row.method, of);
-        let crush_m = comparisons.iter().map(|c| c.reference_max_crush_m).sum::<f64>();
-        let crush_m = crush_m / comparisons.len() as f64;
         let table = Table::of(&rows)
             .column("method", |row| &row.method)
             .column("driven by", |row| row.driven_by.map_or("spring and damper", ForceKind::name))
             .column("velocity", |row| percent(mean(row, |r| r.velocity_l1)))
             .column("acceleration (CFC 60)", |row| percent(mean(row, |r| r.acceleration_l1)))
             .column("maximum crush", |row| {
-                signed_percent(mean(row, |r| r.max_crush_m) / crush_m - 1.0)
+                percent(mean(row, |r| r.acceptance.displacement_error.map_or(f64::NAN, f64::abs)))
             })
             .column("within 10 %", |row| {
                 let all = comparisons.iter().flat_map(|c| &c.rows);
@@ -444,7 +445,7 @@ fn methods_explained(nsdm_seeds: u64) -> String {
         _ => " nsdm: a spring and damper fitted by a genetic algorithm to that run.",
     };
     format!(
-        "fe: FE's own contact force at the left-out speed, the floor for predictions of it; fe_body: the force that FE's speeds imply, a check. fdrm: FE's curve of the nearest other speed, its last force held beyond its data.{nsdm} ddtcm: the reference method's forest. best: the model chosen by leaving speeds out."
+        "fe: FE's own force of the recipe at the left-out speed, the floor for predictions of it; fe_body: the force that FE's speeds imply, a check where that is another. fdrm: FE's curve of the nearest other speed, its last force held beyond its data.{nsdm} ddtcm: the reference method's forest. best: the model chosen by leaving speeds out."
     )
 }
 

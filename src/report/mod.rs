@@ -349,11 +349,6 @@ fn percent(share: f64) -> String {
     if share.is_finite() { format!("{:.1} %", 100.0 * share) } else { "–".into() }
 }
 
-/// `−4.5 %`, `+4.5 %`.
-fn signed_percent(share: f64) -> String {
-    format!("{:+.1} %", 100.0 * share).replace('-', "−")
-}
-
 /// `3.214 MN`.
 fn force(force_n: f64) -> String {
     Shown::force(force_n).text(force_n)

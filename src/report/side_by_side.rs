@@ -35,6 +35,7 @@ pub(super) fn add_designs(content: &mut Content, designs: &[Design]) {
             let masses = iter::once(of.curve.mass_kg).chain(of.curve.other_mass_kg());
             masses.map(mass).collect::<Vec<_>>().join(" against ")
         })
+        .column("force", |of| of.curve.provenance.force_kind.name())
         .column("peak force", |of| force(of.curve.peak_force_n()))
         .column("maximum crush", |of| metres(of.curve.max_deflection_m))
         .column("energy", |of| energy(of.curve.energy_j));
@@ -48,7 +49,7 @@ pub(super) fn add_designs(content: &mut Content, designs: &[Design]) {
     if !differ.is_empty() {
         let differ = differ.join(" and ");
         let text =
-            format!("Not all of these curves are for the same impact: they differ in {differ}.");
+            format!("These curves cannot be compared point by point: they differ in {differ}.");
         parts.insert(0, Part::Text(text));
     }
     let (id, title) = ("designs".into(), "Designs side by side".into());
@@ -63,10 +64,12 @@ fn differences(curves: &[&PredictedCurve]) -> Vec<&'static str> {
     if curves.iter().any(|curve| curve.speed_kind != curves[0].speed_kind) {
         return vec!["kind of speed"];
     }
+    let force = |curve: &PredictedCurve| curve.provenance.force_kind;
+    let is_one_force = curves.iter().all(|curve| force(curve) == force(curves[0]));
     let is_one_speed = of_one(|curve| curve.speed_m_per_s);
     let both = |curve: &PredictedCurve| curve.other_mass_kg().unwrap_or(1.0);
     let is_one_mass = of_one(|curve| curve.mass_kg) && of_one(both);
-    let all = [("speed", is_one_speed), ("mass", is_one_mass)];
+    let all = [("force", is_one_force), ("speed", is_one_speed), ("mass", is_one_mass)];
     all.iter().filter(|(_, is_one)| !is_one).map(|(what, _)| *what).collect()
 }
 
