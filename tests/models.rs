@@ -2214,6 +2214,7 @@ fn a_method_without_a_curve_leaves_the_others() {
     assert!(methods.contains(&&Value::from("best")) && !methods.contains(&&Value::from("ddtcm")));
     let missing = found["missing"][0].as_str().unwrap();
     says(missing, "ddtcm has no row: the maximum crush by the spline rule is -");
+    says(found["missing"][1].as_str().unwrap(), "fe has no row: the curve has no times");
     says(
         &String::from_utf8(output.stderr).unwrap(),
         "warning: at 10 km/h (10kmh) ddtcm has no row",
@@ -2302,7 +2303,7 @@ fn cases_of_one_speed_are_distinguished() {
     }
     says(
         &crumple_ok(here, "validate two.h5 --next"),
-        "when left out; run it with the wall_mm whose curve is needed",
+        "left out between others; run it with the wall_mm whose curve is needed",
     );
     let shown = crumple_ok(here, "db show two.h5 --compare --speed 48km/h");
     assert!(shown.lines().any(|l| l.split_whitespace().eq(["wall_mm", "8.075", "9.5"])), "{shown}");

@@ -215,9 +215,6 @@ pub(crate) fn compare(
         report = Some(nsdm_report(&fitted, fixed_case, reference, settings)?);
     }
     let mut missing = Vec::new();
-    if case.moves_by_its_force() {
-        missing.push("fe has no row: the curve has no times, and the errors are against a motion that is made of its own force".to_string());
-    }
     let mut add =
         |name: &str, predict: &dyn Fn() -> Result<Method, Error>, rows_of: &mut Vec<Row>| {
             match predict() {
@@ -229,6 +226,9 @@ pub(crate) fn compare(
     add("ddtcm", &|| methods::ddtcm(&left_out, settings.seed), &mut compared)?;
     let best = || methods::best(&left_out, group, &set.others(cases, speed), settings.seed);
     add("best", &best, &mut compared)?;
+    if case.moves_by_its_force() {
+        missing.push("fe has no row: the curve has no times, and the errors are against a motion that is made of its own force".into());
+    }
 
     Ok(Comparison {
         group: group.into(),
