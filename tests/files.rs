@@ -723,8 +723,11 @@ fn links_of_h5py_alone_are_kept_or_refused() {
              assert f['lead-car-wall'].get('reference', getlink=True).path == '/lead-car-wall/36kmh'\n\
              assert f['lead-car-wall/36kmh'].get('video', getlink=True).filename == 'video.h5'");
     }
-    let copied = crumple_fails(here, 3, "db copy curves.h5 --case 36kmh --to other.h5 --strict");
-    says(&copied, "does not copy: soft and external links, if it has any");
+    let copied = crumple_ok(here, "db copy curves.h5 --case 36kmh --to other.h5 --strict");
+    says(
+        &copied,
+        "note: another program has edited curves.h5: soft and external links in it, if any, are not copied",
+    );
     // With more, the group's links move into a heap, where they cannot be edited.
     run("f = h5py.File('curves.h5', 'a')\n\
          for k in range(8): f['lead-car-wall'][f'l{k}'] = h5py.SoftLink('/x')");

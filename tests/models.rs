@@ -2303,7 +2303,7 @@ fn cases_of_one_speed_are_distinguished() {
     }
     says(
         &crumple_ok(here, "validate two.h5 --next"),
-        "left out between others; run it with the wall_mm whose curve is needed",
+        "errors at its inner ends; run it with the wall_mm whose curve is needed",
     );
     let shown = crumple_ok(here, "db show two.h5 --compare --speed 48km/h");
     assert!(shown.lines().any(|l| l.split_whitespace().eq(["wall_mm", "8.075", "9.5"])), "{shown}");

@@ -36,30 +36,29 @@ fn target_of(law: &Nsdm) -> Target {
     Target::new(MASS_KG, SPEED_M_PER_S, time_s, motion.v_m_per_s, motion.a_m_per_s2).unwrap()
 }
 
-/// The bounds are those of rail vehicles; a toy that moves alike in a tenth of the time is fitted as one of them.
+/// The bounds are those of rail vehicles; others that move alike are fitted as one of them, just outside as well.
 #[test]
-fn light_masses_are_fitted_as_heavy_ones() {
+fn light_and_slow_masses_are_fitted_as_usual_ones() {
     let (law, settings) = (known(), short());
-    let heavy = fit(&target_of(&law), &settings, 7).unwrap();
-    let (mass, rate) = (1e-4, 10.0);
+    let usual = target_of(&law);
+    let heavy = fit(&usual, &settings, 7).unwrap();
+    let largest_m = usual.displacement_m().iter().copied().fold(0.0, f64::max);
+    let slow = 6.25 / (SPEED_M_PER_S / largest_m);
     let time_s = times(200);
     let of = law.run(MASS_KG, SPEED_M_PER_S, &time_s).unwrap();
     let times = |values: &[f64], by: f64| values.iter().map(|value| value * by).collect::<Vec<_>>();
-    let light = Target::new(
-        MASS_KG * mass,
-        SPEED_M_PER_S * rate,
-        times(&time_s, 1.0 / rate),
-        times(&of.v_m_per_s, rate),
-        times(&of.a_m_per_s2, rate * rate),
-    );
-    let light = fit(&light.unwrap(), &settings, 7).unwrap();
-    let close = |a: &[f64], b: &[f64], by: f64| {
-        a.iter().zip(b).all(|(a, b)| (a - b * by).abs() <= 1e-3 * (b * by).abs())
-    };
-    let (a, b) = (&light.model, &heavy.model);
-    assert!(close(a.stiffness.values(), b.stiffness.values(), mass * rate * rate), "{a:?} {b:?}");
-    assert!(close(a.damping.values(), b.damping.values(), mass * rate), "{a:?} {b:?}");
-    assert!((light.acceleration_l1 / heavy.acceleration_l1 - 1.0).abs() < 1e-3);
+    for (mass, rate) in [(1e-4, 10.0), (7.5 / 24.0, slow), (76.0 / 24.0, slow), (1.0, 100.0)] {
+        let other = Target::new(
+            MASS_KG * mass,
+            SPEED_M_PER_S * rate,
+            times(&time_s, 1.0 / rate),
+            times(&of.v_m_per_s, rate),
+            times(&of.a_m_per_s2, rate * rate),
+        );
+        let fitted = fit(&other.unwrap(), &settings, 7).unwrap();
+        let errors = (fitted.velocity_l1, heavy.velocity_l1);
+        assert!(errors.0 < 1.5 * errors.1 + 0.01, "{mass} {rate}: {errors:?}");
+    }
 }
 
 fn short() -> FitSettings {

@@ -205,7 +205,11 @@ impl Gap {
 pub fn gaps(set: &TrainingSet, validation: &Validation) -> Vec<Gap> {
     let speeds = set.speeds_m_per_s();
     let mut ends: Vec<(f64, f64)> = speeds.iter().map(|v| nearly_same(&speeds, *v)).collect();
-    ends.dedup_by(|next, before| is_within(next.0, *before));
+    ends.dedup_by(|next, before| {
+        let is_one = is_within(next.0, *before);
+        before.1 = if is_one { before.1.max(next.1) } else { before.1 };
+        is_one
+    });
     let error_at = |of: (f64, f64)| {
         let rows = validation.rows.iter();
         let of_chosen = rows.filter(|r| r.model == validation.chosen && r.inner);
@@ -248,7 +252,7 @@ pub(crate) fn next_run(set: &TrainingSet, validation: &Validation) -> Option<Nex
             km_per_h(high)
         ),
         Some(error) => format!(
-            "of all intervals between training speeds, the one from {} to {} has the largest expected force error ({:.1} %), estimated from the errors at those of its ends that were left out between others",
+            "of all intervals between training speeds, the one from {} to {} has the largest expected force error ({:.1} %), estimated from the leave-one-out errors at its inner ends",
             km_per_h(low),
             km_per_h(high),
             error * 100.0

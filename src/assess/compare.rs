@@ -199,6 +199,7 @@ pub(crate) fn compare(
         reference,
         max_crush_m: case.max_deflection_m(),
         fe_time_s: case.provenance.solver_wall_time_s,
+        fe_rebound_m_per_s: left_out.own.motion.rebound_speed_m_per_s,
         training_time_s,
     };
 

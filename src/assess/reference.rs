@@ -35,6 +35,8 @@ pub struct Reference {
 
 /// A body that has not stopped after so many windows is not followed further.
 pub(super) const MOST_WINDOWS: f64 = 16.0;
+/// Nor beyond half the outputs that a run may have.
+const MOST_OUTPUTS: f64 = 5e5;
 
 /// Errors of a multi-body run against FE, from contact to 30 ms after FE's maximum
 /// deflection, as `Σ|p − r|/Σ|r|`.
@@ -103,7 +105,7 @@ impl Reference {
         let output_interval_s = self.time_s[1] - self.time_s[0];
         // One output more than is compared, so that rounding cannot make it too short.
         let mut duration_s = self.time_s[self.time_s.len() - 1] + 1.5 * output_interval_s;
-        let most_s = MOST_WINDOWS * duration_s;
+        let most_s = (MOST_WINDOWS * duration_s).min(MOST_OUTPUTS * output_interval_s);
         loop {
             let run = simulate(&chain, &RunSettings::new(duration_s, output_interval_s))?;
             let is_closing = run.bodies[0].v_m_per_s.last().is_some_and(|v| *v > 0.0);

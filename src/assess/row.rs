@@ -74,6 +74,8 @@ pub(super) struct RowBuilder<'a> {
     /// FE's maximum deflection, in m.
     pub max_crush_m: f64,
     pub fe_time_s: Option<f64>,
+    /// Speed in m/s with which FE's body leaves; `None` if the record ends before.
+    pub fe_rebound_m_per_s: Option<f64>,
     /// Of all runs that curves are trained on.
     pub training_time_s: Option<f64>,
 }
@@ -92,6 +94,8 @@ struct Motion<'a> {
 
 /// The motion on spring and damper is looked at so many times in each interval of the reference.
 const FINER: usize = 8;
+/// And no further than for so many states.
+const MOST_STATES: usize = 1_000_000;
 
 impl RowBuilder<'_> {
     /// The row of a method with a curve.
@@ -105,11 +109,14 @@ impl RowBuilder<'_> {
         let (v, stored_j) = (&run.bodies[0].v_m_per_s, &run.interfaces[0].stored_j);
         let window = run.time_s.partition_point(|t| *t < self.reference.window_s());
         let at = (window..v.len() - 1).find(|k| v[*k] <= 0.0).unwrap_or(v.len() - 1);
+        // Of a curve that is followed back nothing says what the structure returns; nor of FE, if its record ends before.
+        let is_known = self.fe_rebound_m_per_s.is_some();
+        let counts = is_known && run.interfaces[0].dissipated_at_end_j > 0.0;
         let motion = Motion {
             velocity: &velocity,
             peak_force_n: run.interfaces[0].peak_force_n,
             max_crush_m: run.interfaces[0].max_deflection_m,
-            left: self.left(v[at], stored_j[at]),
+            left: self.left(v[at], if counts { stored_j[at] } else { 0.0 }),
             simulation_s,
         };
         let along = grid(truth.end_m(), STEPS);
@@ -154,7 +161,8 @@ impl RowBuilder<'_> {
             let time_s: Vec<f64> = (0..=states).map(|k| k as f64 * interval_s).collect();
             let motion = law.run(mass, speed, &time_s)?;
             let stops = (window..=states).find(|k| motion.v_m_per_s[*k] <= 0.0);
-            if stops.is_some() || states as f64 > MOST_WINDOWS * window as f64 {
+            let is_long = states as f64 > MOST_WINDOWS * window as f64 || states > MOST_STATES;
+            if stops.is_some() || is_long {
                 return Ok((motion, stops.unwrap_or(states)));
             }
             states *= 2;
@@ -168,9 +176,11 @@ impl RowBuilder<'_> {
         (v_m_per_s / speed).powi(2) + stored_j / initial_j
     }
 
-    /// Of one mass, which has all of the energy at first; the force is the mean that stops it. FE's structure gives nothing more back.
+    /// Of one mass, which has all of the energy at first; the force is the mean that stops it. FE's body may still be leaving when the
+    /// window is over.
     fn acceptance(&self, left: f64, max_crush_m: f64) -> Acceptance {
-        let fe = self.left(self.reference.velocity()[self.reference.inside() - 1], 0.0);
+        let last = self.reference.velocity()[self.reference.inside() - 1].abs();
+        let fe = self.left(self.fe_rebound_m_per_s.map_or(last, |v| v.max(last)), 0.0);
         let crush = max_crush_m / self.max_crush_m;
         Acceptance::of(fe - left, crush - 1.0, 1.0 / crush - 1.0)
     }

@@ -29,14 +29,15 @@ use super::{CommandResult, GlobalOptions, Outcome, usage};
   crumple compare curves.h5 --group lead-car-wall                 # every inner speed, and means
   crumple compare curves.h5 --group lead-car-wall --fixed-speed 36km/h --nsdm-start least-squares
   crumple compare --train train-set.toml
-Rows: fe is FE's own force of the recipe in the one-mass model, the floor for predictions of it;
+Rows: fe is FE's own force, as the recipe extracted it, in the one-mass model: the floor for its
+predictions;
 fe_body is derived from FE's own speeds, unfiltered, and checks that curve, force law and run agree;
 fdrm is FE's curve at one other speed; nsdm is the spring and damper fitted to that run; ddtcm is
 the reference method's random forest and spline; best is the model chosen by leaving speeds out,
 without this one, driven by its body force. Errors are sum|p-r|/sum|r| from contact to 30 ms after
 FE's maximum crush; accelerations are filtered with CFC 60, unfiltered in brackets. --json has
-every measure, of one case at --speed as a document, else in its list comparisons; those of velocity and
-acceleration are evaluated at 10 kHz, as by crumple rate.
+every measure: as one document if --speed has one case, else in the list comparisons; those of
+velocity and acceleration are evaluated at 10 kHz, as by crumple rate.
 With --train, a scenario whose curves are database cases is run with the curves of each method, and
 the vehicles' speeds are compared with the FE run in its [reference]. rate_live lets the crush
 force follow the closing speeds of the run; split_ends gives each vehicle two ends with the mass

@@ -49,6 +49,18 @@ pub(crate) struct Joined {
     /// What other programs have put into the databases and is not taken along.
     #[serde(skip)]
     pub not_taken: Vec<(PathBuf, String)>,
+    /// Databases that other programs have edited: links in them are not taken along, either.
+    #[serde(skip)]
+    pub edited: Vec<PathBuf>,
+}
+
+impl Joined {
+    fn leave_foreign(&mut self, input: &Path) -> Result<(), Error> {
+        let (items, is_edited) = database::foreign_items(input)?;
+        self.not_taken.extend(items.map(|items| (input.into(), items)));
+        self.edited.extend(is_edited.then(|| input.into()));
+        Ok(())
+    }
 }
 
 /// Joins the databases at `inputs`, in their order, into the file at `output`, which is one of them
@@ -76,8 +88,7 @@ pub(crate) fn merge(
         if is_in(output) || inputs[..k].iter().any(|earlier| is_in(earlier)) {
             continue;
         }
-        let foreign = database::foreign_items(input)?;
-        join.joined.not_taken.extend(foreign.map(|items| (input.clone(), items)));
+        join.joined.leave_foreign(input)?;
         let cases = Database::read(input)?.into_cases();
         let incoming = cases.into_iter().map(|(case, altered)| {
             let from = CasePath::of(&case);
@@ -131,9 +142,7 @@ pub(crate) fn copy(
     }
     let mut join = Join::new(there, on_conflict);
     join.take(path, incoming)?;
-    if let Some(items) = database::foreign_items(path)? {
-        join.joined.not_taken.push((path.into(), items));
-    }
+    join.joined.leave_foreign(path)?;
     join.written(output, dry_run)
 }
 

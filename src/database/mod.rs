@@ -427,13 +427,11 @@ pub(crate) fn remember_origin(case: &mut Case) {
     }
 }
 
-/// What other programs have put into the file at `path`, as a message lists it; `None` if nothing.
-pub(crate) fn foreign_items(path: &Path) -> Result<Option<String>, Error> {
+/// What other programs have put into the file at `path`, as a message lists it; `None` if nothing. And whether they may have put
+/// links into it.
+pub(crate) fn foreign_items(path: &Path) -> Result<(Option<String>, bool), Error> {
     let items = edit::found(&opened::open(path)?)?;
-    let items = (!items.is_empty()).then(|| edit::listed(&items));
-    let links =
-        edit::may_have_links(path)?.then(|| "soft and external links, if it has any".into());
-    Ok(items.into_iter().chain(links).reduce(|items, links: String| format!("{items}; {links}")))
+    Ok(((!items.is_empty()).then(|| edit::listed(&items)), edit::may_have_links(path)?))
 }
 
 /// Whether the file at `path` is a curve database.

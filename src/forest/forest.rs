@@ -273,7 +273,7 @@ fn out_of_bag<F: Float>(
     }
     let count = f64::from(samples.max(1));
     let differ = table.targets.windows(2).any(|pair| pair[0] != pair[1]);
-    let r2 = differ.then(|| 1.0 - error / spread);
+    let r2 = (differ && spread > 0.0).then(|| 1.0 - error / spread);
     OutOfBag { rmse: (error / count).sqrt(), r2, samples: samples as usize }
 }
 

@@ -40,9 +40,8 @@ pub use law::{Identifiability, Nsdm, PiecewiseLinear};
 pub use motion::Motion;
 use motion::Steps;
 
-/// Bounds of the stiffness at its nodes, in N/m, for rail vehicles; searched evenly in the logarithm. A mass below 7.6 or above 75 t, or a
-/// speed over crush below 6.4 or above 63 1/s, is fitted as one of 24 t and 20 1/s with so many tens less or more, and the law
-/// scaled back.
+/// Bounds of the stiffness at its nodes, in N/m, for rail vehicles; searched evenly in the logarithm. A mass below 7.6 or above 76 t is
+/// fitted as one of 24 t, and a speed over crush below 6.3 or above 63 1/s as one of 20 1/s, and the law is scaled back.
 pub const STIFFNESS_N_PER_M: [f64; 2] = [1e5, 1e8];
 /// Bounds of the damping at its nodes, in N s/m, for the same.
 pub const DAMPING_N_S_PER_M: [f64; 2] = [0.0, 5e5];
@@ -253,9 +252,10 @@ pub fn fit(target: &Target, settings: &FitSettings, seed: u64) -> Result<Fit, Er
             "the weight of the velocity is {weight_per_s2} 1/s²: expected a finite number of 0 or more"
         ));
     }
-    let tens = |ratio: f64| libm::pow(10.0, libm::round(libm::log10(ratio)));
-    let mass = tens(target.mass_kg / USUAL_MASS_KG);
-    let rate = tens(target.speed_m_per_s / target.largest_m / USUAL_RATE_PER_S);
+    let is_usual = |ratio: f64| (0.1_f64.sqrt()..=10_f64.sqrt()).contains(&ratio);
+    let scale = |ratio: f64| if is_usual(ratio) { 1.0 } else { ratio };
+    let mass = scale(target.mass_kg / USUAL_MASS_KG);
+    let rate = scale(target.speed_m_per_s / target.largest_m / USUAL_RATE_PER_S);
     let (asked, target) = (target, &target.scaled(mass, rate));
     let weight_per_s2 = weight_per_s2 / (rate * rate);
     let steps = Steps::new(&target.time_s)?;

@@ -445,7 +445,7 @@ fn methods_explained(nsdm_seeds: u64) -> String {
         _ => " nsdm: a spring and damper fitted by a genetic algorithm to that run.",
     };
     format!(
-        "fe: FE's own force of the recipe at the left-out speed, the floor for predictions of it; fe_body: the force that FE's speeds imply, a check where that is another. fdrm: FE's curve of the nearest other speed, its last force held beyond its data.{nsdm} ddtcm: the reference method's forest. best: the model chosen by leaving speeds out."
+        "fe: FE's own force of the recipe at the left-out speed, the floor for predictions of it; fe_body: the force that FE's speeds imply, a check where the two forces differ. fdrm: FE's curve of the nearest other speed, its last force held beyond its data.{nsdm} ddtcm: the reference method's forest. best: the model chosen by leaving speeds out."
     )
 }
 

@@ -127,17 +127,23 @@ pub(crate) fn encoded(head: &[u8]) -> Option<&'static str> {
 
 const UTF_16: &str = "this is UTF-16 text (convert it with iconv -f UTF-16 -t UTF-8)";
 
-/// A title: UTF-8, or else Latin-1, as in decks that were written on Windows.
+/// A title: UTF-8, of which a fixed width may have cut the last character, or else Latin-1, as in decks that were written on
+/// Windows.
 pub(super) fn title(bytes: &[u8]) -> Cow<'_, str> {
+    let bytes = bytes.trim_ascii_end();
     match std::str::from_utf8(bytes) {
         Ok(text) => text.into(),
+        Err(error) if error.error_len().is_none() => {
+            String::from_utf8_lossy(&bytes[..error.valid_up_to()])
+        }
         Err(_) => bytes.iter().map(|&byte| char::from(byte)).collect::<String>().into(),
     }
 }
 
 /// The text of a field of a binary file without its padding; `None` if there is nothing else.
 pub(super) fn unpadded(bytes: &[u8]) -> Option<String> {
-    let text = title(bytes);
+    let end = bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
+    let text = title(&bytes[..end]);
     let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0');
     (!text.is_empty()).then(|| text.to_string())
 }

@@ -106,6 +106,10 @@ fn report(joined: &Joined, path: &Path, dry_run: bool, options: GlobalOptions) -
                 writeln!(out, "{what} {case}{now} (of {from})")?;
             }
         }
+        for edited in &joined.edited {
+            let edited = edited.display();
+            writeln!(out, "note: another program has edited {edited}: soft and external links in it, if any, are not copied")?;
+        }
         writeln!(
             out,
             "{} {database}: {} added, {} replaced, {} already present",

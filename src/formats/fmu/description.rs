@@ -80,7 +80,7 @@ const VARIABLES: [Variable; 9] = [
         reference: UNLOADING_STIFFNESS,
         role: Role::UnloadingStiffness,
         unit: Some("N/m"),
-        description: "Unloading stiffness, above 0",
+        description: "Unloading stiffness: sets the energy returned in unloading; above 0",
     },
     Variable {
         name: "past_knot",

@@ -68,7 +68,7 @@ static TERMS: [Terms; 3] = [
 const OTHERS: &str = "low lo lower high hi upper min max std deviation error tolerance rate target setpoint command nominal soll";
 
 /// Units that make a column `T` that of a temperature, in lower case.
-const OF_TEMPERATURE: &str = "°c ºc c degc k °f degf celsius kelvin";
+const OF_TEMPERATURE: &str = "°c ºc c degc gradc k °f degf celsius kelvin";
 
 /// Whether a word is one of several with blanks between.
 fn is_one(word: &str, of: &str) -> bool {
@@ -105,6 +105,12 @@ impl Quantity {
             Self::Force => units.force(),
             Self::Time => units.time_s,
         }
+    }
+
+    /// Whether a column called `T` is that of a temperature, as `T [°C]`.
+    fn is_temperature(self, unit: &str) -> bool {
+        let unit = unit.to_lowercase().replace(' ', "");
+        self == Self::Time && is_one(&unit, OF_TEMPERATURE)
     }
 
     fn named(name: &str) -> Option<Self> {
@@ -204,15 +210,14 @@ impl Label {
         let text = text.trim().trim_matches('"').trim();
         if let Some((name, unit)) = in_brackets(text) {
             let quantity = Quantity::named(name)?;
-            // `T [°C]` is a temperature.
-            let is_its =
-                quantity != Quantity::Time || !is_one(&unit.to_lowercase(), OF_TEMPERATURE);
-            return is_its.then(|| Self { quantity, unit: Some(unit.into()) });
+            return (!quantity.is_temperature(unit))
+                .then(|| Self { quantity, unit: Some(unit.into()) });
         }
         if let Some((name, unit)) = text.rsplit_once('/')
             && let Some(quantity) = Quantity::named(name)
         {
-            return Some(Self { quantity, unit: Some(unit.trim().into()) });
+            let is_its = !quantity.is_temperature(unit);
+            return is_its.then(|| Self { quantity, unit: Some(unit.trim().into()) });
         }
         if let Some((name, unit)) = text.rsplit_once(['_', ' '])
             && let Some(quantity) = Quantity::named(name)
@@ -338,6 +343,7 @@ mod tests {
         t("Temperature [°C]", None);
         t("T [°C]", None);
         t("T [K]", None);
+        t("T/° C", None);
         t("t [sek]", Some((Time, Some("sek"))));
     }
 }
