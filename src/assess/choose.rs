@@ -48,11 +48,12 @@ pub enum Selection<'a> {
 ///
 /// The default is the first of the `physical` ones, or if there is none, the one with the smallest mean error.
 /// Another takes its place if the mean of the paired differences is larger than their standard deviation, from three speeds on; or, of
-/// fewer, if it is grossly better at each.
+/// fewer, if it is grossly better at each. `what` was left out, in a word.
 pub(crate) fn choose(
     of: &[(&str, Vec<f64>)],
     purpose: Purpose,
     physical: &[&str],
+    what: &str,
 ) -> Option<(String, String)> {
     let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
     let best = of.iter().min_by(|a, b| mean(&a.1).total_cmp(&mean(&b.1)))?;
@@ -76,8 +77,6 @@ pub(crate) fn choose(
         Purpose::Vehicle => "",
         Purpose::Train => ", ends of the range included,",
     };
-    // Where cases differ in more than speed, no model is physical, and a speed may have several of them.
-    let what = if physical.is_some() { "speed" } else { "case" };
     let speeds = format!("{} left out{ends}", counted(default.1.len(), what));
     let share = |other: &[f64]| 100.0 * (mean(other) / mean(&default.1) - 1.0);
     if let Some((name, errors)) = better {
@@ -285,7 +284,7 @@ mod tests {
 
     fn chosen(of: &[(&str, &[f64])]) -> String {
         let of: Vec<(&str, Vec<f64>)> = of.iter().map(|(m, e)| (*m, e.to_vec())).collect();
-        choose(&of, Purpose::Vehicle, &["crush-law", "rate"]).unwrap().0
+        choose(&of, Purpose::Vehicle, &["crush-law", "rate"], "speed").unwrap().0
     }
 
     #[test]
@@ -299,7 +298,7 @@ mod tests {
         assert_eq!(chosen(&[law, ("extra", &[0.8, 1.0])]), "crush-law");
         assert_eq!(chosen(&[law, ("extra", &[0.4, 0.5])]), "extra");
         assert_eq!(chosen(&[("crush-law", &[1.0]), ("extra", &[0.1])]), "crush-law");
-        assert!(choose(&[], Purpose::Vehicle, &["rate"]).is_none());
+        assert!(choose(&[], Purpose::Vehicle, &["rate"], "speed").is_none());
     }
 
     #[test]

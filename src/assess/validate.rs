@@ -420,7 +420,13 @@ impl Tables {
 
     /// The model chosen for a purpose, and why.
     pub(super) fn chosen(&self, purpose: Purpose, physical: &[&str]) -> Option<(String, String)> {
-        choose(&scores(&self.means, &self.rows, purpose), purpose, physical)
+        // Where cases differ in more than speed, a speed may have several of them.
+        let is_repeated = |rows: &[LeftOut]| {
+            let [a, b] = rows else { return false };
+            a.model == b.model && is_same_speed(a.speed_m_per_s, b.speed_m_per_s)
+        };
+        let what = if self.rows.windows(2).any(is_repeated) { "case" } else { "speed" };
+        choose(&scores(&self.means, &self.rows, purpose), purpose, physical, what)
     }
 
     /// Adds residuals at ends of the set without its outermost one and two speeds on either side: two ends would be little evidence.

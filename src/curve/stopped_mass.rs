@@ -27,6 +27,8 @@ pub(crate) struct StoppedMass {
 
 /// The loading branch of a run: contact force in N and closing speed in m/s over the same deflections.
 pub(crate) struct LoadingRun {
+    /// What moves along the deflections.
+    pub mass_kg: f64,
     pub contact_n: Envelope,
     /// An envelope by its shape, not a force.
     pub closing_m_per_s: Envelope,
@@ -57,17 +59,16 @@ const AGREES: f64 = 0.5;
 const MEAN_POINTS: usize = 9;
 
 impl StoppedMass {
-    /// Fits it to the runs of a group; `mass_kg` moves along their deflections. `None` if there are fewer
-    /// than two runs, or more than half of the mass would be stopped.
-    pub(crate) fn fit(runs: &[LoadingRun], mass_kg: f64) -> Option<Self> {
+    /// Fits it to the runs of a group. `None` if there are fewer than two runs, or more than half of the lightest mass would be
+    /// stopped.
+    pub(crate) fn fit(runs: &[LoadingRun]) -> Option<Self> {
         if runs.len() < 2 {
             return None;
         }
         let end_m = runs.iter().map(LoadingRun::end_m).fold(0.0, f64::max);
         let node = |i: usize| end_m * libm::pow(i as f64 / SEGMENTS as f64, SHORTER_AT_TIP);
         let deflection_m: Vec<f64> = (0..=SEGMENTS).map(node).collect();
-        let states: Vec<Vec<(f64, f64)>> =
-            runs.par_iter().map(|run| stopped_by_momentum(run, mass_kg)).collect();
+        let states: Vec<Vec<(f64, f64)>> = runs.par_iter().map(stopped_by_momentum).collect();
         let most_kg_per_m = most_kg_per_m(&deflection_m, runs);
         let rates = rates_kg_per_m(&deflection_m, &states, &most_kg_per_m);
         let mut stopped_kg = vec![0.0];
@@ -76,7 +77,8 @@ impl StoppedMass {
             stopped_kg.push(stopped_kg[i] + rate * step_m);
         }
         let most = stopped_kg[SEGMENTS];
-        if !(most.is_finite() && most < MOST_STOPPED * mass_kg) {
+        let lightest_kg = runs.iter().map(|run| run.mass_kg).fold(f64::INFINITY, f64::min);
+        if !(most.is_finite() && most < MOST_STOPPED * lightest_kg) {
             return None;
         }
         let mut found = Self { deflection_m, stopped_kg, residual_kg: 0.0 };
@@ -164,7 +166,8 @@ impl StoppedMass {
 }
 
 /// Deflection in m and stopped mass in kg along a curve, from its momentum.
-fn stopped_by_momentum(run: &LoadingRun, mass_kg: f64) -> Vec<(f64, f64)> {
+fn stopped_by_momentum(run: &LoadingRun) -> Vec<(f64, f64)> {
+    let LoadingRun { mass_kg, .. } = run;
     let first = run.closing_at(0.0);
     let (mut impulse, mut before) = (0.0, (0.0, run.contact_n.force_at(0.0) / first));
     let mut states = Vec::new();
@@ -261,13 +264,13 @@ mod tests {
         let d: Vec<f64> = (0..=100).map(|i| 0.25 * f64::from(i) / 100.0).collect();
         let closing = d.iter().map(|d| (25.0 - 100.0 * d).max(0.0).sqrt()).collect();
         let contact_n = Envelope::new(d.clone(), vec![1e6; d.len()]).unwrap();
-        LoadingRun { contact_n, closing_m_per_s: Envelope::new(d, closing).unwrap() }
+        LoadingRun { mass_kg: 20e3, contact_n, closing_m_per_s: Envelope::new(d, closing).unwrap() }
     }
 
     #[test]
     fn one_run_tells_none() {
-        assert_eq!(StoppedMass::fit(&[run()], 20e3), None);
-        let found = StoppedMass::fit(&[run(), run()], 20e3).unwrap();
+        assert_eq!(StoppedMass::fit(&[run()]), None);
+        let found = StoppedMass::fit(&[run(), run()]).unwrap();
         assert!(found.is_sound() && found.stopped_kg.len() == SEGMENTS + 1);
         // Half of the speed is left there; nearer to the stop small errors of the speed weigh more.
         assert!(found.at(0.19) < 1.0, "{found:?}");

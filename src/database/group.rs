@@ -41,10 +41,7 @@ pub(super) fn stopped_mass(name: &str, cases: &[Case]) -> Option<StoppedMass> {
     let first = cases.first()?;
     // Looked at before anything is filtered: a group may have thousands of cases.
     let is_uniform = first.curves.force_kind == ForceKind::Contact
-        && cases.iter().all(|c| {
-            c.conditions.masses == first.conditions.masses
-                && c.conditions.parameters == first.conditions.parameters
-        });
+        && cases.iter().all(|c| c.conditions.parameters == first.conditions.parameters);
     let set = is_uniform.then(|| TrainingSet::new(name, cases).ok())??;
     set.stopped_mass().filter(StoppedMass::is_known)
 }

@@ -90,6 +90,11 @@ pub struct TrainingSet {
 }
 
 impl Feature {
+    /// Whether it is a mass of the bodies, and not of the structure.
+    pub(crate) fn is_mass(&self) -> bool {
+        [MASS, OTHER_MASS].contains(&&*self.parameter)
+    }
+
     fn value(&self, parameter: &Parameter) -> Option<f64> {
         match (parameter, &self.category) {
             (Parameter::Number(value), None) => Some(*value),
@@ -566,19 +571,23 @@ const EVEN: f64 = 0.01;
 pub(crate) const STEPS: usize = 200;
 
 impl TrainingSet {
-    /// The mass that is stopped at each deflection, of a group whose runs differ in speed alone and know a
+    /// The mass that is stopped at each deflection, of a group whose runs differ in speed and mass alone and know a
     /// contact force on one body, or between two of the same mass. Its
     /// `is_known` says whether the runs agree on one. A motion that was made of its own force says nothing of it.
     pub(crate) fn stopped_mass(&self) -> Option<StoppedMass> {
-        let is_even =
-            self.masses.other_kg.is_none_or(|m| (m / self.masses.body_kg - 1.0).abs() <= EVEN);
-        let may_tell = self.force_kind == ForceKind::Contact && self.features.is_empty() && is_even;
+        let is_even = |case: &Arc<TrainingCase>| {
+            let Masses { body_kg, other_kg } = case.case.conditions.masses;
+            other_kg.is_none_or(|m| (m / body_kg - 1.0).abs() <= EVEN)
+        };
+        let may_tell = self.force_kind == ForceKind::Contact
+            && self.features.iter().all(Feature::is_mass)
+            && self.cases.iter().all(is_even);
         if !may_tell {
             return None;
         }
         let fit = |cases: &[&Arc<TrainingCase>]| {
             let runs: Option<Vec<LoadingRun>> = cases.par_iter().map(|c| loading_run(c)).collect();
-            StoppedMass::fit(&runs?, self.masses.effective_kg())
+            StoppedMass::fit(&runs?)
         };
         let moves = |case: &&Arc<TrainingCase>| !case.case.moves_by_its_force();
         let own: Vec<_> = self.cases.iter().filter(moves).collect();
@@ -597,6 +606,7 @@ fn loading_run(case: &Arc<TrainingCase>) -> Option<LoadingRun> {
         Envelope::new(deflection_m.clone(), values).ok()
     };
     Some(LoadingRun {
+        mass_kg: case.effective_mass_kg,
         contact_n: over(&case.envelope)?,
         closing_m_per_s: over(&case.motion.closing_speed)?,
     })

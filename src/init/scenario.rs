@@ -101,7 +101,7 @@ pub(crate) fn propose_scenario(
         })
         .collect();
     let wall = nose.speed_kind == SpeedKind::Wall;
-    let knows_ends = |model: &Model| model.knows_stopped_mass() && model.features.is_empty();
+    let knows_ends = Model::knows_stopped_mass;
     let ends = !one_mass && inner.is_some_and(|inner| knows_ends(nose) && knows_ends(inner));
     let speed = speed(nose);
     let mut trains = vec![train("A", speed, nose.mass_kg, nose, inner)];

@@ -433,7 +433,7 @@ fn crush_curve(model: &Model, speed_m_per_s: f64) -> Result<(&CrushLaw, CrushCur
     model.crush_curve(speed_m_per_s).ok_or_else(|| {
         error!(
             Scenario at "model",
-            "its group \"{}\" has no crush law for the end of a vehicle: expected contact forces and speeds of two or more runs that differ in speed alone, against a wall or between equal masses; give front and rear a mass and a curve",
+            "its group \"{}\" has no crush law for the end of a vehicle: expected contact forces and speeds of two or more runs that differ in speed and mass alone, against a wall or between equal masses; give front and rear a mass and a curve",
             model.group
         )
     })

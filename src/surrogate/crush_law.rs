@@ -221,10 +221,10 @@ pub(super) mod made {
             let contact_n = case.envelope().clone();
             let d = contact_n.deflection_m().to_vec();
             let closing = d.iter().map(|&d| case.closing_at(d)).collect();
-            LoadingRun { contact_n, closing_m_per_s: Envelope::new(d, closing).unwrap() }
+            LoadingRun { mass_kg, contact_n, closing_m_per_s: Envelope::new(d, closing).unwrap() }
         };
         let runs: Vec<LoadingRun> = cases.iter().map(run).collect();
-        CrushLaw::of(StoppedMass::fit(&runs, mass_kg).unwrap(), cases)
+        CrushLaw::of(StoppedMass::fit(&runs).unwrap(), cases)
     }
 }
 

@@ -171,6 +171,23 @@ pub(super) fn answering_at(cases: &[CaseCurve], v: f64) -> Cow<'_, [CaseCurve]> 
     answering(&speeds, v).into_iter().map(|i| cases[i].clone()).collect()
 }
 
+/// Points in order of x, with one mean of those of equal x.
+pub(super) fn mean_points(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
+    let mut points: Vec<(f64, f64)> = points.collect();
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut known: Vec<(f64, f64, f64)> = Vec::new();
+    for (x, y) in points {
+        match known.last_mut() {
+            Some(last) if last.0 == x => {
+                last.1 += y;
+                last.2 += 1.0;
+            }
+            _ => known.push((x, y, 1.0)),
+        }
+    }
+    known.into_iter().map(|(x, sum, n)| (x, sum / n)).collect()
+}
+
 /// Linear interpolation over points of increasing abscissa, held beyond the ends; `None`
 /// without points.
 pub(crate) fn interpolate_held(points: &[(f64, f64)], x: f64) -> Option<f64> {

@@ -7,12 +7,12 @@ use super::band::{self, Band};
 use super::cached::Cached;
 use super::cases::{Curves, ModelCase, SlopeJump};
 use super::crush_law::{CrushCurve, CrushLaw};
-use super::curves::interpolate_held;
+use super::curves::{interpolate_held, mean_points};
 use super::entry::FitInput;
 use super::forest::ForestSurrogate;
 use super::leave_one_out::Validation;
 use super::max_crush::MaxCrushRule;
-use super::models::{MODELS, ModelKind};
+use super::models::{MODELS, ModelEntry, ModelKind};
 use super::response::with_response;
 use super::{CaseCurve, QueryPoint, Surrogate, Warning, WarningCode};
 use crate::curve::body::rebound_stiffness_n_per_m;
@@ -180,13 +180,19 @@ impl Model {
                 "model {model} needs at least {least} curves, the group has {found}{of_runs}: only --model nearest can use a single curve, as it is"
             ));
         }
-        if !set.features.is_empty() && !entry.sees_features {
-            let names = |names: Vec<String>| names.join(", ");
-            let others = MODELS.iter().filter(|e| e.sees_features && e.least_curves > 1);
+        let sees = |entry: &ModelEntry, feature: &Feature| {
+            // A body's motion has its mass in it.
+            entry.sees_features || entry.follows_closing && feature.is_mass()
+        };
+        let unseen = set.features.iter().filter(|feature| !sees(entry, feature));
+        let unseen: Vec<String> = unseen.map(Feature::name).collect();
+        if !unseen.is_empty() {
+            let sees_all = |e: &&ModelEntry| set.features.iter().all(|feature| sees(e, feature));
+            let others = MODELS.iter().filter(sees_all).filter(|e| e.least_curves > 1);
             return Err(error!(
                 Model,
-                "model {model} sees only the speed, but the cases also differ in {features}: use --model {others}, or keep cases that differ in speed alone",
-                features = names(set.features.iter().map(Feature::name).collect()),
+                "model {model} does not see {features}, in which the cases also differ: use --model {others}, or keep cases that differ in speed alone",
+                features = unseen.join(", "),
                 others = others.map(|e| e.name).collect::<Vec<_>>().join(" or ")
             ));
         }
@@ -248,16 +254,18 @@ impl Model {
 
     /// The same of a run.
     pub(super) fn energy_speed(&self, case: &ModelCase) -> f64 {
+        self.speed_of_equal_energy(case.speed_m_per_s, self.moved_kg(&case.features))
+    }
+
+    /// The mass in kg that moves along the deflections of a run with these features.
+    fn moved_kg(&self, features: &[f64]) -> f64 {
         let of = |name: &str| {
             let at = self.features.iter().position(|feature| feature.parameter == name)?;
-            case.features.get(at).copied()
+            features.get(at).copied()
         };
         let Masses { body_kg, other_kg } = self.masses();
-        let masses = Masses {
-            body_kg: of(MASS).unwrap_or(body_kg),
-            other_kg: other_kg.map(|other_kg| of(OTHER_MASS).unwrap_or(other_kg)),
-        };
-        self.speed_of_equal_energy(case.speed_m_per_s, masses.effective_kg())
+        let other_kg = other_kg.map(|other_kg| of(OTHER_MASS).unwrap_or(other_kg));
+        Masses { body_kg: of(MASS).unwrap_or(body_kg), other_kg }.effective_kg()
     }
 
     /// Whether the mass is among its parameters.
@@ -314,7 +322,8 @@ impl Model {
             let known = || self.cases.iter().map(|c| c.features[k]);
             let (low, high) =
                 (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
-            let asked = at.features[k];
+            // A crush law that drives a train is not asked for any.
+            let asked = *at.features.get(k)?;
             // 32 t are those of a run whose mass by momentum is 31.99 t.
             let slack = NEARLY_INSIDE * low.abs().max(high.abs());
             let inside = low - slack..=high + slack;
@@ -333,7 +342,7 @@ impl Model {
             Some(body) if body.crush_law().is_some() => {
                 let law_n =
                     |at: &QueryPoint<'_>| body.force_n(&self.curves.declared, at, deflection_m);
-                let mass_kg = self.masses().effective_kg();
+                let mass_kg = |run: &CaseCurve| self.moved_kg(&run.features);
                 let Curves { body: runs, responses, .. } = &*self.curves;
                 with_response(runs, responses, mass_kg, at, deflection_m, law_n)
             }
@@ -388,18 +397,17 @@ impl Model {
     /// the declared force.
     pub(crate) fn unloading_n_per_m(&self, speed_m_per_s: f64, mass_kg: f64) -> Option<f64> {
         let equal_v = speed_m_per_s * (mass_kg / self.mass_kg).sqrt();
-        let moved_kg = self.masses().effective_kg();
         let of = |(case, curve): (&ModelCase, &CaseCurve)| {
             let top_n = curve.force_at(curve.end_m());
             let law = self.crush_law.as_ref();
-            let free_kg = moved_kg - law.map_or(0.0, |law| law.stopped.at(curve.end_m()));
+            let free_kg = self.moved_kg(&case.features)
+                - law.map_or(0.0, |law| law.stopped.at(curve.end_m()));
             let rebound = case.rebound_speed_m_per_s;
             let stiffness = rebound.and_then(|v| rebound_stiffness_n_per_m(top_n, free_kg, v));
-            Some((case.speed_m_per_s, stiffness.or(case.unloading_stiffness_n_per_m)?))
+            Some((self.energy_speed(case), stiffness.or(case.unloading_stiffness_n_per_m)?))
         };
-        let known: Vec<(f64, f64)> =
-            self.cases.iter().zip(&self.curves.declared).filter_map(of).collect();
-        interpolate_held(&known, equal_v)
+        let known = self.cases.iter().zip(&self.curves.declared).filter_map(of);
+        interpolate_held(&mean_points(known), equal_v)
     }
 
     /// The training curves: of the declared force, and of the body's where it is another.
@@ -461,13 +469,14 @@ impl Model {
         warnings
     }
 
-    /// Whether a run has the parameters of a query.
+    /// Whether a run has the parameters of a query, but for masses that the model follows.
     pub(super) fn is_alike(&self, case: &ModelCase, at: &QueryPoint<'_>) -> bool {
         let pairs = self.features.iter().zip(case.features.iter().zip(at.features));
         pairs.into_iter().all(|(feature, (own, asked))| {
-            let is_mass = [MASS, OTHER_MASS].contains(&&*feature.parameter);
+            let is_mass = feature.is_mass();
             let share = if is_mass { SAME_MASS } else { NEARLY_INSIDE };
-            (own - asked).abs() <= share * own.abs()
+            let follows = is_mass && self.kind.entry().follows_closing;
+            follows || (own - asked).abs() <= share * own.abs()
         })
     }
 

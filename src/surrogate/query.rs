@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::cases::ModelCase;
-use super::curves::{interpolate_held, neighbours};
+use super::curves::{interpolate_held, mean_points, neighbours};
 use super::max_crush::{self, MaxCrush, MaxCrushRule};
 use super::predicted::{Rebound, stopping_force_n};
 use super::warning::{Warning, is_far_outside, outside_of};
@@ -228,7 +228,7 @@ impl<'a> ResolvedQuery<'a> {
         let of = |case: &ModelCase| {
             Some((self.model.energy_speed(case), case.unloading_stiffness_n_per_m?))
         };
-        interpolate_held(&means(self.model.cases.iter().filter_map(of)), self.energy_speed())
+        interpolate_held(&mean_points(self.model.cases.iter().filter_map(of)), self.energy_speed())
     }
 
     /// Warnings on unloading, mass, and energy over kinetic energy.
@@ -282,7 +282,7 @@ fn rebound_speed(model: &Model, v: f64, last_n: f64) -> Option<f64> {
     };
     let known: Vec<(f64, f64)> = model.cases.iter().zip(curves).filter_map(known).collect();
     let line = relative_line(&known)?;
-    let beside = means(known.iter().map(|&(v, y)| (v, libm::log(y / line(v)))));
+    let beside = mean_points(known.iter().map(|&(v, y)| (v, libm::log(y / line(v)))));
     let speeds: Vec<f64> = beside.iter().map(|p| p.0).collect();
     let (low, high, share) = neighbours(&speeds, v);
     let beside = (1.0 - share).powi(2) * beside[low].1 + share.powi(2) * beside[high].1;
@@ -316,21 +316,4 @@ fn relative_line(points: &[(f64, f64)]) -> Option<impl Fn(f64) -> f64> {
 fn last_force_n(curve: &Envelope) -> f64 {
     let from_m = (1.0 - LAST_SHARE_OF_CRUSH) * curve.end_m();
     (curve.work() - curve.work_to(from_m)) / (curve.end_m() - from_m)
-}
-
-/// Points in order of x, with one mean of those of equal x.
-fn means(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
-    let mut points: Vec<(f64, f64)> = points.collect();
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let mut known: Vec<(f64, f64, f64)> = Vec::new();
-    for (x, y) in points {
-        match known.last_mut() {
-            Some(last) if last.0 == x => {
-                last.1 += y;
-                last.2 += 1.0;
-            }
-            _ => known.push((x, y, 1.0)),
-        }
-    }
-    known.into_iter().map(|(x, sum, n)| (x, sum / n)).collect()
 }

@@ -63,19 +63,18 @@ impl Response {
 }
 
 /// The force in N of a body at increasing deflections: `law_n` of the query with the response of the `runs`, given by their body
-/// force in order of speed, of bodies of `mass_kg`. Never below 0. `kept` has the responses along the deflections asked for first.
+/// force in order of speed, and the mass that moved in each. Never below 0. `kept` has the responses along the deflections asked for first.
 pub(super) fn with_response(
     runs: &[CaseCurve],
     kept: &[Cached<Response>],
-    mass_kg: f64,
+    mass_kg: impl Fn(&CaseCurve) -> f64,
     at: &QueryPoint<'_>,
     deflection_m: &[f64],
     law_n: impl Fn(&QueryPoint<'_>) -> Vec<f64>,
 ) -> Vec<f64> {
     let mut force_n = law_n(at);
     let speeds: Vec<f64> = runs.iter().map(|run| run.speed_m_per_s).collect();
-    // By speed and by mass.
-    let inside = share_inside(&speeds, at.speed_m_per_s) * (at.mass_kg / mass_kg).min(1.0);
+    let inside = share_inside(&speeds, at.speed_m_per_s);
     if inside == 0.0 {
         return force_n;
     }
@@ -93,6 +92,8 @@ pub(super) fn with_response(
         if weight == 0.0 {
             continue;
         }
+        let mass_kg = mass_kg(&runs[i]);
+        let weight = inside * (at.mass_kg / mass_kg).min(1.0) * weight;
         let response = || Response::of(&runs[i], mass_kg, deflection_m, &law_n);
         let of_others;
         let mut of = kept[i].get_or_compute(response);
@@ -101,7 +102,7 @@ pub(super) fn with_response(
             of = &of_others;
         }
         let both = of.force_n.iter().zip(&time_s).map(|(own, &t)| 0.5 * (own + of.at_time_n(t)));
-        force_n.iter_mut().zip(both).for_each(|(f, response)| *f += inside * weight * response);
+        force_n.iter_mut().zip(both).for_each(|(f, response)| *f += weight * response);
     }
     force_n.iter_mut().for_each(|f| *f = f.max(0.0));
     force_n
@@ -110,12 +111,11 @@ pub(super) fn with_response(
 /// 1 between the speeds of the runs, less outside of them, 0 from as far on as the outermost two lie apart.
 fn share_inside(speeds: &[f64], v: f64) -> f64 {
     let [first, .., last] = speeds else { return 0.0 };
-    let (outside, gap) = if v < *first {
-        (first - v, speeds[1] - first)
-    } else {
-        (v - last, last - speeds[speeds.len() - 2])
-    };
-    (1.0 - outside.max(0.0) / gap).max(0.0)
+    let end = v.clamp(*first, *last);
+    // Runs of other masses may have the same speed.
+    let others = speeds.iter().map(|s| (s - end).abs()).filter(|gap| *gap > 0.0);
+    let outside = |gap: f64| (1.0 - (v - end).abs() / gap).max(0.0);
+    if v == end { 1.0 } else { others.reduce(f64::min).map_or(0.0, outside) }
 }
 
 /// How much of a response is left at a share of the maximum deflection: 1 up to the half, 0 at the end, without kinks.
@@ -169,7 +169,7 @@ mod tests {
         let kept = vec![Cached::default(); runs.len()];
         let at =
             QueryPoint { speed_m_per_s, features: &[], mass_kg: MASS_KG, closing_m_per_s: None };
-        with_response(runs, &kept, MASS_KG, &at, along_m, |_| vec![1e6; along_m.len()])
+        with_response(runs, &kept, |_| MASS_KG, &at, along_m, |_| vec![1e6; along_m.len()])
     }
 
     fn along() -> Vec<f64> {
