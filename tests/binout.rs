@@ -522,6 +522,11 @@ fn a_recipe_finds_text_or_binout() {
     let mut files = vec![("binout0000", binout.clone())];
     files.extend(strangers);
     assert_eq!(build(&files)["work_J"], from_text["work_J"]);
+    // The container was cut before the section.
+    let folder = tempfile::tempdir().unwrap();
+    study(folder.path(), &[("binout0000", binout[..binout.len() / 4].to_vec())]);
+    let error = crumple_fails(folder.path(), 1, "build study.toml -o c.h5");
+    says(&error, "has no file \"rwforc\": it has binout0000; binout0000 is damaged (byte ");
     // Another rwforc beside the binout.
     let other =
         fs::read_to_string(run.join("rwforc")).unwrap().replace("1.735271E+06", "1.835271E+06");

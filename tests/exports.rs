@@ -927,7 +927,7 @@ fn groups_and_several_speeds_are_exported_at_once() {
         (&["export", "lead50.json", "--to", "json", "--tail", "hold"][..], "--tail is for csv, lsdyna"),
         (&["export", "lead.model", "--to", "onnx", "--speed", "50km/h"][..], "holds a whole model: remove --speed"),
         (&["export", "lead.model", "--to", "table", "--group", "x"][..], "a model has only one group"),
-        (&["export", "curves.h5", "--group", "lead-car-wall", "-o", "all.spr"][..], "name a folder, and the kind of file with --to spr"),
+        (&["export", "curves.h5", "--group", "lead-car-wall", "-o", "all.spr"][..], "name a folder, as with -o all --to spr"),
     ];
     cases.into_iter().for_each(|(arguments, expected)| t(2, arguments, expected));
     export(here, "curves.h5", "sprs", &["--group", "lead-car-wall", "--to", "spr"]);

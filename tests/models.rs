@@ -83,6 +83,21 @@ fn case_every(
     }
 }
 
+/// The same of which the record ended at a share of the crush.
+pub fn died(mut case: Case, share: f64) -> Case {
+    let until = |curve: &Curve| {
+        let end = curve.deflection_m().iter().copied().fold(0.0, f64::max);
+        let keep = curve.deflection_m().iter().position(|&d| d > share * end).unwrap();
+        let [time, deflection, force] =
+            [curve.time_s(), curve.deflection_m(), curve.force_n()].map(|all| all[..keep].to_vec());
+        Curve::new(time, deflection, force).unwrap()
+    };
+    case.curves.sampled = until(&case.curves.sampled);
+    case.curves.closing_speed_m_per_s.truncate(case.curves.sampled.time_s().len());
+    case.curves.original = until(&case.curves.original);
+    case
+}
+
 /// The case in another group.
 pub fn in_group(case: &Case, group: &str) -> Case {
     let mut case = case.clone();
@@ -2177,18 +2192,7 @@ fn a_speed_that_nearly_repeats_another_promises_nothing() {
         );
     }
     // One that ended while loading cannot be judged in place of another.
-    let mut cut = repeated(35.7);
-    let until_half_crush = |curve: &Curve| {
-        let end = curve.deflection_m().iter().copied().fold(0.0, f64::max);
-        let keep = curve.deflection_m().iter().position(|&d| d > 0.5 * end).unwrap();
-        let [time, deflection, force] =
-            [curve.time_s(), curve.deflection_m(), curve.force_n()].map(|all| all[..keep].to_vec());
-        Curve::new(time, deflection, force).unwrap()
-    };
-    cut.curves.sampled = until_half_crush(&cut.curves.sampled);
-    cut.curves.closing_speed_m_per_s.truncate(cut.curves.sampled.time_s().len());
-    cut.curves.original = until_half_crush(&cut.curves.original);
-    let cases = [of("25kmh"), cut, of("36kmh"), of("60kmh")];
+    let cases = [of("25kmh"), died(repeated(35.7), 0.5), of("36kmh"), of("60kmh")];
     let best = Selection::Best(Purpose::Vehicle);
     let with_cut = validate("lead-car-wall", &cases, &ModelKind::all(0), best).unwrap();
     assert!(with_cut.notes.iter().any(|said| said.contains("\"35.7kmh\" ended while loading")));

@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use crate::common::{crumple_fails, crumple_ok, says, shared};
-use crate::models::{all_kinds, case, database_of, family, law};
+use crate::models::{all_kinds, case, database_of, died, family, law};
 use crumple::assess::{Choice, train, validate};
-use crumple::assess::{Purpose, Selection};
+use crumple::assess::{Purpose, Selection, gaps};
 use crumple::curve::{Case, Parameter};
 use crumple::dataset::TrainingSet;
 use crumple::surrogate::Scatter;
-use crumple::surrogate::{ModelKind, Query, predict};
+use crumple::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
 use serde_json::Value;
 
 const MASS_KG: f64 = 24e3;
@@ -297,4 +297,58 @@ fn perturbed_runs_scatter_little() {
     .unwrap();
     let band = model.leave_one_out.unwrap().band.unwrap();
     assert!(width(&band, "pointwise_share") < 0.5 * band.interpolation_share(), "{band:?}");
+}
+
+/// A repeated run that ended while loading takes nothing away from the whole ones.
+#[test]
+fn a_repeated_run_that_died_is_left_out() {
+    let other =
+        |name: &str, share: f64| case(name, 12.0, MASS_KG, &|d, u| (1.0 + share) * law(d, u));
+    let whole = [family(&[8.0, 16.0, 20.0]), vec![other("a", 0.01), other("b", -0.01)]].concat();
+    let with_dead = [whole.clone(), vec![died(other("c", 0.0), 0.4)]].concat();
+    let of = |cases: &[Case]| train("made", cases, Choice::Kind(ModelKind::linear())).unwrap();
+    let (expected, found) = (of(&whole), of(&with_dead));
+    assert_eq!(found.leave_one_out, expected.leave_one_out);
+    let curve = |model: &Model| predict(model, &Query::at(12.0)).unwrap();
+    let said = "run \"a (mean of 2)\": c, of the same speed, ended while loading and is left out";
+    assert!(curve(&found).warnings.iter().any(|w| w.message == said));
+    assert_eq!(curve(&found).force_n, curve(&expected).force_n);
+    // If all died, there is nothing else.
+    let dead = [family(&[8.0, 16.0, 20.0]), vec![died(other("c", 0.0), 0.4)]].concat();
+    assert!(of(&dead).cases.iter().any(|case| case.truncated));
+}
+
+/// A run that ended before a slower one stood narrows no interval: not that of a band, of `nearest`, or of the next run. Its peak so far
+/// is not that of its speed.
+#[test]
+fn a_run_that_died_shows_no_more_than_a_slower_one() {
+    let without = family(&[6.0, 8.0, 12.0, 20.0, 22.0]);
+    let dead = |share| died(case("dead", 16.0, MASS_KG, &law), share);
+    let with = |share| [without.clone(), vec![dead(share)]].concat();
+    let model = |cases: &[Case], kind| train("made", cases, Choice::Kind(kind)).unwrap();
+    let at = |model: &Model, v| predict(model, &Query::at(v)).unwrap();
+    for kind in [ModelKind::nearest(), ModelKind::rate()] {
+        let [none, early, late] = [without.clone(), with(0.15), with(0.9)].map(|c| model(&c, kind));
+        let gap = |model: &Model| at(model, 15.0).provenance.band.map(|band| band.span_m_per_s);
+        let near = |model: &Model| at(model, 15.0).provenance.nearest_training_speed_m_per_s;
+        assert_eq!((near(&none), near(&early), near(&late)), (12.0, 12.0, 16.0));
+        if kind == ModelKind::nearest() {
+            assert_eq!(at(&early, 15.0).force_n, at(&none, 15.0).force_n);
+            let said = |curve: &PredictedCurve| {
+                curve.warnings.iter().any(|w| w.message.contains("m of the nearest run: the force"))
+            };
+            // Of 12 m/s the curve ends before a faster body stands.
+            assert!(said(&at(&none, 15.0)) && !said(&at(&none, 11.0)));
+        } else {
+            assert_eq!(gap(&none), gap(&early));
+            assert!(gap(&late) < gap(&none), "{:?}", gap(&late));
+        }
+        let codes = |curve: PredictedCurve| curve.warnings.into_iter().map(|w| w.code.name());
+        assert!(codes(at(&early, 16.0)).all(|code| code != "peak_force"));
+    }
+    let next = |cases: &[Case]| {
+        let of = model(cases, ModelKind::rate()).leave_one_out.unwrap();
+        gaps(&TrainingSet::new("made", cases).unwrap(), &of).remove(0).between_m_per_s
+    };
+    assert_eq!(next(&with(0.15)), next(&without));
 }

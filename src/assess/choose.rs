@@ -200,9 +200,10 @@ impl Gap {
 ///
 /// A left-out speed is predicted over the gap that its absence leaves; the error expected
 /// in the middle of a gap is that of the speeds at its ends, relative to the gaps. Gaps at
-/// the ends of the range have one such speed. Speeds that nearly repeat one another, which are left out together, are one.
+/// the ends of the range have one such speed. Speeds that nearly repeat one another, which are left out together, are one; runs that
+/// ended before a slower one stood do not count.
 pub fn gaps(set: &TrainingSet, validation: &Validation) -> Vec<Gap> {
-    let speeds = set.speeds_m_per_s();
+    let speeds = set.speeds_of_crush_m_per_s();
     let mut ends: Vec<(f64, f64)> = speeds.iter().map(|v| nearly_same(&speeds, *v)).collect();
     ends.dedup_by(|next, before| {
         let is_one = is_within(next.0, *before);

@@ -76,7 +76,7 @@ impl<'a> LeftOutCase<'a> {
             return Err(NotLeftOut::NoEnergy { case: name() });
         }
         let v = own.speed_m_per_s;
-        let others = rest.speeds_m_per_s();
+        let others = rest.speeds_of_crush_m_per_s();
         let inner = others.first().is_some_and(|&low| low < v)
             && others.last().is_some_and(|&high| v < high);
         let gap = if inner { band::gap(&others, v) } else { band::outside(&others, v) };

@@ -94,7 +94,7 @@ fn at_speed(mean: &TrainingCase, cases: &[Case]) -> Option<SpeedScatter> {
 
 fn apart(run: &Case, mean: &TrainingCase, motion: &Reference) -> Option<Apart> {
     let own = run.loading().ok()?.envelope;
-    let along = grid(own.end_m(), STEPS);
+    let along = grid(own.end_m().min(mean.envelope.end_m()), STEPS);
     let (own_n, mean_n) = (forces_n(&own, &along), forces_n(&mean.envelope, &along));
     let body = match run.curves.force_kind {
         ForceKind::Contact => {

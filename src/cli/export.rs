@@ -384,9 +384,10 @@ fn paths(path: &Path, format: &Format, exported: &Exported) -> Result<Vec<PathBu
     let names_a_file = format.extensions.contains(&extension);
     if !path.is_dir() && names_a_file && !format.takes_case() {
         return usage(format!(
-            "-o {}: this export gives {} files: name a folder, and the kind of file with --to {extension}",
+            "-o {}: this export gives {} files: name a folder, as with -o {} --to {extension}",
             path.display(),
-            exported.files.len()
+            exported.files.len(),
+            path.with_extension("").display()
         ));
     }
     Ok(exported.files.iter().map(|(name, _)| path.join(name)).collect())

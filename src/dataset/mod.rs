@@ -307,6 +307,19 @@ pub(crate) fn nearly_same(speeds: &[f64], v: f64) -> (f64, f64) {
     }
 }
 
+/// The cases but for those that ended while loading, before a slower one of the same features stood: of the crush at their speed they
+/// show nothing that others do not. `of` gives whether a case ended so, its speed, its end in m and its features.
+pub(crate) fn show_their_crush<'a, C>(
+    cases: &'a [C],
+    of: impl Fn(&'a C) -> (bool, f64, f64, &'a Vec<f64>),
+) -> impl Iterator<Item = &'a C> {
+    cases.iter().filter(move |case| {
+        let (truncated, speed, end_m, features) = of(case);
+        let mut slower = cases.iter().map(&of).filter(|other| other.1 < speed);
+        !(truncated && slower.any(|(_, _, m, other)| m >= end_m && other == features))
+    })
+}
+
 /// Whether a speed is in such a range.
 pub(crate) fn is_within(speed: f64, (low, high): (f64, f64)) -> bool {
     (low <= speed || is_same_speed(low, speed)) && (speed <= high || is_same_speed(high, speed))
@@ -438,6 +451,14 @@ impl TrainingSet {
         self.cases.iter().map(|c| c.speed_m_per_s).collect()
     }
 
+    /// Of the cases that [`show_their_crush`].
+    pub(crate) fn speeds_of_crush_m_per_s(&self) -> Vec<f64> {
+        let showing = show_their_crush(&self.cases, |case| {
+            (case.truncated, case.speed_m_per_s, case.envelope.end_m(), &case.features)
+        });
+        showing.map(|case| case.speed_m_per_s).collect()
+    }
+
     /// The table {v in m/s, d in m, features} → F in N over the loading branches of all
     /// cases, of the declared force.
     pub fn table(&self, kind: TableKind) -> Dataset<f64, f64, ndarray::Ix1> {
@@ -519,8 +540,14 @@ impl TrainingCase {
         // A copied run does not count as a repetition.
         let mut known = HashSet::new();
         let of_own = |run: &&&Case| known.insert(key_of(&run.curves.original));
-        let runs: Vec<&Case> = runs.iter().filter(of_own).copied().collect();
-        let case = mean_of(runs[0], &runs[1..]).map_err(|_| no_motion())?;
+        let runs = runs.iter().filter(of_own).copied();
+        // The mean would end where the first of its runs does.
+        let (ended, whole): (Vec<_>, Vec<_>) = runs.partition(|run| run.is_truncated());
+        let (runs, left_out) = if whole.is_empty() { (ended, whole) } else { (whole, ended) };
+        let mut case = mean_of(runs[0], &runs[1..]).map_err(|_| no_motion())?;
+        case.quality.warnings.extend(left_out.iter().map(|run| {
+            format!("{}, of the same speed, ended while loading and is left out", run.id.name)
+        }));
         let named = |source| {
             error!(Dataset, "case \"{name}\": {source}", name = case.id.name).caused_by(source)
         };

@@ -205,7 +205,7 @@ fn zero() -> Vec<f64> {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum LawName {
-    /// Elastic-plastic: unloads on a line of the unloading stiffness, or a steeper one where that would return more than has been absorbed.
+    /// Elastic-plastic: unloads on a line of the unloading stiffness, or a steeper one, so that energy once dissipated never comes back.
     #[default]
     Memory,
     /// Follows the curve back, as in the reference model.

@@ -54,9 +54,7 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
             Err(error) if is_text && error.code() != ErrorCode::Io => continue,
             Err(error) => return Err(error.at(KeyPath::default())),
         };
-        let states: usize = sections.iter().map(|s| s.time.len()).sum();
         if let Some(problem) = sections.iter().find_map(|s| s.problems.first())
-            && states == 0
             && damaged.is_none()
         {
             damaged = Some(format!("{part} is damaged ({problem})"));

@@ -93,13 +93,15 @@ impl ModelCase {
     }
 
     fn curve(&self, force_n: &[f64]) -> Result<CaseCurve, Error> {
-        CaseCurve::new(
+        let mut curve = CaseCurve::new(
             self.speed_m_per_s,
             self.features.clone(),
             self.deflection_m.clone(),
             force_n.to_vec(),
             self.closing_speed_m_per_s.clone(),
-        )
+        )?;
+        curve.truncated = self.truncated;
+        Ok(curve)
     }
 }
 

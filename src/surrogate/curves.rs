@@ -11,6 +11,8 @@ pub(crate) struct CaseCurve {
     pub speed_m_per_s: f64,
     /// Values of the further features.
     pub features: Vec<f64>,
+    /// Whether the run ended while loading, so that the curve is its beginning.
+    pub truncated: bool,
     envelope: Envelope,
     /// Closing speed in m/s over deflection, if it is known: an envelope by its shape.
     closing: Option<Envelope>,
@@ -34,7 +36,7 @@ impl CaseCurve {
         };
         let envelope =
             Envelope::new(deflection_m, force_n).map_err(|e| e.coded(ErrorCode::Model))?;
-        Ok(Self { speed_m_per_s, features, envelope, closing })
+        Ok(Self { speed_m_per_s, features, truncated: false, envelope, closing })
     }
 
     pub(crate) fn envelope(&self) -> &Envelope {

@@ -80,6 +80,11 @@ pub(crate) trait Surrogate: Debug + Send + Sync {
         Vec::new()
     }
 
+    /// How far its answer is data, in m; `None` if that is as far as any of the runs.
+    fn data_end_m(&self, _cases: &[CaseCurve], _at: &QueryPoint<'_>) -> Option<f64> {
+        None
+    }
+
     /// What was fitted, for the model file; `None` for a model that answers from the training
     /// curves alone.
     fn parameters(&self) -> Option<Result<Box<RawValue>, serde_json::Error>> {

@@ -19,6 +19,7 @@ use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{ForceKind, Masses};
 use crate::dataset::{
     Feature, MASS, OTHER_MASS, SAME_MASS, SAME_SPEED, TrainingCase, TrainingSet, nearest,
+    show_their_crush,
 };
 use crate::error::{Error, error};
 use crate::forest::RegressionForest;
@@ -222,6 +223,12 @@ impl Model {
         self.cases.iter().map(|case| case.max_deflection_m).fold(0.0, f64::max)
     }
 
+    /// How far the forces of a query are data, in m.
+    pub(super) fn data_end_m(&self, at: &QueryPoint<'_>) -> f64 {
+        let of = self.fitted.data_end_m(&self.curves.declared, at);
+        of.unwrap_or_else(|| self.largest_crush_m())
+    }
+
     /// Lowest and highest training speed, in m/s.
     pub fn range_m_per_s(&self) -> (f64, f64) {
         (self.cases[0].speed_m_per_s, self.cases[self.cases.len() - 1].speed_m_per_s)
@@ -230,13 +237,20 @@ impl Model {
     /// The training speeds in m/s that a query lies among or beyond, in order: those of the runs with its parameters, or all if these have
     /// one speed or none.
     pub(super) fn speeds_around(&self, at: &QueryPoint<'_>) -> Vec<f64> {
-        let alike = self.cases.iter().filter(|case| self.is_alike(case, at));
+        let alike = self.showing().filter(|case| self.is_alike(case, at));
         let alike: Vec<f64> = alike.map(|case| case.speed_m_per_s).collect();
         if alike.first() < alike.last() {
             alike
         } else {
-            self.cases.iter().map(|case| case.speed_m_per_s).collect()
+            self.showing().map(|case| case.speed_m_per_s).collect()
         }
+    }
+
+    /// The runs that [`show_their_crush`].
+    fn showing(&self) -> impl Iterator<Item = &ModelCase> {
+        show_their_crush(&self.cases, |case| {
+            (case.truncated, case.speed_m_per_s, case.max_deflection_m, &case.features)
+        })
     }
 
     /// Whether a query lies between these training speeds, but for the rounding of units.
@@ -297,7 +311,7 @@ impl Model {
             let why = format!("no case outside the training cases' {name} was left out");
             return Err(Warning::no_band(&why));
         }
-        let speeds: Vec<f64> = self.cases.iter().map(|c| c.speed_m_per_s).collect();
+        let speeds: Vec<f64> = self.showing().map(|c| c.speed_m_per_s).collect();
         let is_inside = (speeds[0]..=speeds[speeds.len() - 1]).contains(&at.speed_m_per_s);
         if is_inside && !self.contains(at) {
             let why = "no speed beyond those of the runs with these parameters was left out";

@@ -123,7 +123,7 @@ impl<'a> Motion<'a> {
         };
         let curve = ForceCurve {
             beyond: Some(beyond.clone()),
-            data_end_m: Some(model.largest_crush_m()),
+            data_end_m: Some(model.data_end_m(&asked.at())),
             speed_kind: Some(model.speed_kind),
             speed_m_per_s: Some(asked.v),
             ..ForceCurve::of_body(loading).unloading_with(stiffness_n_per_m)
@@ -224,7 +224,7 @@ impl<'a> Prediction<'a> {
         let along = |force: &Envelope| deflection_m.iter().map(|&d| force.force_at(d)).collect();
         let force_n = along(&self.declared);
         let body_force_n = asked.model.has_body_force().then(|| along(body));
-        let data_end_m = asked.model.largest_crush_m();
+        let data_end_m = asked.model.data_end_m(&asked.at());
         Beyond { data_end_m, deflection_m, force_n, body_force_n }
     }
 
@@ -279,13 +279,15 @@ impl<'a> Prediction<'a> {
             warnings.extend(contact_mismatch(model, energy));
         }
         warnings.extend(asked.unlike_peak(&declared));
-        let (crush_m, data_end_m) = (declared.end_m(), model.largest_crush_m());
+        let (crush_m, data_end_m) = (declared.end_m(), model.data_end_m(&asked.at()));
+        let longest_m = model.largest_crush_m();
         if is_beyond(crush_m, data_end_m) {
             let by_speed_m = crush.monotone_m.filter(|_| !model.contains(&asked.at()));
-            warnings.push(Warning::beyond_data(crush_m, data_end_m, by_speed_m));
+            let of = if data_end_m < longest_m { "nearest run" } else { "training runs" };
+            warnings.push(Warning::beyond_data(crush_m, (data_end_m, of), by_speed_m));
         }
         // Between the training speeds no curve that was left out goes on there: a mass does that.
-        let is_beyond = is_beyond(crush_m, data_end_m) && model.contains(&asked.at());
+        let is_beyond = is_beyond(crush_m, longest_m) && model.contains(&asked.at());
         let ratio = asked.mass_kg / model.masses().effective_kg();
         let without_band = match () {
             () if is_unlike(ratio) && !model.has_mass() => {

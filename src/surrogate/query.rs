@@ -218,6 +218,8 @@ impl<'a> ResolvedQuery<'a> {
         let is_inside =
             self.model.contains(&self.at()) && self.same_mass && self.model.features.is_empty();
         let peak = |k: usize| (speeds[k], curves[k].envelope().peak_force_n());
+        // A run that ended while loading may have had a larger one later.
+        let is_inside = is_inside && !curves[low].truncated && !curves[high].truncated;
         is_inside
             .then(|| Warning::peak_force(declared.peak_force_n(), [peak(low), peak(high)]))
             .flatten()

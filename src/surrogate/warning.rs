@@ -310,7 +310,11 @@ impl Warning {
     }
 
     /// `by_speed_m`: what the runs' maximum crush over their speeds, continued, would give.
-    pub(crate) fn beyond_data(crush_m: f64, data_end_m: f64, by_speed_m: Option<f64>) -> Self {
+    pub(crate) fn beyond_data(
+        crush_m: f64,
+        (data_end_m, of): (f64, &str),
+        by_speed_m: Option<f64>,
+    ) -> Self {
         let mut other = String::new();
         if let Some(m) = by_speed_m {
             other = format!("; their crush over the speed, continued, gives {m:.3} m");
@@ -324,7 +328,7 @@ impl Warning {
         Self {
             code: WarningCode::OutOfRange,
             message: format!(
-                "the maximum crush of {crush_m:.3} m lies beyond the {data_end_m:.3} m of the training runs: the force there is an assumption{other}"
+                "the maximum crush of {crush_m:.3} m lies beyond the {data_end_m:.3} m of the {of}: the force there is an assumption{other}"
             ),
         }
     }
