@@ -551,7 +551,14 @@ impl TrainingCase {
         let named = |source| {
             error!(Dataset, "case \"{name}\": {source}", name = case.id.name).caused_by(source)
         };
-        let motion = body_motion(&case).ok_or_else(no_motion)?;
+        let mut motion = body_motion(&case).ok_or_else(no_motion)?;
+        if motion.rebound_speed_m_per_s.is_none() && runs.len() > 1 {
+            // The mean reaches as far as the shortest record.
+            let of_run = |run: &&Case| body_motion(run)?.rebound_speed_m_per_s;
+            let known: Vec<f64> = runs.iter().filter_map(of_run).collect();
+            let mean = known.iter().sum::<f64>() / known.len() as f64;
+            motion.rebound_speed_m_per_s = (!known.is_empty()).then_some(mean);
+        }
         Ok(Self {
             name: case.id.name.clone(),
             runs: runs.iter().map(|run| run.id.name.clone()).collect(),

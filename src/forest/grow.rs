@@ -89,10 +89,12 @@ pub(crate) fn grow<F: Float>(
         .zip(&table.orders)
         .map(|(values, order)| {
             let mut samples = Vec::with_capacity(count);
-            samples.extend(values.iter().zip(order).filter_map(|(&value, &sample)| {
+            for (&value, &sample) in values.iter().zip(order) {
                 let (target, times) = drawn[sample as usize];
-                (times > 0).then_some(Drawn { target, value, sample, times })
-            }));
+                if times > 0 {
+                    samples.push(Drawn { target, value, sample, times });
+                }
+            }
             samples
         })
         .collect();

@@ -53,6 +53,7 @@ impl Rules {
         }
     }
 
+    #[inline]
     fn large_enough(&self, node: &Sums, left_weight: f64) -> bool {
         let right_weight = node.weight - left_weight;
         (left_weight >= self.min_samples_leaf) & (right_weight >= self.min_samples_leaf)
@@ -140,15 +141,18 @@ fn midpoints<F: Float>(
 ) -> Option<Split<F>> {
     let (mut left_weight, mut left_target) = (0.0, 0.0);
     let mut most = 0.0;
-    gains.resize(order.len() - 1, 0.0);
-    for (pair, gain) in order.windows(2).zip(gains.iter_mut()) {
-        let weight = pair[0].weight();
+    let (firsts, seconds) = (&order[..order.len() - 1], &order[1..]);
+    gains.resize(firsts.len(), 0.0);
+    let noted = &mut gains[..firsts.len()];
+    for k in 0..firsts.len() {
+        let (left, right) = (&firsts[k], &seconds[k]);
+        let weight = left.weight();
         left_weight += weight;
-        left_target += weight * pair[0].target;
-        let allowed = (pair[0].value < pair[1].value) & rules.large_enough(node, left_weight);
+        left_target += weight * left.target;
+        let allowed = (left.value < right.value) & rules.large_enough(node, left_weight);
         let found = node.gain(left_weight, left_target);
-        *gain = if allowed { found } else { 0.0 };
-        most = if *gain > most { *gain } else { most };
+        noted[k] = if allowed { found } else { 0.0 };
+        most = if noted[k] > most { noted[k] } else { most };
     }
     if most <= node.rounding() {
         return None;

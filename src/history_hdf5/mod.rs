@@ -109,19 +109,17 @@ impl Storage {
         if self.single { size_of::<f32>() } else { size_of::<f64>() }
     }
 
-    /// Appends the bytes of values.
-    fn append(self, values: &[f64], bytes: &mut Vec<u8>) {
-        let start = bytes.len();
-        bytes.resize(start + self.size() * values.len(), 0);
-        let place = &mut bytes[start..];
+    /// Writes the bytes of values into their place.
+    #[inline]
+    fn put(self, values: &[f64], place: &mut [u8]) {
         match self.single {
             false => {
-                let each = place.as_chunks_mut().0.iter_mut().zip(values);
-                each.for_each(|(to, value)| *to = value.to_le_bytes());
+                let place = &mut place.as_chunks_mut().0[..values.len()];
+                (0..values.len()).for_each(|k| place[k] = values[k].to_le_bytes());
             }
             true => {
-                let each = place.as_chunks_mut().0.iter_mut().zip(values);
-                each.for_each(|(to, value)| *to = (*value as f32).to_le_bytes());
+                let place = &mut place.as_chunks_mut().0[..values.len()];
+                (0..values.len()).for_each(|k| place[k] = (values[k] as f32).to_le_bytes());
             }
         }
     }
@@ -448,11 +446,13 @@ fn fill(blocks: &Blocks, storage: Storage, offsets: &[u64], file: &File) -> Resu
             let mut start = 0;
             for (column, offset) in blocks.columns.iter().zip(offsets) {
                 let width = column.width();
-                bytes.clear();
-                for state in read.chunks_exact(values).take(count) {
-                    storage.append(&state[start..start + width], bytes);
+                let of_state = width * storage.size();
+                bytes.resize(count * of_state, 0);
+                for k in 0..count {
+                    let state = &read[k * values..];
+                    storage.put(&state[start..start + width], &mut bytes[k * of_state..]);
                 }
-                let at = offset + (first * width * storage.size()) as u64;
+                let at = offset + (first * of_state) as u64;
                 write_all_at(file, bytes, at).map_err(Trouble::Writing)?;
                 start += width;
             }

@@ -375,7 +375,8 @@ impl Layout {
     /// The fields of a line with the indices of their values.
     fn fields<'a>(&'a self, row: &Row, class: &'a Class) -> impl Iterator<Item = (&'a Field, u32)> {
         let outs = self.outs.get(row.values as usize..).unwrap_or_default();
-        class.fields.iter().zip(outs.iter().copied().chain(std::iter::repeat(NOWHERE)))
+        let out = |k: usize| outs.get(k).copied().unwrap_or(NOWHERE);
+        class.fields.iter().enumerate().map(move |(k, field)| (field, out(k)))
     }
 }
 
@@ -426,8 +427,11 @@ const WIDE: usize = 16;
 fn conforms(line: &[u8], expected: &[u8], free: &[u8]) -> bool {
     let mut differs = [0; WIDE];
     let (lines, rest) = line.as_chunks();
-    let chunks = lines.iter().zip(expected.as_chunks().0).zip(free.as_chunks().0);
-    chunks.for_each(|((line, expected), free)| compare(&mut differs, line, expected, free));
+    let n = lines.len();
+    let (expecteds, frees) = (&expected.as_chunks().0[..n], &free.as_chunks().0[..n]);
+    for k in 0..n {
+        compare(&mut differs, &lines[k], &expecteds[k], &frees[k]);
+    }
     // The rest with what is above it, so that it is as wide.
     match (line.last_chunk(), expected.last_chunk(), free.last_chunk()) {
         _ if rest.is_empty() => {}
@@ -468,7 +472,7 @@ impl Class {
             return false;
         }
         let mut from = 0;
-        for (field, &index) in self.fields.iter().zip(outs) {
+        for (k, field) in self.fields.iter().enumerate() {
             let start = field.to - 12;
             // With the beginning of the first number, so that it is as wide as a comparison.
             let between =
@@ -486,7 +490,7 @@ impl Class {
             let Some(value) = line[start..].first_chunk().and_then(e12::parse) else {
                 return false;
             };
-            if let Some(place) = out.get_mut(index as usize) {
+            if let Some(place) = out.get_mut(outs[k] as usize) {
                 *place = value;
             }
         }
