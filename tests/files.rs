@@ -391,9 +391,9 @@ fn db_check_holds_attributes_against_the_curves() {
     let number = AttrValue::F64;
     #[rustfmt::skip]
     let cases = [
-        ("loading_end", AttrValue::I64(3), "attribute_differs", "loading_end is 3, the curve's is "),
-        ("max_deflection_m", number(0.2), "attribute_differs", "max_deflection_m is 0.2, the curve's"),
-        ("truncated", AttrValue::U8(1), "attribute_differs", "truncated is 1, the curve's is 0"),
+        ("loading_end", AttrValue::I64(3), "attribute_differs", "loading_end is 3, by the case's other values "),
+        ("max_deflection_m", number(0.2), "attribute_differs", "max_deflection_m is 0.2, by the case's other values "),
+        ("truncated", AttrValue::U8(1), "attribute_differs", "truncated is 1, by the case's other values 0"),
         ("work_over_energy", number(1.0), "attribute_differs", "work_over_energy is 1, "),
         ("work_J", number(1e300), "audit_differs", "the stored work "),
         ("kinetic_energy_J", number(5.0), "audit_differs", "the stored kinetic energy 5 J is not"),
@@ -473,6 +473,20 @@ fn db_check_finds_wrong_lengths_order_and_holes() {
             group.set_attr("cases", AttrValue::VarLenStringArray(cases)).unwrap();
         },
         &[("case_order", "the group's cases are listed as 72kmh, 60kmh")],
+    );
+    t(
+        &|file| {
+            let group = file.group(WALL).unwrap();
+            let mut cases = group.groups().unwrap();
+            cases.push("48kmh".into());
+            group.set_attr("cases", AttrValue::VarLenStringArray(cases)).unwrap();
+            let mut force = file.dataset("lead-car-wall/36kmh/force_N").unwrap();
+            force.set_attr("units", AttrValue::String("kN".into())).unwrap();
+        },
+        &[
+            ("case_list", "is listed more than once in the group's cases"),
+            ("attribute_differs", "the units of force_N are \"kN\", and its values are read in N"),
+        ],
     );
     t(
         &|file| file.group(WALL).unwrap().delete("48kmh").unwrap(),

@@ -257,6 +257,26 @@ fn every_kind_of_file_is_drawn() {
     }
 }
 
+/// What an end stops is no longer the vehicle's: all energy of the start is in the picture at all times. Of two runs an interface has
+/// one colour, which nothing else has.
+#[test]
+fn energies_of_ends_and_of_two_runs() {
+    let folder = demo_folder();
+    let folder = folder.path();
+    crumple_ok(folder, "plot split-ends.toml --quantity energy -o a.svg");
+    let svg = fs::read_to_string(folder.join("a.svg")).unwrap();
+    assert!(!svg.contains("error of the method") && svg.contains("aria-label=\"kinetic"));
+    let scenario = fs::read_to_string(folder.join("scenario.toml")).unwrap();
+    let braked = "speed = \"50km/h\"\nresistance = { braking = 0.15 }";
+    let scenario = scenario.replace("speed = \"50km/h\"", braked);
+    fs::write(folder.join("braked.toml"), scenario).unwrap();
+    crumple_ok(folder, "plot scenario.toml braked.toml --quantity energy -o a.svg");
+    let svg = fs::read_to_string(folder.join("a.svg")).unwrap();
+    for name in ["kinetic", "A1|wall", "resistance"] {
+        assert_eq!(svg.matches(&format!("aria-label=\"{name}\"")).count(), 1, "{name}: {svg}");
+    }
+}
+
 /// A sweep is drawn alike from both files that it can be written to, also a sample of its rows.
 #[test]
 fn sweeps_are_drawn_from_csv_and_hdf5() {
@@ -307,6 +327,18 @@ fn sweeps_are_drawn_from_csv_and_hdf5() {
     says(&picture, "share of runs over a limit");
     says(&picture, "95 % confidence interval");
     assert!(!picture.contains("median"));
+    // Over two quantities, runs without a verdict may be either.
+    let vary = "{ what = \"speed\", train = \"A\", values = [\"50km/h\", \"75km/h\"] }, { what = \"mass\", vehicle = \"A1\", values = [\"24t\", \"28t\"] }, { what = \"band\", curve = \"nose\", values = [-1, 0, 1] }";
+    let plan = format!("[sweep]\nresults = [\"over_limits\"]\nvary = [ {vary} ]\n");
+    fs::write(folder.join("plan.toml"), plan).unwrap();
+    let mild = fs::read_to_string(folder.join("judged.toml")).unwrap().replace("12.0", "40.0");
+    fs::write(folder.join("judged.toml"), mild).unwrap();
+    crumple_ok(folder, "sweep judged.toml --plan plan.toml -o judged.csv -q --restart");
+    let over = "--over speed_m_per_s[A] --over mass_kg[A1]";
+    crumple_ok(folder, &format!("plot judged.csv {over} --result over_limits -o c.svg"));
+    let picture = fs::read_to_string(folder.join("c.svg")).unwrap();
+    says(&picture, "without a verdict may be either");
+    says(&picture, "aria-label=\"0.00 to 0.667\"");
     // A choice of curves varies as well: rows of different curves have no common line, and the plan's names are known.
     let plan = "[sweep]\nvary = [ { what = \"curve\", curve = \"nose\", values = [\"nose\", \"soft\"] }, { what = \"speed\", train = \"A\", values = [\"30km/h\", \"40km/h\"] } ]\nresults = [\"max_deflection\", \"final_speed\"]\n";
     fs::write(folder.join("plan.toml"), plan).unwrap();

@@ -5,8 +5,9 @@ use crate::assess::train::TrainComparison;
 use crate::error::{Error, ErrorCode, error};
 use crate::guess::hint;
 use crate::history::{TimeGap, time_gaps};
-use crate::multibody::{Run, STANDARD_GRAVITY_M_PER_S2};
+use crate::multibody::{BodyHistory, Run, STANDARD_GRAVITY_M_PER_S2};
 use crate::plot::{Axis, Band, Chart, Panel, Series, Shown};
+use crate::plural::counted;
 use crate::rating::acceptance::StageRecord;
 use crate::scenario::{PLATES, Prepared};
 use crate::signal::{CfcError, cfc};
@@ -198,8 +199,9 @@ impl Motion {
         };
         let interfaces = prepared.chain.interfaces().iter().zip(&run.interfaces);
         let kinetic = |t: usize| {
-            let bodies = bodies.iter().zip(&run.bodies);
-            bodies.map(|(b, h)| 0.5 * b.mass_kg * h.v_m_per_s[t] * h.v_m_per_s[t]).sum()
+            let masses_kg = run.masses_kg(&prepared.chain, t).into_iter();
+            let of = |(m, h): (f64, &BodyHistory)| 0.5 * m * h.v_m_per_s[t] * h.v_m_per_s[t];
+            masses_kg.zip(&run.bodies).map(of).sum()
         };
         Self {
             time_s: run.time_s.clone(),
@@ -298,7 +300,15 @@ pub fn motion(
     let names = names(runs, quantity, chosen)?;
     let mut chart = match quantity {
         Quantity::Energy => {
-            let panels = runs.iter().map(|(name, run)| energy(name, run, &names, runs.len() > 1));
+            // One colour for an interface in all runs.
+            let mut of: Vec<&str> = Vec::new();
+            for interface in runs.iter().flat_map(|(_, run)| areas(run, &names).0) {
+                if !of.contains(&&*interface.name) {
+                    of.push(&interface.name);
+                }
+            }
+            let panels =
+                runs.iter().map(|(name, run)| energy(name, run, &names, &of, runs.len() > 1));
             Chart::row(title, panels.collect::<Result<_, _>>()?)
         }
         _ => lines(title, runs, quantity, &names, filter_class),
@@ -492,8 +502,36 @@ fn crush(interface: &InterfaceMotion) -> Vec<Part> {
     parts.into_iter().take(if end < closed.len() { 2 } else { 1 }).collect()
 }
 
-/// What the interfaces have taken, one above the other, then what is still kinetic.
-fn energy(name: &str, run: &Motion, names: &[String], is_named: bool) -> Result<Panel, Error> {
+/// The most that an interface has taken: what springs back is gone at the end.
+fn most(taken_j: &[f64]) -> f64 {
+    taken_j.iter().copied().fold(0.0, f64::max)
+}
+
+/// The interfaces that have areas of their own, in the order of the chain, and the others that take energy.
+fn areas<'a>(
+    run: &'a Motion,
+    names: &[String],
+) -> (Vec<&'a InterfaceMotion>, Vec<&'a InterfaceMotion>) {
+    let (mut of, mut others): (Vec<_>, Vec<_>) =
+        run.interfaces.iter().enumerate().partition(|(_, of)| names.contains(&of.name));
+    of.sort_by(|(_, a), (_, b)| most(&b.taken_j).total_cmp(&most(&a.taken_j)));
+    others.extend(of.split_off(if of.len() > MOST_AREAS { MOST_AREAS - 1 } else { of.len() }));
+    of.sort_by_key(|(place, _)| *place);
+    others.retain(|(_, of)| most(&of.taken_j) > 0.0);
+    let alone =
+        |all: Vec<(usize, &'a InterfaceMotion)>| all.into_iter().map(|(_, of)| of).collect();
+    (alone(of), alone(others))
+}
+
+/// What the interfaces have taken, one above the other, then what is still kinetic. `looks` has the names of all interfaces with areas
+/// in the order of their colours.
+fn energy(
+    name: &str,
+    run: &Motion,
+    names: &[String],
+    looks: &[&str],
+    is_named: bool,
+) -> Result<Panel, Error> {
     if run.kinetic_j.is_empty() {
         return Err(error!(
             Plot,
@@ -505,32 +543,25 @@ fn energy(name: &str, run: &Motion, names: &[String], is_named: bool) -> Result<
     if is_named {
         panel.title = name.into();
     }
-    // What springs back is gone at the end.
-    let most = |taken_j: &[f64]| taken_j.iter().copied().fold(0.0, f64::max);
-    // By place in the chain, so that runs of one train have the same colours.
-    let (mut of, mut others): (Vec<_>, Vec<_>) =
-        run.interfaces.iter().enumerate().partition(|(_, of)| names.contains(&of.name));
-    of.sort_by(|(_, a), (_, b)| most(&b.taken_j).total_cmp(&most(&a.taken_j)));
-    others.extend(of.split_off(if of.len() > MOST_AREAS { MOST_AREAS - 1 } else { of.len() }));
-    of.sort_by_key(|(place, _)| *place);
-    let mut parts: Vec<(String, Vec<f64>)> =
-        of.iter().map(|(_, of)| (of.name.clone(), of.taken_j.clone())).collect();
+    let (of, others) = areas(run, names);
+    let look = |name: &str| looks.iter().position(|other| *other == name).unwrap_or(0) % MOST_AREAS;
+    let mut parts: Vec<(String, usize, Vec<f64>)> =
+        of.iter().map(|of| (of.name.clone(), look(&of.name), of.taken_j.clone())).collect();
     let states = run.time_s.len();
-    others.retain(|(_, of)| most(&of.taken_j) > 0.0);
-    let sum = |t: usize| others.iter().map(|(_, of)| of.taken_j[t]).sum();
+    let sum = |t: usize| others.iter().map(|of| of.taken_j[t]).sum();
     let sums: Vec<f64> = (0..states).map(sum).collect();
     if most(&sums) > 1e-3 * start_j {
-        parts.push((format!("{} further interfaces", others.len()), sums));
+        parts.push((counted(others.len(), "further interface"), MOST_AREAS - 1, sums));
     }
     let all = |t: usize| run.interfaces.iter().map(|of| of.taken_j[t]).sum::<f64>();
     let lost: Vec<f64> = (0..states).map(|t| start_j - run.kinetic_j[t] - all(t)).collect();
     // Below this it is the method's own error.
     if most(&lost) > 1e-3 * start_j {
-        parts.push((run.rest.into(), lost));
+        parts.push((run.rest.into(), MOST_AREAS, lost));
     }
-    parts.push(("kinetic".into(), run.kinetic_j.clone()));
+    parts.push(("kinetic".into(), MOST_AREAS + 1, run.kinetic_j.clone()));
     let mut low = vec![0.0; states];
-    for (look, (name, values)) in parts.into_iter().enumerate() {
+    for (name, look, values) in parts {
         let high: Vec<f64> =
             low.iter().zip(&values).map(|(low, value)| low + value.max(0.0)).collect();
         let x = run.time_s.clone();
@@ -629,7 +660,8 @@ mod tests {
             notes: Vec::new(),
         };
         let names: Vec<String> = (0..8).map(at).collect();
-        let panel = energy("", &run, &names, false).unwrap();
+        let looks: Vec<&str> = names.iter().map(String::as_str).collect();
+        let panel = energy("", &run, &names, &looks, false).unwrap();
         let last = panel.bands.last().unwrap();
         assert_eq!((last.name.as_str(), &last.high), ("kinetic", &vec![100.0; 3]));
         let shown: Vec<&str> = panel.bands.iter().map(|band| band.name.as_str()).collect();

@@ -82,6 +82,13 @@ pub(crate) fn sweep(
     if !others.is_empty() {
         chart.notes.push(format!("Also varied: {}.", others.join(", ")));
     }
+    for result in results.iter().filter(|result| result.name != OVER_LIMITS) {
+        let missing = result.values.iter().filter(|value| !value.is_finite()).count();
+        if missing > 0 {
+            let of = result.values.len();
+            chart.notes.push(format!("{}: {missing} of {of} rows have no number.", result.name));
+        }
+    }
     let seen = chosen[0].values.len() as u64;
     if seen < columns.rows {
         chart.notes.push(format!("From {seen} of {} rows, chosen by their item.", columns.rows));
@@ -337,31 +344,40 @@ fn over_two(
     let mut chart = Chart::row(title, Vec::new());
     for result in results {
         let (own, mut panel) = (axis(result, false), Panel::new(named_axis(x), named_axis(y)));
-        let mut cells = Vec::new();
+        let (mut cells, mut unknown) = (Vec::new(), 0);
         for (i, (_, members)) in columns.iter().enumerate() {
             for j in 0..rows.len() {
                 let inside: Vec<usize> =
                     members.iter().copied().filter(|&k| row_of[k] == j).collect();
                 let values = sorted(result, &inside);
-                if !values.is_empty() {
-                    cells.push((i, j, values.iter().sum::<f64>() / values.len() as f64));
+                let (sum, known, all) = (values.iter().sum::<f64>(), values.len(), inside.len());
+                let mean = |of: usize, most: usize| (sum + most as f64) / of as f64;
+                if result.name == OVER_LIMITS && all > 0 {
+                    // Runs without a verdict may be either.
+                    unknown += all - known;
+                    cells.push((i, j, [mean(all, 0), mean(all, all - known)]));
+                } else if known > 0 {
+                    cells.push((i, j, [mean(known, 0); 2]));
                 }
             }
         }
         if cells.is_empty() {
             return Err(no_result(result));
         }
-        let all = cells.iter().map(|(.., mean)| *mean);
+        let all = cells.iter().map(|(.., [mean, _])| *mean);
         let (low, high) =
             all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         let share = |mean: f64| if high > low { (mean - low) / (high - low) } else { 0.0 };
         panel.cells = cells
             .iter()
-            .map(|&(i, j, mean)| Cell {
+            .map(|&(i, j, [mean, most])| Cell {
                 x: (x_edges[i], x_edges[i + 1]),
                 y: (y_edges[j], y_edges[j + 1]),
                 depth: share(mean),
-                text: three_digits(mean * own.scale),
+                text: match three_digits(mean * own.scale) {
+                    text if most > mean => format!("{text} to {}", three_digits(most * own.scale)),
+                    text => text,
+                },
             })
             .collect();
         panel.x = panel.x.over(x_edges[0], x_edges[columns.len()]);
@@ -372,8 +388,12 @@ fn over_two(
             of if of == result.name => own.label(),
             of => format!("{} {of}{}", own.quantity, unit_in_brackets(&own.unit)),
         };
+        let either = match unknown {
+            0 => String::new(),
+            _ => format!("; {} without a verdict may be either", counted(unknown, "run")),
+        };
         chart.notes.push(format!(
-            "{}: from {low}{unit} (pale) to {high}{unit} (deep); means of each cell.",
+            "{}: from {low}{unit} (pale) to {high}{unit} (deep); means of each cell{either}.",
             panel.title
         ));
         chart.panels.push(panel);

@@ -147,6 +147,19 @@ impl Findings<'_> {
             if path == BODY_FORCE && opened.version == OLDEST {
                 continue;
             }
+            let [unit, _] = layout::labels(path);
+            let stored = case.dataset(path).and_then(|dataset| dataset.attrs());
+            if let Some(found) = stored.ok().and_then(|mut of| of.remove(unit.0))
+                && found.as_str() != unit.1.as_str()
+            {
+                let found = found.as_str().unwrap_or("not a text");
+                let message = format!(
+                    "the {} of {path} are \"{found}\", and its values are read in {}",
+                    unit.0,
+                    unit.1.as_str().unwrap_or_default()
+                );
+                self.add("attribute_differs", Some(path), None, message);
+            }
             let values = match opened.values(case, path) {
                 Ok(values) => values,
                 Err(detail) => {
@@ -249,7 +262,8 @@ impl Findings<'_> {
             match stored.get(*name).and_then(number) {
                 Some(found) if is_same(found, expected) => {}
                 Some(found) => {
-                    let message = format!("{name} is {found}, the curve's is {expected}");
+                    let message =
+                        format!("{name} is {found}, by the case's other values {expected}");
                     self.add("attribute_differs", None, None, message);
                 }
                 None => {
@@ -394,8 +408,11 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
     }
     let in_list: Vec<&str> = found.listed.iter().flatten().map(String::as_str).collect();
     let there: Vec<&str> = found.cases.iter().map(|(name, _)| name.as_str()).collect();
-    let (is_listed, is_there): (HashSet<&str>, HashSet<&str>) =
-        (in_list.iter().copied().collect(), there.iter().copied().collect());
+    let is_there: HashSet<&str> = there.iter().copied().collect();
+    let mut is_listed = HashSet::new();
+    for name in in_list.iter().filter(|name| !is_listed.insert(**name)) {
+        add(name, "case_list", "is listed more than once in the group's cases".into());
+    }
     for name in in_list.iter().filter(|name| !is_there.contains(*name)) {
         add(name, "case_list", "is listed in the group's cases, but is missing".into());
     }

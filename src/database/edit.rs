@@ -27,10 +27,13 @@ pub(super) fn write_keeping(
     let is_current = opened::open(path)?.version == VERSION;
     let mut old = opened::decode(path)?;
     let moves = Moves::of(&old, database, before);
-    let before: BTreeSet<Item> = before.iter().map(|item| moves.of_item(item)).collect();
+    // Where each goes, and where it is.
+    let moved: BTreeMap<Item, &Item> =
+        before.iter().map(|item| (moves.of_item(item), item)).collect();
+    let before: BTreeSet<Item> = moved.keys().cloned().collect();
     let listed = |items: &BTreeSet<Item>| match items.is_empty() {
         true => "links".to_string(),
-        false => listed(items),
+        false => listed(&items.iter().map(|item| moved[item].clone()).collect()),
     };
     let would_drop = |what: String| {
         error!(

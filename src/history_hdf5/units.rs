@@ -68,7 +68,12 @@ const PARTS: [(&str, Quantity); 4] = [
 ];
 
 /// Names that alone determine the quantity of a component of one section.
-const OF_SECTION: [(&str, &[&str], Quantity); 8] = [
+const OF_SECTION: [(&str, &[&str], Quantity); 9] = [
+    (
+        "sleout",
+        &["slave", "master", "total_slave", "total_master", "total_friction"],
+        Quantity::Energy,
+    ),
     ("spcforc", &["x_resultant", "y_resultant", "z_resultant"], Quantity::Force),
     ("bndout", &["x_total", "y_total", "z_total"], Quantity::Force),
     ("elout", &["axial", "shear_s", "shear_t"], Quantity::Force),

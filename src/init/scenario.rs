@@ -230,7 +230,7 @@ impl ScenarioProposal {
         if !self.ends {
             text.line("curve = \"nose\"");
         }
-        text.comment("guessed: the noses touch at the start; a clear distance between them only delays the crash");
+        text.comment("guessed: the noses touch at the start; a run counts from the first contact, whatever the distance");
         text.line("gap = \"0mm\"");
         text.done()
     }

@@ -349,6 +349,20 @@ impl Run {
         run
     }
 
+    /// Masses of the chain's bodies in kg at output `t` of its histories: crush zones have taken what they have stopped.
+    pub(crate) fn masses_kg(&self, chain: &Chain, t: usize) -> Vec<f64> {
+        let mut masses_kg: Vec<f64> = chain.bodies().iter().map(|body| body.mass_kg).collect();
+        for (interface, history) in chain.interfaces().iter().zip(&self.interfaces) {
+            if let Some(stopping) = &interface.stopping {
+                let before_kg = masses_kg[stopping.zone];
+                let now_kg = stopping.zone_kg(history.largest_deflection_m[t], before_kg);
+                masses_kg[stopping.zone] = now_kg;
+                masses_kg[stopping.body] -= now_kg - before_kg;
+            }
+        }
+        masses_kg
+    }
+
     /// Interfaces, counted from back to front, that were crushed or pulled beyond the data of their curves.
     pub fn beyond_data(&self) -> impl Iterator<Item = usize> {
         self.interfaces.iter().enumerate().filter(|(_, i)| i.is_beyond_data()).map(|(k, _)| k)

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{PLATES, Prepared};
-use crate::multibody::{InterfaceHistory, Run};
+use crate::multibody::{BodyHistory, InterfaceHistory, Run};
 
 /// Something that happened at an interface.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -191,17 +191,20 @@ pub(super) fn common_speed_time_s(prepared: &Prepared, run: &Run) -> Option<f64>
     if prepared.settings.output_interval_s > MOST_INTERVAL_S {
         return None;
     }
-    let bodies = prepared.chain.bodies();
-    let (first, second) = bodies.split_at(prepared.meeting + 1);
-    let mean = |from: usize, of: &[crate::multibody::Body], t: usize| {
-        let mass_kg: f64 = of.iter().map(|body| body.mass_kg).sum();
-        let pairs = of.iter().zip(&run.bodies[from..]);
-        let momentum: f64 = pairs.map(|(body, h)| body.mass_kg * h.v_m_per_s[t]).sum();
+    let (first, second) = run.bodies.split_at(prepared.meeting + 1);
+    let mean = |masses_kg: &[f64], of: &[BodyHistory], t: usize| {
+        let mass_kg: f64 = masses_kg.iter().sum();
+        let pairs = masses_kg.iter().zip(of);
+        let momentum: f64 = pairs.map(|(mass_kg, h)| mass_kg * h.v_m_per_s[t]).sum();
         if mass_kg > 0.0 { momentum / mass_kg } else { 0.0 }
     };
     // Falls to 0; the sign is turned, so that it rises.
-    let closing: Vec<f64> =
-        (0..run.time_s.len()).map(|t| mean(first.len(), second, t) - mean(0, first, t)).collect();
+    let closing = |t: usize| {
+        let masses_kg = run.masses_kg(&prepared.chain, t);
+        let (of_first, of_second) = masses_kg.split_at(first.len());
+        mean(of_second, second, t) - mean(of_first, first, t)
+    };
+    let closing: Vec<f64> = (0..run.time_s.len()).map(closing).collect();
     let is_closing = closing.first().is_some_and(|first| *first < 0.0);
     is_closing.then(|| crossing_s(&run.time_s, &closing, 0.0)).flatten()
 }
