@@ -957,6 +957,40 @@ fn the_motion_has_the_mass_in_it() {
         let error = predict(&model, &Query::at(10.0)).unwrap_err().to_string();
         says(&error, "the model needs mass_kg, the mass of the body: give --mass");
     }
+    // Runs of one speed are one evidence of the band.
+    let three = [8.0, 12.0, 16.0].map(|v| [(v, 20e3), (v, 30e3)]).concat();
+    let model = train("made", &of(&three), auto).unwrap();
+    let at = Query { mass_kg: Some(24e3), ..Query::at(10.0) };
+    let curve = predict(&model, &at).unwrap();
+    assert_eq!(model.leave_one_out.unwrap().band.unwrap().curves, 1);
+    assert!(curve.warnings.iter().any(|w| w.message.contains("only one speed could be left out")));
+    // A light body stops early: beyond its curve those of heavier and slower ones say how the force goes on.
+    let stepped = |d: f64, u: f64| if d < 0.7 { law(d, u) } else { 2.5 * law(d, u) };
+    let of = |(v, m): (f64, f64)| case(&format!("{v} {m}"), v, m, &stepped);
+    let cases = [(6.0, 30e3), (8.0, 48e3), (10.0, 48e3), (12.0, 48e3), (15.0, 6e3)].map(of);
+    let model = train("made", &cases, Choice::Kind(ModelKind::rate())).unwrap();
+    for (v, mass_kg) in [(15.0, 20e3), (14.5, 18e3), (12.5, 40e3), (13.5, 30e3)] {
+        let truth = of((v, mass_kg)).max_deflection_m();
+        let curve = predict(&model, &Query { mass_kg: Some(mass_kg), ..Query::at(v) }).unwrap();
+        let error = curve.max_deflection_m / truth - 1.0;
+        assert!(truth > 0.72 && error.abs() < 0.02, "{v} m/s, {mass_kg} kg: {error} of {truth} m");
+    }
+    // A change of mode is found between the runs of two masses, too; a dead run of a mass of its own narrows nothing.
+    let softer = |v: f64, m: f64| {
+        let force = |d: f64, u: f64| if v > 12.0 && d > 0.25 { 0.5 * law(d, u) } else { law(d, u) };
+        case(&format!("{v} {m}"), v, m, &force)
+    };
+    let cases = [8.0, 11.0, 13.0, 16.0].map(|v| [softer(v, 20e3), softer(v, 30e3)]).concat();
+    let model = train("made", &cases, Choice::Kind(ModelKind::rate())).unwrap();
+    assert_eq!(model.mode_switches_m_per_s, [(11.0, 13.0)]);
+    let dead = died(case("dead", 17.0, 23e3, &law), 0.15);
+    let with_dead = [mixed.clone(), vec![dead]].concat();
+    let near = |cases: &[Case]| {
+        let model = train("made", cases, Choice::Kind(ModelKind::rate())).unwrap();
+        let at = Query { mass_kg: Some(23e3), ..Query::at(16.9) };
+        predict(&model, &at).unwrap().provenance.nearest_training_speed_m_per_s
+    };
+    assert_eq!([near(&mixed), near(&with_dead)], [18.0; 2]);
     // A crush law of runs of two masses is that of runs of one; the crush zone of either is stopped alike.
     let crush_of = |points: &[(f64, f64)]| {
         let cases: Vec<Case> = points.iter().map(|&(v, m)| with_stopped_mass(v, m, 1e3)).collect();

@@ -111,7 +111,9 @@ pub(crate) fn choose(
 /// The models whose force follows the closing speed, the default first: by simplicity, but the crush law last if it needs
 /// more stopped mass than crush zones hold.
 pub(super) fn physical(set: &TrainingSet) -> Vec<&'static str> {
-    let is_doubtful = set.stopped_mass().is_some_and(|m| !m.is_usual(set.masses.effective_kg()));
+    let masses = set.cases.iter().map(|case| case.effective_mass_kg);
+    let lightest_kg = masses.fold(f64::INFINITY, f64::min);
+    let is_doubtful = set.stopped_mass().is_some_and(|m| !m.is_usual(lightest_kg));
     let mut physical: Vec<_> = MODELS.iter().filter(|entry| entry.follows_closing).collect();
     physical.sort_by_key(|entry| (entry.needs_crush_law && is_doubtful, entry.complexity));
     physical.into_iter().map(|entry| entry.name).collect()

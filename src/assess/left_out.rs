@@ -7,7 +7,9 @@ use rayon::prelude::*;
 use super::reference::{MotionErrors, Reference};
 use crate::curve::force_curve::ForceCurve;
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
-use crate::dataset::{OTHER_MASS, TrainingCase, TrainingSet, grid, is_within, nearly_same};
+use crate::dataset::{
+    Feature, OTHER_MASS, TrainingCase, TrainingSet, grid, is_within, nearly_same,
+};
 use crate::error::{Error, error};
 use crate::signal::l1_ratio;
 use crate::signal::peaks::matched_peaks;
@@ -232,12 +234,17 @@ impl<'a> LeftOutCase<'a> {
         curve: &PredictedCurve,
         along: &[f64],
     ) -> Result<BTreeMap<ForceKind, Residuals>, Error> {
+        let features = &self.rest.features;
+        let is_of_masses = !features.is_empty() && features.iter().all(Feature::is_mass);
         // Up to its first point a prediction rises from 0, which FE does not.
         let first = curve.deflection_m[1];
         let from = along.iter().position(|&d| d >= first).unwrap_or(0);
         let of = |fe: &Envelope, predicted: &Envelope| {
             let mut ratios = band::ratios(&forces_n(fe, along), &forces_n(predicted, along));
-            Residuals::new(self.gap, ratios.split_off(from), self.own.runs.len())
+            let (ratios, runs) = (ratios.split_off(from), self.own.runs.len());
+            let mut residuals = Residuals::new(self.gap, ratios, runs);
+            residuals.is_of_masses = is_of_masses;
+            residuals
         };
         let declared = of(&self.own.envelope, &curve.envelope()?);
         let mut residuals = BTreeMap::from([(curve.provenance.force_kind, declared)]);

@@ -300,15 +300,20 @@ pub fn motion(
     let names = names(runs, quantity, chosen)?;
     let mut chart = match quantity {
         Quantity::Energy => {
-            // One colour for an interface in all runs.
-            let mut of: Vec<&str> = Vec::new();
+            // One colour for an interface in all runs; those that take the most have one.
+            let mut of: Vec<(&str, f64)> = Vec::new();
             for interface in runs.iter().flat_map(|(_, run)| areas(run, &names).0) {
-                if !of.contains(&&*interface.name) {
-                    of.push(&interface.name);
+                match of.iter_mut().find(|(name, _)| *name == interface.name) {
+                    Some((_, most_j)) => *most_j = most_j.max(most(&interface.taken_j)),
+                    None => of.push((&interface.name, most(&interface.taken_j))),
                 }
             }
-            let panels =
-                runs.iter().map(|(name, run)| energy(name, run, &names, &of, runs.len() > 1));
+            let mut largest: Vec<f64> = of.iter().map(|(_, most_j)| *most_j).collect();
+            largest.sort_by(|a, b| b.total_cmp(a));
+            let least_j = largest.get(MOST_AREAS - 1).copied().unwrap_or(0.0);
+            let looks = of.iter().filter(|(_, most_j)| of.len() <= MOST_AREAS || *most_j > least_j);
+            let looks: Vec<String> = looks.map(|(name, _)| name.to_string()).collect();
+            let panels = runs.iter().map(|(name, run)| energy(name, run, &looks, runs.len() > 1));
             Chart::row(title, panels.collect::<Result<_, _>>()?)
         }
         _ => lines(title, runs, quantity, &names, filter_class),
@@ -523,15 +528,9 @@ fn areas<'a>(
     (alone(of), alone(others))
 }
 
-/// What the interfaces have taken, one above the other, then what is still kinetic. `looks` has the names of all interfaces with areas
+/// What the interfaces have taken, one above the other, then what is still kinetic. `looks` has the names of the interfaces with areas
 /// in the order of their colours.
-fn energy(
-    name: &str,
-    run: &Motion,
-    names: &[String],
-    looks: &[&str],
-    is_named: bool,
-) -> Result<Panel, Error> {
+fn energy(name: &str, run: &Motion, looks: &[String], is_named: bool) -> Result<Panel, Error> {
     if run.kinetic_j.is_empty() {
         return Err(error!(
             Plot,
@@ -543,15 +542,16 @@ fn energy(
     if is_named {
         panel.title = name.into();
     }
-    let (of, others) = areas(run, names);
-    let look = |name: &str| looks.iter().position(|other| *other == name).unwrap_or(0) % MOST_AREAS;
+    let (of, others) = areas(run, looks);
+    let look = |name: &str| looks.iter().position(|other| *other == name).unwrap_or(0);
     let mut parts: Vec<(String, usize, Vec<f64>)> =
         of.iter().map(|of| (of.name.clone(), look(&of.name), of.taken_j.clone())).collect();
     let states = run.time_s.len();
     let sum = |t: usize| others.iter().map(|of| of.taken_j[t]).sum();
     let sums: Vec<f64> = (0..states).map(sum).collect();
     if most(&sums) > 1e-3 * start_j {
-        parts.push((counted(others.len(), "further interface"), MOST_AREAS - 1, sums));
+        let look = looks.len().max(MOST_AREAS - 1);
+        parts.push((counted(others.len(), "further interface"), look, sums));
     }
     let all = |t: usize| run.interfaces.iter().map(|of| of.taken_j[t]).sum::<f64>();
     let lost: Vec<f64> = (0..states).map(|t| start_j - run.kinetic_j[t] - all(t)).collect();
@@ -660,8 +660,8 @@ mod tests {
             notes: Vec::new(),
         };
         let names: Vec<String> = (0..8).map(at).collect();
-        let looks: Vec<&str> = names.iter().map(String::as_str).collect();
-        let panel = energy("", &run, &names, &looks, false).unwrap();
+        let looks: Vec<String> = areas(&run, &names).0.iter().map(|of| of.name.clone()).collect();
+        let panel = energy("", &run, &looks, false).unwrap();
         let last = panel.bands.last().unwrap();
         assert_eq!((last.name.as_str(), &last.high), ("kinetic", &vec![100.0; 3]));
         let shown: Vec<&str> = panel.bands.iter().map(|band| band.name.as_str()).collect();

@@ -197,7 +197,14 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             [first, .., last] if speeds.len() > MOST_LISTED => {
                 format!("{} cases from {} to {}", speeds.len(), km_per_h(*first), km_per_h(*last))
             }
-            all => all.iter().map(|speed| km_per_h(*speed)).collect::<Vec<_>>().join(", "),
+            all => {
+                let shown: Vec<String> = all.iter().map(|speed| km_per_h(*speed)).collect();
+                let of = |same: &[String]| match same {
+                    [one] => one.clone(),
+                    _ => format!("{} ({} cases)", same[0], same.len()),
+                };
+                shown.chunk_by(|a, b| a == b).map(of).collect::<Vec<_>>().join(", ")
+            }
         };
         writeln!(out, "{} on {on}", model.name())?;
         if let Some(oob) = out_of_bag {

@@ -36,8 +36,15 @@ pub(crate) fn remarks(cases: &[Case]) -> Vec<Remark> {
     all.extend(titles(cases));
     let runs: Vec<&Case> =
         cases.iter().filter(|c| c.id.study != IMPORTED && !c.is_truncated()).collect();
-    let energy = |case: &&Case| (case.conditions.speed.m_per_s, case.quality.audit.ratio());
-    let impulse = |case: &&Case| (case.conditions.speed.m_per_s, impulse_ratio(case));
+    // What a crush zone stops is less of a heavier body: all are compared as if they had the largest mass.
+    let of_mass = |case: &Case| case.conditions.masses.effective_kg();
+    let heaviest_kg = runs.iter().map(|case| of_mass(case)).fold(0.0, f64::max);
+    let scaled = |ratio: f64, by: f64| ratio + (ratio - 1.0) * (by - 1.0);
+    let point = |case: &Case, ratio: f64| {
+        (case.conditions.speed.m_per_s, scaled(ratio, of_mass(case) / heaviest_kg))
+    };
+    let energy = |case: &&Case| point(case, case.quality.audit.ratio());
+    let impulse = |case: &&Case| point(case, impulse_ratio(case));
     let measures: [(_, _, Vec<(f64, f64)>); 2] = [
         ("group_energy", "W/E", runs.iter().map(energy).collect()),
         ("group_impulse", "impulse over momentum", runs.iter().map(impulse).collect()),
@@ -52,6 +59,8 @@ pub(crate) fn remarks(cases: &[Case]) -> Vec<Remark> {
             let is_outside = !(low - OUTSIDE..=high + OUTSIDE).contains(&found);
             let is_unlike = |of: f64| (found / of - 1.0).abs() > UNLIKE;
             if is_outside && is_unlike(expected) && is_unlike(expected.max(low).min(high)) {
+                let own = |ratio: f64| scaled(ratio, heaviest_kg / of_mass(case));
+                let (found, expected) = (own(found), own(expected));
                 all.push((
                     case.id.name.clone(),
                     code,
@@ -63,18 +72,19 @@ pub(crate) fn remarks(cases: &[Case]) -> Vec<Remark> {
             }
         }
     }
-    all.extend(early_forces(&runs));
+    all.extend(early_forces(&runs, |case| of_mass(case) / heaviest_kg));
     all.extend(designs(&runs));
     all
 }
 
 /// Runs whose contact force runs further ahead of their body than that of any other run of their design does: a crush zone that is stopped
 /// first takes a part that changes little with the speed.
-fn early_forces(runs: &[&Case]) -> Vec<Remark> {
+/// `share` is that of a run's mass in the largest.
+fn early_forces(runs: &[&Case], share: impl Fn(&Case) -> f64) -> Vec<Remark> {
     let mut alike: BTreeMap<String, Vec<(&Case, f64)>> = BTreeMap::new();
     for case in runs.iter().filter(|case| case.curves.force_kind == ForceKind::Contact) {
         let of = alike.entry(format!("{:?}", case.conditions.parameters)).or_default();
-        of.push((case, lead(case)));
+        of.push((case, lead(case) * share(case)));
     }
     let mut found = Vec::new();
     for runs in alike.values().filter(|runs| runs.len() >= LEAST_ALIKE) {
@@ -88,8 +98,8 @@ fn early_forces(runs: &[&Case]) -> Vec<Remark> {
             if *lead > most + LEAD && !is_coarse {
                 let words = format!(
                     "the impulse of its force runs ahead of the momentum that the body has lost by up to {:.1} % of the impact's momentum, that of the group's other runs by {:.1} % at most: its force may be recorded early",
-                    lead * 100.0,
-                    most * 100.0
+                    lead / share(case) * 100.0,
+                    most / share(case) * 100.0
                 );
                 found.push((case.id.name.clone(), "group_lead", words));
             }

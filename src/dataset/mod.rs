@@ -308,10 +308,10 @@ pub(crate) fn nearly_same(speeds: &[f64], v: f64) -> (f64, f64) {
 }
 
 /// The cases but for those that ended while loading, before a slower one of the same features stood: of the crush at their speed they
-/// show nothing that others do not. `of` gives whether a case ended so, its speed, its end in m and its features.
+/// show nothing that others do not. `of` gives whether a case ended so, its speed, its end in m and its features but for masses.
 pub(crate) fn show_their_crush<'a, C>(
     cases: &'a [C],
-    of: impl Fn(&'a C) -> (bool, f64, f64, &'a Vec<f64>),
+    of: impl Fn(&'a C) -> (bool, f64, f64, &'a [f64]),
 ) -> impl Iterator<Item = &'a C> {
     cases.iter().filter(move |case| {
         let (truncated, speed, end_m, features) = of(case);
@@ -453,8 +453,10 @@ impl TrainingSet {
 
     /// Of the cases that [`show_their_crush`].
     pub(crate) fn speeds_of_crush_m_per_s(&self) -> Vec<f64> {
+        let alone = self.features.iter().all(Feature::is_mass);
         let showing = show_their_crush(&self.cases, |case| {
-            (case.truncated, case.speed_m_per_s, case.envelope.end_m(), &case.features)
+            let features = if alone { &[] } else { &case.features[..] };
+            (case.truncated, case.speed_m_per_s, case.envelope.end_m(), features)
         });
         showing.map(|case| case.speed_m_per_s).collect()
     }

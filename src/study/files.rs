@@ -11,7 +11,7 @@ use crate::file::{self, is_file};
 use crate::guess;
 use crate::solver::decks::{self, Search};
 use crate::solver::lsdyna::deck::Deck;
-use crate::solver::{self, Selection};
+use crate::solver::{self, Problem, ProblemCode, Selection};
 
 /// A source file of a run before it is read.
 #[derive(Clone, Debug, PartialEq)]
@@ -54,7 +54,9 @@ pub(super) fn locate_file(folder: &Path, name: &str) -> Result<Located, Error> {
             Err(error) if is_text && error.code() != ErrorCode::Io => continue,
             Err(error) => return Err(error.at(KeyPath::default())),
         };
-        if let Some(problem) = sections.iter().find_map(|s| s.problems.first())
+        let has_states = sections.iter().any(|s| !s.time.is_empty());
+        let cut = |p: &&Problem| !has_states || p.code == ProblemCode::CutRecord;
+        if let Some(problem) = sections.iter().find_map(|s| s.problems.iter().find(cut))
             && damaged.is_none()
         {
             damaged = Some(format!("{part} is damaged ({problem})"));

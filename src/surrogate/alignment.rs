@@ -16,6 +16,7 @@
 use super::CaseCurve;
 use super::curves::{LEAST_WAY_M, mean_over, neighbours};
 use crate::curve::group::LEAST_RATIO;
+use crate::dataset::is_same_speed;
 use crate::piecewise;
 
 /// A pair is aligned if that takes so much away from the mean square of its differences, relative to the level, after the price of the
@@ -128,21 +129,24 @@ pub(super) fn mode_switches(cases: &[CaseCurve]) -> Vec<(usize, usize)> {
         let by = |curve: usize| Sampled { end_m: cases[curve].end_m(), level_n: &relative, curve };
         (Pair::of(&by(i), &by(i + 1)), levels[1] < LEAST_RATIO * levels[0])
     };
-    let pairs = (0..cases.len().saturating_sub(1)).map(pair);
-    let (pairs, is_weaker): (Vec<Pair>, Vec<bool>) = pairs.unzip();
-    let speed = |i: usize| cases[i + 1].speed_m_per_s - cases[i].speed_m_per_s;
+    let speed = |i: usize| cases[i].speed_m_per_s;
+    // Runs of other masses may have the same speed.
+    let slow: Vec<usize> = (0..cases.len().saturating_sub(1))
+        .filter(|&i| !is_same_speed(speed(i), speed(i + 1)))
+        .collect();
+    let (pairs, is_weaker): (Vec<Pair>, Vec<bool>) = slow.iter().map(|&i| pair(i)).unzip();
     let mut rates: Vec<f64> =
-        pairs.iter().enumerate().map(|(i, p)| p.most_m() / speed(i)).collect();
+        slow.iter().zip(&pairs).map(|(&i, p)| p.most_m() / (speed(i + 1) - speed(i))).collect();
     let of: Vec<f64> = rates.clone();
     rates.sort_by(f64::total_cmp);
     let usual = rates.get(rates.len() / 2).copied().unwrap_or(0.0);
-    let switches = |&i: &usize| {
+    let switches = |&k: &usize| {
         let jumps = pairs.len() > 2
-            && of[i] > JUMP * usual
-            && pairs[i].most_m() > LEAST_JUMP * cases[i + 1].end_m();
-        jumps || pairs[i].rest > UNLIKE || is_weaker[i]
+            && of[k] > JUMP * usual
+            && pairs[k].most_m() > LEAST_JUMP * cases[slow[k] + 1].end_m();
+        jumps || pairs[k].rest > UNLIKE || is_weaker[k]
     };
-    (0..pairs.len()).filter(switches).map(|i| (i, i + 1)).collect()
+    (0..pairs.len()).filter(switches).map(|k| (slow[k], slow[k] + 1)).collect()
 }
 
 /// Two neighbouring curves.

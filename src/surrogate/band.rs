@@ -193,13 +193,20 @@ pub(crate) struct Residuals {
     pub ratios: Vec<f64>,
     /// How many runs the left-out curve is the mean of.
     pub runs: usize,
+    /// Whether the group's cases differ in speed and mass alone: those of one speed, which are left out together, are one curve.
+    pub is_of_masses: bool,
     /// How many stretches of it lie above or below the prediction by themselves.
     stretches: usize,
 }
 
 impl Residuals {
     pub(crate) fn new(gap: Gap, ratios: Vec<f64>, runs: usize) -> Self {
-        Self { stretches: stretches(&ratios), gap, ratios, runs }
+        Self { stretches: stretches(&ratios), gap, ratios, runs, is_of_masses: false }
+    }
+
+    /// Whether both are of one speed and differ in mass alone.
+    fn is_with(&self, other: &Self) -> bool {
+        self.is_of_masses && self.gap == other.gap
     }
 
     /// Share of the points within a half width.
@@ -322,26 +329,30 @@ impl Band {
         curves: &[&Residuals],
         scatter: Option<ForceScatter>,
     ) -> Option<Self> {
-        let t_of_curves = student_t(curves.len())?;
+        let shares = shares(curves);
+        let n = shares.iter().sum::<f64>();
+        let t_of_curves = student_t(n.round() as usize)?;
         let t_of_points = student_t(degrees_of_freedom(left_out, curves))?;
-        let n = curves.len() as f64;
-        let mean = |of: fn(&Gap) -> f64| curves.iter().map(|r| of(&r.gap)).sum::<f64>() / n;
+        let sum = |of: &dyn Fn(&Residuals) -> f64| -> f64 {
+            curves.iter().zip(&shares).map(|(r, share)| share * of(r)).sum()
+        };
+        let mean = |of: fn(&Gap) -> f64| sum(&|r| of(&r.gap)) / n;
         let gap = Gap {
             span_m_per_s: mean(|gap| gap.span_m_per_s),
             around_m_per_s: mean(|gap| gap.around_m_per_s),
         };
         let over_span = |of: &dyn Fn(&[f64]) -> f64, scatter: Option<f64>| {
-            let of = |r: &&Residuals| {
+            let of = |r: &Residuals| {
                 let of_scatter = scatter.map_or(0.0, |s| s * s / r.runs as f64);
                 (of(&r.ratios) - of_scatter) / r.gap.over(gap, left_out).powi(2)
             };
-            (curves.iter().map(of).sum::<f64>() / n).max(0.0).sqrt()
+            (sum(&of) / n).max(0.0).sqrt()
         };
         let squares = |r: &[f64]| r.iter().map(|x| x * x).sum::<f64>() / r.len().max(1) as f64;
         let largest = |r: &[f64]| r.iter().fold(0.0_f64, |m, x| m.max(x.abs())).powi(2);
         let band = Self {
             level: LEVEL,
-            curves: curves.len(),
+            curves: n.round() as usize,
             left_out,
             span_m_per_s: gap.span_m_per_s,
             around_m_per_s: gap.around_m_per_s,
@@ -443,21 +454,32 @@ pub(crate) fn at(inner: Option<Band>, ends: Option<Band>, speeds: &[f64], v: f64
 
 /// Degrees of freedom of the width at one deflection.
 fn degrees_of_freedom(left_out: LeftOutSpeeds, curves: &[&Residuals]) -> usize {
-    match left_out {
-        LeftOutSpeeds::Inner => curves.iter().map(|r| r.stretches).sum(),
-        LeftOutSpeeds::Ends => curves.len(),
-    }
+    let of = |(r, share): (&&Residuals, f64)| match left_out {
+        LeftOutSpeeds::Inner => share * r.stretches as f64,
+        LeftOutSpeeds::Ends => share,
+    };
+    curves.iter().zip(shares(curves)).map(of).sum::<f64>().round() as usize
 }
 
-/// The band that the curves other than `i` give over its gap, with its degrees of freedom.
+/// How much each curve counts: 1, or its share of those of one speed that differ in mass alone.
+fn shares(curves: &[&Residuals]) -> Vec<f64> {
+    let share = |r: &&Residuals| {
+        let others = curves.iter().filter(|other| r.is_with(other)).count();
+        1.0 / others.max(1) as f64
+    };
+    curves.iter().map(share).collect()
+}
+
+/// The band that the curves of other speeds than `i` give over its gap, with its degrees of freedom.
 fn without_own(
     left_out: LeftOutSpeeds,
     curves: &[Residuals],
     i: usize,
     scatter: Option<ForceScatter>,
 ) -> Option<(Band, usize)> {
+    let is_other = |&(k, r): &(usize, &Residuals)| k != i && !r.is_with(&curves[i]);
     let others: Vec<&Residuals> =
-        curves.iter().enumerate().filter(|(k, _)| *k != i).map(|(_, r)| r).collect();
+        curves.iter().enumerate().filter(is_other).map(|(_, r)| r).collect();
     let band = Band::without_coverage(left_out, &others, scatter)?.over(curves[i].gap)?;
     Some((band, degrees_of_freedom(left_out, &others)))
 }

@@ -133,13 +133,16 @@ pub(super) fn mean_over(
 pub(super) const LEAST_WAY_M: f64 = 1e-6;
 
 /// The two neighbours of `v` among increasing speeds and the share of the second, 0 to 1:
-/// beyond the ends the outermost alone.
+/// beyond the ends the outermost alone. Of equal speeds, those of heavier bodies, the last counts.
 pub(crate) fn neighbours(speeds: &[f64], v: f64) -> (usize, usize, f64) {
     let above = speeds.partition_point(|&s| s <= v);
     match above {
         0 => (0, 0, 0.0),
         n if n == speeds.len() => (n - 1, n - 1, 0.0),
-        n => (n - 1, n, (v - speeds[n - 1]) / (speeds[n] - speeds[n - 1])),
+        n => {
+            let high = speeds.partition_point(|&s| s <= speeds[n]) - 1;
+            (n - 1, high, (v - speeds[n - 1]) / (speeds[n] - speeds[n - 1]))
+        }
     }
 }
 

@@ -145,7 +145,7 @@ impl Model {
         let model = material.fit(kind)?;
         let crush_law = material.crush_law().clone();
         let speed = |i: usize| model.cases[i].speed_m_per_s;
-        let switches = if set.features.is_empty() {
+        let switches = if set.features.iter().all(Feature::is_mass) {
             mode_switches(&model.curves.declared)
         } else {
             Vec::new()
@@ -248,8 +248,10 @@ impl Model {
 
     /// The runs that [`show_their_crush`].
     fn showing(&self) -> impl Iterator<Item = &ModelCase> {
-        show_their_crush(&self.cases, |case| {
-            (case.truncated, case.speed_m_per_s, case.max_deflection_m, &case.features)
+        let alone = self.features.iter().all(Feature::is_mass);
+        show_their_crush(&self.cases, move |case| {
+            let features = if alone { &[] } else { &case.features[..] };
+            (case.truncated, case.speed_m_per_s, case.max_deflection_m, features)
         })
     }
 
@@ -457,7 +459,7 @@ impl Model {
         }
         let nearest = speeds[nearest(speeds.iter().copied(), v)];
         if !self.contains(at) {
-            let of = if speeds.len() < self.cases.len() {
+            let of = if self.cases.iter().any(|case| !self.is_alike(case, at)) {
                 " of the runs with these parameters"
             } else {
                 ""

@@ -46,7 +46,8 @@ pub(super) const ENTRY: ModelEntry = ModelEntry {
 /// speeds that an interface sees inside a train need no other curve.
 ///
 /// Beyond the end of a slower neighbour, its Q is that of the next faster curve times a ratio that
-/// begins at their ratio there and decays to 1, so that the blend has no step.
+/// begins at their ratio there and decays to 1, so that the blend has no step. Where no faster curve goes further, a slower one
+/// takes its place.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Rate {
     /// β, in (s/m)^½.
@@ -67,7 +68,7 @@ struct Prepared {
     of: Vec<[f64; 3]>,
     /// `None` where no event moves.
     alignment: Option<Alignment>,
-    /// Level of each curve, aligned where that is needed, at its end against the next faster one; 1 for the fastest.
+    /// Level of each curve, aligned where that is needed, at its end against the one along which it is carried on; 1 for the longest.
     levels: Vec<f64>,
     /// What the runs have of their own, for [`Blend`].
     own: f64,
@@ -149,14 +150,21 @@ impl Rate {
 
     /// `Q` of case `i`, carried on beyond its end.
     fn quotient(&self, cases: &[CaseCurve], levels: &[f64], i: usize, d: f64) -> f64 {
-        let last = (i..cases.len() - 1).find(|&k| cases[k].reaches(d)).unwrap_or(cases.len() - 1);
-        (i..=last).rev().fold(0.0, |next_n, k| self.carried_n(cases, levels, k, d, next_n))
+        let case = &cases[i];
+        match carries_on(cases, i).filter(|_| !case.reaches(d)) {
+            Some(along) => {
+                let along_n = self.quotient(cases, levels, along, d);
+                self.carried_n(cases, levels, (i, along), d, along_n)
+            }
+            // Beyond the longest curve its end is held, where it stood.
+            None => case.force_at(d) / self.factor(case.closing_at(d)),
+        }
     }
 
-    /// What the impact speed of case `i` makes of the Q of the next faster one.
-    fn level_of_next(&self, cases: &[CaseCurve], i: usize) -> f64 {
+    /// What the impact speed of case `i` makes of the Q of another.
+    fn level_of(&self, cases: &[CaseCurve], i: usize, other: usize) -> f64 {
         let of = |i: usize| factor(self.of_impact.unwrap_or(0.0), cases[i].speed_m_per_s);
-        of(i) / of(i + 1)
+        of(i) / of(other)
     }
 
     fn carried(&self) -> LevelExtrapolation {
@@ -296,12 +304,17 @@ impl Rate {
     /// The curves along deflections in m.
     fn along(&self, cases: &[CaseCurve], levels: &[f64], deflection_m: &[f64]) -> Along {
         let ends_m = furthest_m(cases);
+        let along: Vec<Option<usize>> = (0..cases.len()).map(|i| carries_on(cases, i)).collect();
         let curves_at = |&d: &f64| {
             let mut curves = vec![(0.0, 0.0); cases.len()];
-            let mut next_n = 0.0;
             for i in (0..cases.len()).rev() {
-                next_n = self.carried_n(cases, levels, i, d, next_n);
-                curves[i] = (next_n, self.fading(ends_m[i], d));
+                let on = along[i].filter(|_| !cases[i].reaches(d));
+                let value_n = match on.filter(|on| *on == i + 1) {
+                    // That of the next one is known by now.
+                    Some(on) => self.carried_n(cases, levels, (i, on), d, curves[on].0),
+                    None => self.quotient(cases, levels, i, d),
+                };
+                curves[i] = (value_n, self.fading(ends_m[i], d));
             }
             curves
         };
@@ -319,15 +332,17 @@ impl Rate {
         }
     }
 
-    /// `Q` of case `i`, beyond its end from `next_n`, that of the next faster one.
-    fn carried_n(&self, cases: &[CaseCurve], levels: &[f64], i: usize, d: f64, next_n: f64) -> f64 {
-        let case = &cases[i];
-        if case.reaches(d) || i + 1 == cases.len() {
-            // Beyond the fastest curve its end is held, where it stood.
-            return case.force_at(d) / self.factor(case.closing_at(d));
-        }
-        let level = 1.0 + (levels[i] - 1.0) * self.fading(case.end_m(), d);
-        next_n * self.level_of_next(cases, i) * level
+    /// `Q` of case `i` beyond its end from that of the one `along` which it is carried on.
+    fn carried_n(
+        &self,
+        cases: &[CaseCurve],
+        levels: &[f64],
+        (i, along): (usize, usize),
+        d: f64,
+        along_n: f64,
+    ) -> f64 {
+        let level = 1.0 + (levels[i] - 1.0) * self.fading(cases[i].end_m(), d);
+        along_n * self.level_of(cases, i, along) * level
     }
 
     /// Whether β is one that a fit gives.
@@ -341,19 +356,28 @@ impl Rate {
 
     fn find_levels(&self, cases: &[CaseCurve]) -> Vec<f64> {
         let mut levels = vec![1.0; cases.len()];
-        for i in (0..cases.len().saturating_sub(1)).rev() {
+        for i in (0..cases.len()).rev() {
+            let Some(along) = carries_on(cases, i) else { continue };
             let end = cases[i].end_m();
             let at = |k: usize| end * (1.0 - self.carried().last * k as f64 / POINTS as f64);
             let sum = |case: usize| -> f64 {
                 (0..=POINTS).map(|k| self.quotient(cases, &levels, case, at(k))).sum()
             };
-            let (own, next) = (sum(i), self.level_of_next(cases, i) * sum(i + 1));
+            let (own, next) = (sum(i), self.level_of(cases, i, along) * sum(along));
             if next > 0.0 {
                 levels[i] = (own / next).clamp(LEVELS.0, LEVELS.1);
             }
         }
         levels
     }
+}
+
+/// The curve along which case `i` is carried on beyond its end: the next faster one if one of the faster ends further, else the nearest of
+/// the slower ones that do, which are of heavier bodies or of a faster run that died. `None` for the longest.
+fn carries_on(cases: &[CaseCurve], i: usize) -> Option<usize> {
+    let is_longer = |other: &CaseCurve| other.end_m() > cases[i].end_m();
+    let faster = cases[i + 1..].iter().any(is_longer).then_some(i + 1);
+    faster.or_else(|| cases[..i].iter().rposition(is_longer))
 }
 
 /// Ends of the curves in m: a run that ends before a slower one does not end the blend of that one.

@@ -11,6 +11,7 @@
 use super::cached::Cached;
 use super::curves::neighbours;
 use super::{CaseCurve, QueryPoint};
+use crate::dataset::is_same_speed;
 use crate::piecewise;
 
 /// Share of a run's maximum deflection from which its response fades.
@@ -113,7 +114,7 @@ fn share_inside(speeds: &[f64], v: f64) -> f64 {
     let [first, .., last] = speeds else { return 0.0 };
     let end = v.clamp(*first, *last);
     // Runs of other masses may have the same speed.
-    let others = speeds.iter().map(|s| (s - end).abs()).filter(|gap| *gap > 0.0);
+    let others = speeds.iter().filter(|s| !is_same_speed(**s, end)).map(|s| (s - end).abs());
     let outside = |gap: f64| (1.0 - (v - end).abs() / gap).max(0.0);
     if v == end { 1.0 } else { others.reduce(f64::min).map_or(0.0, outside) }
 }
