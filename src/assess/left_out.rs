@@ -8,7 +8,7 @@ use super::reference::{MotionErrors, Reference};
 use crate::curve::force_curve::ForceCurve;
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
 use crate::dataset::{
-    Feature, OTHER_MASS, TrainingCase, TrainingSet, grid, is_within, nearly_same,
+    OTHER_MASS, TrainingCase, TrainingSet, are_masses, grid, is_within, nearly_same,
 };
 use crate::error::{Error, error};
 use crate::signal::l1_ratio;
@@ -235,7 +235,7 @@ impl<'a> LeftOutCase<'a> {
         along: &[f64],
     ) -> Result<BTreeMap<ForceKind, Residuals>, Error> {
         let features = &self.rest.features;
-        let is_of_masses = !features.is_empty() && features.iter().all(Feature::is_mass);
+        let is_of_masses = !features.is_empty() && are_masses(features);
         // Up to its first point a prediction rises from 0, which FE does not.
         let first = curve.deflection_m[1];
         let from = along.iter().position(|&d| d >= first).unwrap_or(0);

@@ -114,6 +114,11 @@ impl Feature {
     }
 }
 
+/// Whether cases of one speed differ in mass alone, if at all.
+pub(crate) fn are_masses(features: &[Feature]) -> bool {
+    features.iter().all(Feature::is_mass)
+}
+
 /// The values of `features` for the parameters of a query.
 pub(crate) fn feature_values(
     features: &[Feature],
@@ -453,7 +458,7 @@ impl TrainingSet {
 
     /// Of the cases that [`show_their_crush`].
     pub(crate) fn speeds_of_crush_m_per_s(&self) -> Vec<f64> {
-        let alone = self.features.iter().all(Feature::is_mass);
+        let alone = are_masses(&self.features);
         let showing = show_their_crush(&self.cases, |case| {
             let features = if alone { &[] } else { &case.features[..] };
             (case.truncated, case.speed_m_per_s, case.envelope.end_m(), features)
@@ -616,7 +621,7 @@ impl TrainingSet {
             other_kg.is_none_or(|m| (m / body_kg - 1.0).abs() <= EVEN)
         };
         let may_tell = self.force_kind == ForceKind::Contact
-            && self.features.iter().all(Feature::is_mass)
+            && are_masses(&self.features)
             && self.cases.iter().all(is_even);
         if !may_tell {
             return None;

@@ -18,8 +18,8 @@ use super::{CaseCurve, QueryPoint, Surrogate, Warning, WarningCode};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{ForceKind, Masses};
 use crate::dataset::{
-    Feature, MASS, OTHER_MASS, SAME_MASS, SAME_SPEED, TrainingCase, TrainingSet, nearest,
-    show_their_crush,
+    Feature, MASS, OTHER_MASS, SAME_MASS, SAME_SPEED, TrainingCase, TrainingSet, are_masses,
+    nearest, show_their_crush,
 };
 use crate::error::{Error, error};
 use crate::forest::RegressionForest;
@@ -145,7 +145,7 @@ impl Model {
         let model = material.fit(kind)?;
         let crush_law = material.crush_law().clone();
         let speed = |i: usize| model.cases[i].speed_m_per_s;
-        let switches = if set.features.iter().all(Feature::is_mass) {
+        let switches = if are_masses(&set.features) {
             mode_switches(&model.curves.declared)
         } else {
             Vec::new()
@@ -248,7 +248,7 @@ impl Model {
 
     /// The runs that [`show_their_crush`].
     fn showing(&self) -> impl Iterator<Item = &ModelCase> {
-        let alone = self.features.iter().all(Feature::is_mass);
+        let alone = are_masses(&self.features);
         show_their_crush(&self.cases, move |case| {
             let features = if alone { &[] } else { &case.features[..] };
             (case.truncated, case.speed_m_per_s, case.max_deflection_m, features)
