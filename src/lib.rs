@@ -28,7 +28,7 @@
 //! edges ([`unit`](mod@unit)). A speed always states what it is measured against.
 
 #![deny(missing_docs)]
-#![warn(unreachable_pub)]
+#![warn(unreachable_pub, unnameable_types)]
 
 #[cfg(not(all(feature = "rayon", feature = "serde")))]
 compile_error!(

@@ -1060,6 +1060,19 @@ fn changed_numbers_are_not_read_in_silence() {
     crumple_ok(here, &["db", "show", "curves.h5", "--group", WALL, "--case", "36kmh"]);
     crumple_ok(here, &["db", "rm", "curves.h5", "--group", WALL, "--case", "48kmh"]);
     crumple_ok(here, "db ls curves.h5");
+    // Nor is anything left to be read where all are gone.
+    fs::copy(here.join("curves.h5"), here.join("empty.h5")).unwrap();
+    crumple_ok(here, "db rm empty.h5 --speed 1km/h..200km/h");
+    for command in [
+        "validate empty.h5",
+        "compare empty.h5",
+        "train empty.h5 -o x.model",
+        "export empty.h5 -o x.csv",
+        "plot empty.h5 -o x.svg",
+        "report empty.h5 -o x.html",
+    ] {
+        says(&crumple_fails(here, 1, command), "empty.h5 has no groups");
+    }
     // Models, by one digit.
     let text = fs::read_to_string(here.join("lead.model")).unwrap();
     assert!(text.contains("\"mass_kg\":24000.0"), "{}", &text[..300]);

@@ -13,9 +13,9 @@ pub(crate) mod subsets;
 pub(crate) mod train;
 pub(crate) mod validate;
 
-pub use choose::{Purpose, Selection, gaps};
+pub use choose::{Gap, Purpose, Selection, gaps};
 pub use methods::ComparisonSettings;
-pub use reference::Reference;
+pub use reference::{MotionErrors, Reference};
 pub(crate) use row::Row;
-pub use train::{TrainComparison, compare_train};
+pub use train::{TrainComparison, TrainRow, compare_train};
 pub use validate::{Choice, Report, train, validate};

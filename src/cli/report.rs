@@ -98,9 +98,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let to_stdout = options.on_stdout([&args.output])?;
     let read = |path: &PathBuf| {
         let database = Database::read(path)?;
-        if database.groups().next().is_none() {
-            return usage(format!("{} has no groups: build a study into it", path.display()));
-        }
+        database.all_groups(path)?;
         Ok((path.clone(), database))
     };
     let databases = databases.into_iter().map(read).collect::<Result<Vec<_>, Failure>>()?;

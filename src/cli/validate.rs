@@ -29,7 +29,7 @@ use crate::table::Table;
 use crate::unit::km_per_h;
 
 use super::output::{self, Bar};
-use super::{CommandResult, GlobalOptions, Outcome, usage};
+use super::{CommandResult, GlobalOptions, Outcome};
 
 /// Most bytes of an earlier report.
 const MOST_BYTES: u64 = 64 << 20;
@@ -85,11 +85,8 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let database = Database::read(&args.database)?;
     let groups: Vec<&str> = match &args.group {
         Some(group) => vec![group],
-        None => database.groups().collect(),
+        None => database.all_groups(&args.database)?,
     };
-    if groups.is_empty() {
-        return usage(format!("{} has no groups: build a study into it", args.database.display()));
-    }
     let earlier = args.against.as_deref().map(earlier).transpose()?;
     let bar = Bar::new(options, "validating");
     let mut report = Report { groups: Vec::new() };

@@ -24,6 +24,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, error};
 use crate::unit::{Speed, UnitSystem};
+pub use body::BodyMotion;
 pub use energy::audit;
 pub use envelope::Envelope;
 pub use extract::{Extracted, Measured, MeasuredForce, Setup, Stated, StatedContact, extract};

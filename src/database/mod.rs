@@ -222,12 +222,18 @@ impl Database {
                     "{path} has several groups: choose one with --group: {known}"
                 ));
             }
-            (None, None, _) => {
-                let path = path.display();
-                return Err(error!(Database, "{path} has no groups: build a study into it"));
-            }
+            (None, None, _) => return Err(no_groups(path)),
         };
         Ok((name, cases))
+    }
+
+    /// Names of the groups, one at least.
+    ///
+    /// # Errors
+    /// Where there is none; `path` is for the message.
+    pub(crate) fn all_groups(&self, path: &Path) -> Result<Vec<&str>, Error> {
+        let groups: Vec<&str> = self.groups().collect();
+        if groups.is_empty() { Err(no_groups(path)) } else { Ok(groups) }
     }
 
     /// Group names in alphabetical order.
@@ -453,6 +459,10 @@ fn sort(cases: &mut [Case]) {
 fn listed<'a>(names: impl Iterator<Item = &'a str>) -> String {
     let names: Vec<_> = names.collect();
     if names.is_empty() { "none".into() } else { names.join(", ") }
+}
+
+fn no_groups(path: &Path) -> Error {
+    error!(Database, "{} has no groups: build a study into it", path.display())
 }
 
 /// The error of cases whose values are not those that were written.

@@ -10,7 +10,8 @@ use ndarray::{Array1, Array2};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::curve::body::{BodyMotion, body_motion};
+use crate::curve::BodyMotion;
+use crate::curve::body::body_motion;
 use crate::curve::group::key_of;
 use crate::curve::loading::loading_branch;
 use crate::curve::replicates::mean_of;

@@ -36,7 +36,7 @@ pub use export_curve::ExportCurve;
 pub(crate) use export_curve::TargetUnloading;
 pub use fmu::{FmiVersion, Spring, archive, binaries};
 pub use lsdyna::Material;
-pub use read::{ReadCurve, ReadOptions, read, readers};
+pub use read::{Metadata, ReadCurve, ReadOptions, read, readers};
 pub(crate) use read::{history, is_run, run_table};
 
 /// One target: its name, file extensions, capabilities and writer.

@@ -21,8 +21,7 @@ mod style;
 mod svg;
 mod thin;
 
-pub(crate) use chart::Cell;
 pub(crate) use chart::PanelPlace;
-pub use chart::{Axis, Band, Chart, Drawing, Mark, Panel, Series, Shown};
+pub use chart::{Axis, Band, Cell, Chart, Drawing, Mark, Panel, Series, Shown};
 pub(crate) use style::looks_for_pages;
 pub(crate) use svg::SvgFor;

@@ -74,7 +74,7 @@ pub(crate) fn read_with_includes(path: &Path) -> Result<(Deck, Vec<PathBuf>), Er
 }
 
 /// The files that a deck itself includes.
-fn includes(path: &Path) -> io::Result<Vec<deck::Include>> {
+fn includes(path: &Path) -> io::Result<Vec<deck::DeckInclude>> {
     let mut file = BufReader::new(file::open(path)?);
     let deck = file::if_there(deck::parse_deck(&mut file, &mut |_| None))?;
     Ok(deck.map(|deck| deck.includes).unwrap_or_default())

@@ -39,13 +39,15 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, error};
 use crate::guess;
-pub(crate) use blocks::Blocks;
+pub use blocks::{Blocks, Column};
 pub use decks::read_deck;
 pub use detect::formats;
 pub(crate) use detect::{Format, entity_word, format_names, is_named_like_binary, without_job_id};
 use detect::{check_format, detect, files_in, named};
 pub use lsdyna::deck::context::Value;
-pub use lsdyna::deck::{Deck, DeckEntity, DeckPlace, parse_deck};
+pub use lsdyna::deck::{
+    Deck, DeckEntity, DeckInclude, DeckOutput, DeckPlace, StatedUnits, parse_deck,
+};
 pub use problem::{Problem, ProblemCode};
 pub(crate) use runs::family;
 use runs::missing_continuation;

@@ -33,8 +33,8 @@ use super::{MAX_CURVE_BYTES, MIN_POINTS};
 use crate::curve::{ForceCurve, ForceKind, SourceFile};
 use crate::surrogate::PredictedCurve;
 use crate::unit::UnitSystem;
-pub(crate) use curve::Metadata;
-pub use curve::ReadCurve;
+
+pub use curve::{Metadata, ReadCurve};
 use label::Quantity;
 pub(crate) use mdf::is_run;
 

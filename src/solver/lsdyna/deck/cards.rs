@@ -2,7 +2,7 @@
 
 use super::context::{Block, Context, Defined, MAX_ENTRIES, Missing, Value};
 use super::keyword::{Card, Field, Kind, start, text};
-use super::{DeckEntity, DeckPlace, InitialVelocity, Material, Output, Scope, StatedUnits};
+use super::{DeckEntity, DeckOutput, DeckPlace, InitialVelocity, Material, Scope, StatedUnits};
 use crate::solver::lsdyna::line::shown;
 use crate::solver::problem::{Place, ProblemCode};
 use crate::unit::UnitSystem;
@@ -15,7 +15,7 @@ impl Context {
     pub(super) fn output(&mut self, file: &'static str, block: &Block, card: &Card<'_>) {
         let interval = self.real(card.field(0)).unwrap_or(None);
         let binary = self.integer(card.field(1)).unwrap_or(None);
-        let output = Output { file, interval, binary, at: self.at(block.place) };
+        let output = DeckOutput { file, interval, binary, at: self.at(block.place) };
         self.keep(|deck| &mut deck.outputs, output, "output files");
     }
 

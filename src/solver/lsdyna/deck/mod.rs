@@ -52,7 +52,7 @@ pub struct Deck {
     /// In the order of the deck.
     pub(crate) initial_velocities: Vec<InitialVelocity>,
     /// `*DATABASE_…` of the ASCII files, in order.
-    pub outputs: Vec<Output>,
+    pub outputs: Vec<DeckOutput>,
     /// `*DATABASE_HISTORY_NODE`.
     pub history_nodes: Vec<DeckEntity>,
     /// `*DATABASE_HISTORY_NODE_SET`.
@@ -66,7 +66,7 @@ pub struct Deck {
     /// `*PARAMETER`, names in lower case.
     pub parameters: Vec<(String, Value)>,
     /// `*INCLUDE`, in order of reading. Folders of `*INCLUDE_PATH` are tried, not listed.
-    pub includes: Vec<Include>,
+    pub includes: Vec<DeckInclude>,
     /// What could not be read, in order.
     pub problems: Vec<Problem>,
 }
@@ -136,7 +136,7 @@ pub(crate) enum Scope {
 
 /// One ASCII file that the deck requests.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Output {
+pub struct DeckOutput {
     /// As the keyword names it, in small letters: `nodout`.
     pub file: &'static str,
     /// Output interval, in the deck's unit of time. `None` when left out or not known.
@@ -170,7 +170,7 @@ pub struct DeckEntity {
 
 /// One included file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Include {
+pub struct DeckInclude {
     /// As the deck writes it.
     pub name: String,
     /// Where it is included.

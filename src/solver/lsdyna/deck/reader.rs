@@ -7,7 +7,7 @@ use std::rc::Rc;
 use super::super::line::{Line, Lines, shown};
 use super::context::{Block, Context, MAX_INCLUDES};
 use super::keyword::{Card, Keyword, Kind, STANDARD, kind, start, text};
-use super::{Deck, DeckEntity, Include, Scope, cards};
+use super::{Deck, DeckEntity, DeckInclude, Scope, cards};
 use crate::solver::problem::{Place, ProblemCode};
 use crate::solver::source::read_buffered;
 
@@ -339,7 +339,7 @@ impl<'a, 'o> Includes<'a, 'o> {
         let too_deep = context.reading.len() >= MAX_DEPTH;
         let opened = if too_deep { None } else { self.find(&name) };
         let (at, found) = (context.at(place), opened.is_some());
-        context.deck.includes.push(Include { name: name.clone(), at, found });
+        context.deck.includes.push(DeckInclude { name: name.clone(), at, found });
         let problem = match opened {
             Some((path, _)) if context.reading.iter().any(|(_, open)| *open == path) => {
                 format!("include \"{name}\" includes itself; it is not read again")
