@@ -975,6 +975,18 @@ fn the_motion_has_the_mass_in_it() {
         let error = curve.max_deflection_m / truth - 1.0;
         assert!(truth > 0.72 && error.abs() < 0.02, "{v} m/s, {mass_kg} kg: {error} of {truth} m");
     }
+    // Of two runs of one speed each is what is predicted for its mass, folds included.
+    let folding = |(v, m): (f64, f64)| {
+        let force = |d: f64, u: f64| law(d, u) * (1.0 + 0.2 * (50.0 * d + m / 3e3 + v).sin());
+        case(&format!("{v} {m}"), v, m, &force)
+    };
+    let cases = [8.0, 11.0, 14.0].map(|v| [folding((v, 20e3)), folding((v, 30e3))]).concat();
+    let set = TrainingSet::new("made", &cases).unwrap();
+    let model = Model::fit(&set, ModelKind::rate()).unwrap();
+    for run in &set.cases {
+        let error = force_error(&model, run);
+        assert!(error < 0.01, "{} is predicted with {error}", run.name);
+    }
     // A change of mode is found between the runs of two masses, too; a dead run of a mass of its own narrows nothing.
     let softer = |v: f64, m: f64| {
         let force = |d: f64, u: f64| if v > 12.0 && d > 0.25 { 0.5 * law(d, u) } else { law(d, u) };
@@ -2019,7 +2031,8 @@ fn two_speeds_get_the_default() {
 
 /// `Σ|p − r|/Σ|r|` of the declared force, along the crush of a case that the model has not seen.
 fn force_error(model: &Model, case: &TrainingCase) -> f64 {
-    let curve = predict(model, &Query::at(case.speed_m_per_s)).unwrap();
+    let query = Query { mass_kg: case.features.first().copied(), ..Query::at(case.speed_m_per_s) };
+    let curve = predict(model, &query).unwrap();
     let predicted = Envelope::new(curve.deflection_m, curve.force_n).unwrap();
     let fe = &case.envelope;
     let along = (1..=400).map(|k| fe.end_m() * f64::from(k) / 400.0);

@@ -14,7 +14,7 @@
 //! the whole of the other branch's is as likely.
 
 use super::CaseCurve;
-use super::curves::{LEAST_WAY_M, mean_over, neighbours};
+use super::curves::{LEAST_WAY_M, mean_over, neighbouring};
 use crate::curve::group::LEAST_RATIO;
 use crate::dataset::is_same_speed;
 use crate::piecewise;
@@ -85,12 +85,11 @@ impl Alignment {
     /// The blend `force_n` of the aligned curves, at an impact speed along increasing deflections in m.
     pub(super) fn blended_n(
         &self,
-        speed_m_per_s: f64,
+        at: (f64, &[f64]),
         deflection_m: &[f64],
         force_n: impl Fn(&[CaseCurve], &[f64]) -> Vec<f64>,
     ) -> Vec<f64> {
-        let speeds: Vec<f64> = self.curves.iter().map(|c| c.speed_m_per_s).collect();
-        let (low, high, share) = neighbours(&speeds, speed_m_per_s);
+        let (low, high, share) = neighbouring(&self.curves, at);
         let place = self.places[low].between(&self.places[high], share).inverse();
         let common_m: Vec<f64> = deflection_m.iter().map(|&d| place.at(d)).collect();
         let blend_n = force_n(&self.curves, &common_m);
@@ -301,6 +300,7 @@ impl Warp {
 
 #[cfg(test)]
 mod tests {
+    use super::super::curves::neighbours;
     use super::*;
 
     /// A plateau, and a step to three times its force at a place.
@@ -330,7 +330,7 @@ mod tests {
         let alignment = aligned(&cases).unwrap();
         let at = |v: f64, d: f64| {
             let along: Vec<f64> = (0..=1000).map(|i| f64::from(i) / 1000.0).collect();
-            let force_n = alignment.blended_n(v, &along, |cases, d| between(cases, v, d));
+            let force_n = alignment.blended_n((v, &[]), &along, |cases, d| between(cases, v, d));
             force_n[(d * 1000.0).round() as usize]
         };
         // Half as high in the middle of the step, halfway between 0.40 and 0.50; as wide as the places are apart.

@@ -9,7 +9,7 @@
 //!
 //! Tried and dropped: more variance of its own for what varies over a short way. Neighbouring runs share their folds, too.
 
-use super::curves::neighbours;
+use super::curves::{nearest_twin, neighbours};
 use crate::signal::Cholesky;
 
 /// Length over which the runs are alike, relative to the range of their speeds.
@@ -45,8 +45,8 @@ impl<'a> Blend<'a> {
 
     /// The weights of the runs from the `first` on, 0 for those before, at an impact speed; beyond the speeds
     /// of all runs those of the outermost. The runs from the `first` on say nothing about speeds below that of the one
-    /// before. Their sum is 1.
-    pub(super) fn weights(&self, first: usize, speed_m_per_s: f64) -> Vec<f64> {
+    /// before. Their sum is 1. Of runs of one speed, the one that is least `apart` from the query is reproduced.
+    pub(super) fn weights(&self, first: usize, speed_m_per_s: f64, apart: &[f64]) -> Vec<f64> {
         let all = self.speeds_m_per_s;
         let v = speed_m_per_s.clamp(all[first.saturating_sub(1)], all[all.len() - 1]);
         let mut weights = vec![0.0; all.len()];
@@ -54,6 +54,7 @@ impl<'a> Blend<'a> {
         weights[first..].copy_from_slice(&smooth(v));
         let (low, high, share) = neighbours(all, v);
         for (run, nearness) in [(low, (1.0 - share).powi(2)), (high, share.powi(2))] {
+            let run = nearest_twin(all, apart, run, first);
             if run >= first && nearness > 0.0 {
                 weights[run] += nearness;
                 let slow = smooth(all[run]);
@@ -121,6 +122,8 @@ mod tests {
     use super::*;
 
     const SPEEDS: [f64; 5] = [3.0, 5.0, 7.0, 12.0, 20.0];
+    /// Of queries that give no mass.
+    const ALIKE: &[f64] = &[0.0; 6];
 
     fn close(a: f64, b: f64) -> bool {
         (a - b).abs() < 1e-12
@@ -131,17 +134,17 @@ mod tests {
         let blend = Blend::of(&SPEEDS, OWN[0]);
         for first in 0..SPEEDS.len() {
             for v in [1.0, 3.0, 4.2, 7.0, 15.0, 20.0, 40.0] {
-                let weights = blend.weights(first, v);
+                let weights = blend.weights(first, v, ALIKE);
                 assert!(close(weights.iter().sum(), 1.0), "from {first} at {v}: {weights:?}");
                 assert!(weights[..first].iter().all(|w| *w == 0.0));
             }
             for (run, &speed) in SPEEDS.iter().enumerate().skip(first) {
-                let weights = blend.weights(first, speed);
+                let weights = blend.weights(first, speed, ALIKE);
                 let is_run = |(i, w): (usize, &f64)| close(*w, if i == run { 1.0 } else { 0.0 });
                 assert!(weights.iter().enumerate().all(is_run), "{run} from {first}: {weights:?}");
             }
         }
-        assert_eq!(Blend::of(&[8.0], OWN[0]).weights(0, 9.0), [1.0]);
+        assert_eq!(Blend::of(&[8.0], OWN[0]).weights(0, 9.0, ALIKE), [1.0]);
     }
 
     #[test]
@@ -149,12 +152,13 @@ mod tests {
         let blend = Blend::of(&SPEEDS, OWN[0]);
         let of = |v: f64| 1.0 + 0.05 * v - 0.001 * v * v;
         for v in [4.0, 6.0, 9.0, 16.0] {
-            let weights = blend.weights(0, v);
+            let weights = blend.weights(0, v, ALIKE);
             let found: f64 = weights.iter().zip(SPEEDS).map(|(w, s)| w * of(s)).sum();
             assert!((found / of(v) - 1.0).abs() < 0.01, "{found} instead of {} at {v}", of(v));
         }
         for v in SPEEDS {
-            let (below, above) = (blend.weights(0, v - 1e-9), blend.weights(0, v + 1e-9));
+            let (below, above) =
+                (blend.weights(0, v - 1e-9, ALIKE), blend.weights(0, v + 1e-9, ALIKE));
             assert!(below.iter().zip(&above).all(|(b, a)| (b - a).abs() < 1e-6), "at {v}");
         }
     }
@@ -166,19 +170,19 @@ mod tests {
         let blend = Blend::of(&speeds, OWN[0]);
         for first in 0..speeds.len() {
             for v in (10..80).map(f64::from) {
-                let weights = blend.weights(first, v);
+                let weights = blend.weights(first, v, ALIKE);
                 assert!(weights.iter().all(|w| w.abs() < 1.6), "from {first} at {v}: {weights:?}");
             }
         }
         // Three cases of one speed have equal weights.
-        let equal = Blend::of(&[5.0; 3], OWN[0]).weights(0, 5.0);
+        let equal = Blend::of(&[5.0; 3], OWN[0]).weights(0, 5.0, ALIKE);
         assert!(close(equal.iter().sum(), 1.0) && equal.iter().all(|w| w.is_finite()), "{equal:?}");
     }
 
     /// One run that stands out moves the middle between two runs by less than half.
     #[test]
     fn what_is_a_runs_own_fades_towards_its_neighbours() {
-        let middle = Blend::of(&SPEEDS, OWN[0]).weights(0, 6.0);
+        let middle = Blend::of(&SPEEDS, OWN[0]).weights(0, 6.0, ALIKE);
         assert!(middle[1] < 0.5 && middle[2] < 0.5, "{middle:?}");
     }
 

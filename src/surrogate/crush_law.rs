@@ -138,7 +138,7 @@ impl CrushLaw {
     pub(super) fn standing_n(
         &self,
         contact: &[CaseCurve],
-        speed_m_per_s: f64,
+        at: (f64, &[f64]),
         deflection_m: &[f64],
     ) -> Vec<f64> {
         let of = || contact.iter().map(|c| [c.speed_m_per_s, c.end_m()]);
@@ -148,10 +148,10 @@ impl CrushLaw {
             rate: self.rate(),
         });
         if kept.of.iter().copied().eq(of()) {
-            kept.rate.standing_n(&kept.curves, speed_m_per_s, deflection_m)
+            kept.rate.standing_n(&kept.curves, at, deflection_m)
         } else {
             let curves = self.crush_forces(contact);
-            self.rate().standing_n(&curves, speed_m_per_s, deflection_m)
+            self.rate().standing_n(&curves, at, deflection_m)
         }
     }
 
@@ -159,7 +159,7 @@ impl CrushLaw {
     pub(crate) fn at(&self, contact: &[CaseCurve], speed_m_per_s: f64) -> Option<CrushCurve> {
         let end_m = contact.iter().map(CaseCurve::end_m).fold(0.0, f64::max);
         let deflection_m = grid(end_m, POINTS);
-        let mut standing_n = self.standing_n(contact, speed_m_per_s, &deflection_m);
+        let mut standing_n = self.standing_n(contact, (speed_m_per_s, &[]), &deflection_m);
         // Nothing is crushed before the contact.
         standing_n[0] = 0.0;
         Some(CrushCurve {
@@ -271,7 +271,8 @@ mod tests {
             for share in [0.3, 0.6, 0.7, 0.8, 0.9, 0.99] {
                 let d = share * case.end_m();
                 let u = case.closing_at(d);
-                let found = law.standing_n(&cases, case.speed_m_per_s, &[d])[0] * law.factor(u);
+                let found =
+                    law.standing_n(&cases, (case.speed_m_per_s, &[]), &[d])[0] * law.factor(u);
                 let expected = case.force_at(d) - law.stopped.rate_kg_per_m(d) * u * u;
                 // Between the points of a curve λu² is not on a line.
                 assert!((found / expected - 1.0).abs() < 1e-7, "{found} N, {expected} N at {d} m");
@@ -302,7 +303,8 @@ mod tests {
             {
                 let d = case.end_m() * f64::from(i) / 1000.0;
                 let u = case.closing_at(d);
-                let crush_n = law.standing_n(&cases, case.speed_m_per_s, &[d])[0] * law.factor(u);
+                let crush_n =
+                    law.standing_n(&cases, (case.speed_m_per_s, &[]), &[d])[0] * law.factor(u);
                 let found = crush_n + law.stopped.rate_kg_per_m(d) * u * u;
                 let off = found / case.force_at(d) - 1.0;
                 assert!(off.abs() < 3e-4, "{off} at {d} m, {} m/s", case.speed_m_per_s);

@@ -92,7 +92,7 @@ impl Surrogate for OfCrushLaw {
         if cases.is_empty() {
             return vec![f64::NAN; deflection_m.len()];
         }
-        let standing_n = self.law.standing_n(cases, at.speed_m_per_s, deflection_m);
+        let standing_n = self.law.standing_n(cases, (at.speed_m_per_s, at.features), deflection_m);
         let per_crush = || -> Vec<f64> {
             deflection_m.iter().map(|&d| self.per_crush_force(d, at.mass_kg)).collect()
         };

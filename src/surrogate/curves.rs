@@ -133,7 +133,7 @@ pub(super) fn mean_over(
 pub(super) const LEAST_WAY_M: f64 = 1e-6;
 
 /// The two neighbours of `v` among increasing speeds and the share of the second, 0 to 1:
-/// beyond the ends the outermost alone. Of equal speeds, those of heavier bodies, the last counts.
+/// beyond the ends the outermost alone. Of equal speeds, the last, that of the heaviest body, counts.
 pub(crate) fn neighbours(speeds: &[f64], v: f64) -> (usize, usize, f64) {
     let above = speeds.partition_point(|&s| s <= v);
     match above {
@@ -144,6 +144,33 @@ pub(crate) fn neighbours(speeds: &[f64], v: f64) -> (usize, usize, f64) {
             (n - 1, high, (v - speeds[n - 1]) / (speeds[n] - speeds[n - 1]))
         }
     }
+}
+
+/// The two neighbours as [`neighbours`] has them, but of equal speeds the runs whose masses are nearest to those of the query.
+pub(super) fn neighbouring(
+    cases: &[CaseCurve],
+    (v, features): (f64, &[f64]),
+) -> (usize, usize, f64) {
+    let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
+    let (low, high, share) = neighbours(&speeds, v);
+    let apart = apart(cases, features);
+    let of = |run| nearest_twin(&speeds, &apart, run, 0);
+    (of(low), of(high), share)
+}
+
+/// How far the masses of each run, its features, lie from those of a query; 0 where it gives none.
+pub(super) fn apart(cases: &[CaseCurve], features: &[f64]) -> Vec<f64> {
+    let of = |case: &CaseCurve| {
+        let pairs = case.features.iter().zip(features);
+        pairs.map(|(run, asked)| libm::log(run / asked).abs()).sum()
+    };
+    cases.iter().map(of).collect()
+}
+
+/// Of the runs from the `first` on at the speed of one of them, the one whose masses are nearest; of several such, the last.
+pub(super) fn nearest_twin(speeds: &[f64], apart: &[f64], run: usize, first: usize) -> usize {
+    let twins = (first..speeds.len()).filter(|&i| speeds[i] == speeds[run]);
+    twins.rev().min_by(|&a, &b| apart[a].total_cmp(&apart[b])).unwrap_or(run)
 }
 
 /// Most runs that answer a query together: with more of them the cost would grow with the third power of their number.

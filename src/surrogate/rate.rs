@@ -19,7 +19,7 @@ use serde_json::value::RawValue;
 use super::alignment::Alignment;
 use super::blend::{Blend, own_share};
 use super::cached::Cached;
-use super::curves::{answering_at, neighbours};
+use super::curves::{answering_at, apart, neighbouring};
 use super::entry::{ModelEntry, loaded};
 use super::{CaseCurve, QueryPoint, Surrogate};
 
@@ -176,10 +176,10 @@ impl Rate {
     pub(super) fn standing_n(
         &self,
         cases: &[CaseCurve],
-        speed_m_per_s: f64,
+        at: (f64, &[f64]),
         deflection_m: &[f64],
     ) -> Vec<f64> {
-        let cases = &*answering_at(cases, speed_m_per_s);
+        let cases = &*answering_at(cases, at.0);
         let of = || cases.iter().map(|c| [c.speed_m_per_s, c.end_m(), c.envelope().work()]);
         let prepare = || {
             let alignment = self.alignment(cases);
@@ -197,18 +197,18 @@ impl Rate {
             &own
         };
         let Some(of_impact) = self.of_impact else {
-            let blended_n =
-                |cases: &[CaseCurve], d: &[f64]| self.between_n(cases, levels, speed_m_per_s, d);
+            let blended_n = |cases: &[CaseCurve], d: &[f64]| {
+                self.between_n(cases, levels, neighbouring(cases, at), d)
+            };
             return match alignment {
-                Some(alignment) => alignment.blended_n(speed_m_per_s, deflection_m, blended_n),
+                Some(alignment) => alignment.blended_n(at, deflection_m, blended_n),
                 None => blended_n(cases, deflection_m),
             };
         };
-        let blended_n = |cases: &[CaseCurve], along: &Along| {
-            self.blended_n(cases, *own, of_impact, speed_m_per_s, along)
-        };
+        let blended_n =
+            |cases: &[CaseCurve], along: &Along| self.blended_n(cases, *own, of_impact, at, along);
         if let Some(alignment) = alignment {
-            return alignment.blended_n(speed_m_per_s, deflection_m, |cases, d| {
+            return alignment.blended_n(at, deflection_m, |cases, d| {
                 blended_n(cases, &self.along(cases, levels, d))
             });
         }
@@ -251,11 +251,9 @@ impl Rate {
         &self,
         cases: &[CaseCurve],
         levels: &[f64],
-        speed_m_per_s: f64,
+        (low, high, share): (usize, usize, f64),
         deflection_m: &[f64],
     ) -> Vec<f64> {
-        let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
-        let (low, high, share) = neighbours(&speeds, speed_m_per_s);
         let standing_n = |d: f64| {
             let of = |i| self.quotient(cases, levels, i, d);
             if low == high { of(low) } else { (1.0 - share) * of(low) + share * of(high) }
@@ -270,16 +268,17 @@ impl Rate {
         cases: &[CaseCurve],
         own: f64,
         of_impact: f64,
-        speed_m_per_s: f64,
+        (speed_m_per_s, features): (f64, &[f64]),
         along: &Along,
     ) -> Vec<f64> {
         let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
         let v = speed_m_per_s.clamp(speeds[0], speeds[speeds.len() - 1]);
         let blend = Blend::of(&speeds, own);
+        let apart = apart(cases, features);
         let of_impact = |speed: f64| factor(of_impact, speed);
         let weights: Vec<Vec<f64>> = (0..cases.len())
             .map(|first| {
-                let of = blend.weights(first, v);
+                let of = blend.weights(first, v, &apart);
                 let level = of_impact(speed_m_per_s);
                 of.iter().zip(&speeds).map(|(w, &s)| w * level / of_impact(s)).collect()
             })
@@ -486,7 +485,7 @@ impl Surrogate for Rate {
         if cases.is_empty() {
             return vec![f64::NAN; deflection_m.len()];
         }
-        let standing_n = self.standing_n(cases, at.speed_m_per_s, deflection_m);
+        let standing_n = self.standing_n(cases, (at.speed_m_per_s, at.features), deflection_m);
         if let Some(closing) = at.closing_m_per_s {
             return standing_n.iter().zip(closing).map(|(q, &u)| q * self.factor(u)).collect();
         }

@@ -9,7 +9,7 @@
 //! than that of the runs has less of it, in proportion to its mass.
 
 use super::cached::Cached;
-use super::curves::neighbours;
+use super::curves::neighbouring;
 use super::{CaseCurve, QueryPoint};
 use crate::dataset::is_same_speed;
 use crate::piecewise;
@@ -88,7 +88,7 @@ pub(super) fn with_response(
         }
     };
     let time_s = times_s(deflection_m, closing, at.speed_m_per_s);
-    let (low, high, share) = neighbours(&speeds, at.speed_m_per_s);
+    let (low, high, share) = neighbouring(runs, (at.speed_m_per_s, at.features));
     for (i, weight) in [(low, 1.0 - share), (high, share)] {
         if weight == 0.0 {
             continue;
