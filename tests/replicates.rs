@@ -1,12 +1,14 @@
 //! Runs of one speed that differ by chance: their mean, their scatter, and what a band makes of it.
 
 use std::collections::BTreeMap;
+use std::fs;
 
-use crate::common::{crumple_fails, crumple_ok, says, shared};
+use crate::common::{build_fixture, crumple_fails, crumple_ok, json, says, shared};
 use crate::models::{all_kinds, case, database_of, died, family, law};
 use crumple::assess::{Choice, train, validate};
 use crumple::assess::{Purpose, Selection, gaps};
 use crumple::curve::{Case, Parameter};
+use crumple::database::Database;
 use crumple::dataset::TrainingSet;
 use crumple::surrogate::Scatter;
 use crumple::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
@@ -316,6 +318,44 @@ fn a_repeated_run_that_died_is_left_out() {
     // If all died, there is nothing else.
     let dead = [family(&[8.0, 16.0, 20.0]), vec![died(other("c", 0.0), 0.4)]].concat();
     assert!(of(&dead).cases.iter().any(|case| case.truncated));
+}
+
+/// Runs that ended where they were crushed most show no rebound: the same stiffness is taken of a model and a case, and of what each
+/// was written to.
+#[test]
+fn curves_without_a_rebound_unload_alike_in_every_form() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let whole = Database::read(&build_fixture(here, "lead-car-wall")).unwrap();
+    let mut database = Database::default();
+    for case in whole.cases("lead-car-wall") {
+        database.put(died(case.clone(), 0.99)).unwrap();
+    }
+    database.write(&here.join("dead.h5")).unwrap();
+    crumple_ok(here, "train dead.h5 --model crush-law -o a.model -q");
+    crumple_ok(here, "predict a.model --speed 48km/h -o p.json -o p.csv -q");
+    crumple_ok(here, "export dead.h5 --case 48kmh -o c.json -q");
+    crumple_ok(here, "export dead.h5 --case 48kmh -o c.csv -q");
+    let restitution = |source: &str| {
+        let scenario = format!(
+            "run = {{ duration = \"300ms\" }}\ncurves.nose = {{ {source} }}\nwall = {{}}\ncontact = {{ curve = \"nose\" }}\n\
+             train = [{{ name = \"A\", speed = \"48km/h\", vehicles = [{{ name = \"A1\", mass = \"24t\" }}] }}]\n"
+        );
+        fs::write(here.join("s.toml"), scenario).unwrap();
+        let found = json(&crumple_ok(here, "simulate s.toml --json -q"));
+        found["summary"]["interfaces"][0]["restitution"].as_f64().unwrap()
+    };
+    for forms in [
+        ["model = \"a.model\"", "file = \"p.json\"", "file = \"p.csv\""],
+        [
+            "database = \"dead.h5\", case = \"lead-car-wall/48kmh\"",
+            "file = \"c.json\"",
+            "file = \"c.csv\"",
+        ],
+    ] {
+        let found = forms.map(restitution);
+        assert!(found.iter().all(|r| (r / found[0] - 1.0).abs() < 1e-4), "{forms:?}: {found:?}");
+    }
 }
 
 /// A run that ended before a slower one stood narrows no interval: not that of a band, of `nearest`, or of the next run. Its peak so far

@@ -334,9 +334,6 @@ impl PredictedCurve {
         if self.body_force_n.is_none() {
             return Ok(curve);
         }
-        if curve.rebound.is_none() {
-            curve.unloading_stiffness_n_per_m = envelope.max_slope();
-        }
         curve.energy_j = envelope.work();
         curve.force_n = envelope.force_n().to_vec();
         (curve.force_low_n, curve.force_high_n) =
@@ -385,10 +382,16 @@ impl PredictedCurve {
             _ => 1.0,
         };
         let share = share(envelope);
+        let without_rebound = || {
+            let of_body = self.body_unloading_stiffness_n_per_m;
+            let known = of_body.filter(|_| force == ForceKind::Body);
+            // A softer unloading than the steepest rise would create energy.
+            known.unwrap_or(self.unloading_stiffness_n_per_m).max(envelope.max_slope())
+        };
         self.rebound
             .map(|r| r.stiffness_n_per_m * share * share / free)
             .filter(|k| *k > 0.0 && k.is_finite())
-            .unwrap_or(self.unloading_stiffness_n_per_m)
+            .unwrap_or_else(without_rebound)
     }
 
     /// The curve of one force that drives a body of one mass.

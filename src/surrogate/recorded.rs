@@ -39,7 +39,6 @@ impl PredictedCurve {
             deflection_m.iter().map(|&d| e.force_at(d).max(0.0)).collect()
         };
         let force_n = at(&declared.loading);
-        let steepest = declared.loading.max_slope();
         let loading = envelope(deflection_m.clone(), force_n.clone())?;
         let driving = body.as_ref().unwrap_or(&declared);
         let top_n = driving.loading.force_at(driving.loading.end_m());
@@ -52,8 +51,8 @@ impl PredictedCurve {
         let mut curve = Self {
             body_force_n: body.as_ref().map(|b| at(&b.loading)),
             body_drives: body.as_ref().map(|_| ForceKind::Body.drives().into()),
-            body_unloading_stiffness_n_per_m: None,
-            unloading_stiffness_n_per_m: declared.unloading.stiffness_n_per_m().unwrap_or(steepest),
+            body_unloading_stiffness_n_per_m: body.as_ref().map(|_| 0.0),
+            unloading_stiffness_n_per_m: declared.unloading.stiffness_n_per_m().unwrap_or(0.0),
             force_low_n: None,
             force_high_n: None,
             beyond: None,
