@@ -71,8 +71,9 @@ def _key(entity):
     """An id as it is looked up: 900001, 900001.0 (as pandas has it), "900001" and NumPy's numbers are one."""
     if entity is None or isinstance(entity, str):
         return _id(entity)
-    # NaN and infinity are no entity's id.
-    return int(entity) if math.isfinite(entity) and entity == int(entity) else entity
+    # NaN, infinity and what is not a number are no entity's id.
+    is_whole = isinstance(entity, Number) and math.isfinite(entity) and entity == int(entity)
+    return int(entity) if is_whole else entity
 
 
 def _locked(state):
@@ -95,6 +96,8 @@ def _listed(of):
     if of is None:
         return None
     of = of.tolist() if isinstance(of, np.ndarray) else of
+    if isinstance(of, bytes):
+        raise TypeError(f"ids and components are numbers and texts, not bytes: {of!r}")
     is_one = isinstance(of, (str, Number))
     return [str(_key(one)) for one in ([of] if is_one else of)]
 
@@ -319,8 +322,11 @@ def read(path, ids=None, components=None, section=None, format=None):
 
     Raises `crumple.Error` if the file cannot be opened or read.
     """
+    # Once: each of a folder's files is asked for the same.
+    ids, components = _listed(ids), _listed(components)
+
     def sections(file):
-        return [Section(*of) for of in _crumple.read(os.fspath(file), _listed(ids), _listed(components), section, format)]
+        return [Section(*of) for of in _crumple.read(os.fspath(file), ids, components, section, format)]
 
     if not os.path.isdir(path):
         return Histories(Path(path), sections(path))

@@ -40,6 +40,10 @@ class RegressionForest(RegressorMixin, BaseEstimator):
 
     def fit(self, X, y):
         """Fit the forest to X (samples, features) and y (samples,)."""
+        for name in ("n_estimators", "max_depth", "min_samples_leaf", "max_features"):
+            value = getattr(self, name)
+            if isinstance(value, Integral) and value < 1:
+                raise ValueError(f"{name} is {value}: expected 1 or more")
         X, y = validate_data(self, X, y, dtype=np.float64, order="C", y_numeric=True, multi_output=True)
         y = column_or_1d(y, warn=True, dtype=np.float64)
         seed = int(check_random_state(self.random_state).randint(np.iinfo(np.int32).max))

@@ -47,6 +47,10 @@ def test_a_run_is_read_from_its_folder(tmp_path):
     assert {"nodout", "rwforc"} <= set(run)
     assert np.array_equal(run["nodout"]["x_velocity"].array, crumple.read(NODOUT).only()["x_velocity"].array)
     assert list(crumple.read(NODOUT.parent, ids=900001)) == ["nodout"]
+    for component, name in (("x_velocity", "nodout"), ("normal_force", "rwforc")):
+        for components in ([component], iter([component])):
+            read = crumple.read(NODOUT.parent, components=components)
+            assert {name: list(section) for name, section in read.items()} == {name: [component]}
     with pytest.raises(crumple.Error):
         crumple.read(NODOUT.parent, ids=5)
     with pytest.raises(crumple.Error, match="there are no solver files in this folder"):
@@ -157,7 +161,9 @@ def test_one_or_several_of_any_kind():
         for components in ("x_velocity", ["x_velocity"], np.array(["x_velocity"])):
             component = crumple.read(NODOUT, ids=ids, components=components).only()["x_velocity"]
             assert np.array_equal(component[np.int32(900001)], whole) and 900001.0 in component
-    assert "\u00b2" not in component and None not in component and np.nan not in component
+    assert "\u00b2" not in component and None not in component and np.nan not in component and (900001,) not in component
+    with pytest.raises(TypeError, match="ids and components are numbers and texts, not bytes"):
+        crumple.read(NODOUT, ids=b"900001")
     del component
     histories = crumple.read(NODOUT)
     view = histories.only()["x_velocity"][900001]
@@ -440,6 +446,9 @@ def test_the_forest_is_an_estimator():
     for features in ("all", 0.0, 1.5):
         with pytest.raises(ValueError, match="expected a number, a share"):
             predicted(features)
+    for name in ("n_estimators", "max_depth", "min_samples_leaf", "max_features"):
+        with pytest.raises(ValueError, match=f"{name} is -1: expected 1 or more"):
+            RegressionForest(**{name: -1}).fit(x, x[:, 0])
 
 
 def test_cases_are_read_one_by_one(monkeypatch):
