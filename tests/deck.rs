@@ -51,6 +51,30 @@ fn reads_our_decks() {
     }
 }
 
+/// Editors of Windows begin a file with a byte order mark, and write Latin-1: nothing is lost, not even a last letter.
+#[test]
+fn reads_decks_of_windows() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    fs::write(here.join("Träger.k"), "\u{feff}*INITIAL_VELOCITY\n0\n-15000.\n*END\n").unwrap();
+    let latin1 = |text: &str| -> Vec<u8> { text.chars().map(|c| c as u8).collect() };
+    let main =
+        "*KEYWORD\n*TITLE\nFrontaler Stoß\n*PART\nCafé\n         7\n*INCLUDE\nTräger.k\n*END\n";
+    fs::write(here.join("main.k"), latin1(main)).unwrap();
+    let d = deck_in(here, "main.k");
+    assert_eq!(messages(&d), [""; 0]);
+    assert_eq!(d.title.as_deref(), Some("Frontaler Stoß"));
+    assert_eq!(named(&d.parts), [(7, Some("Café"))]);
+    let (speed, at) = d.impact_speed().unwrap();
+    assert_eq!((speed, at), (15000.0, DeckPlace { line: 1, include: Some(0) }));
+    fs::write(
+        here.join("long.k"),
+        "\u{feff}*KEYWORD LONG=Y\n*PART\nbox\n                   8\n*END\n",
+    )
+    .unwrap();
+    assert_eq!(named(&deck_in(here, "long.k").parts), [(8, Some("box"))]);
+}
+
 fn ids(list: &[DeckEntity]) -> Vec<Option<i64>> {
     list.iter().map(|i| i.id).collect()
 }

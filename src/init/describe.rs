@@ -568,9 +568,9 @@ fn doubts_of_speed(record: &Record, impact: &Impact) -> Vec<String> {
         && !is_near(speed, first, SAME_SPEED)
     {
         notes.push(format!(
-            "the deck {}, line {}, states {speed} in its units, the record {first}",
+            "the deck {}, {}, states {speed} in its units, the record {first}",
             shown_name(path),
-            at.line
+            deck.line(at)
         ));
     }
     notes

@@ -127,23 +127,36 @@ pub(crate) fn encoded(head: &[u8]) -> Option<&'static str> {
 
 const UTF_16: &str = "this is UTF-16 text (convert it with iconv -f UTF-16 -t UTF-8)";
 
-/// A title: UTF-8, of which a fixed width may have cut the last character, or else Latin-1, as in decks that were written on
-/// Windows.
+/// Shorter lines are not cut by the width of a field.
+const LEAST_WIDTH: usize = 64;
+
+/// A title to the end of its line: UTF-8, of which a fixed width may have cut the last character, or else Latin-1, as in decks that
+/// were written on Windows.
 pub(super) fn title(bytes: &[u8]) -> Cow<'_, str> {
-    let bytes = bytes.trim_ascii_end();
-    match std::str::from_utf8(bytes) {
+    title_in(bytes, bytes.len() >= LEAST_WIDTH)
+}
+
+/// A title in a field, which may be as wide as that. Blanks after it show that nothing is cut.
+fn title_in(bytes: &[u8], is_full: bool) -> Cow<'_, str> {
+    let text = bytes.trim_ascii_end();
+    let is_full = is_full && text.len() == bytes.len();
+    match std::str::from_utf8(text) {
         Ok(text) => text.into(),
-        Err(error) if error.error_len().is_none() => {
-            String::from_utf8_lossy(&bytes[..error.valid_up_to()])
+        Err(error) => {
+            let whole = &text[..error.valid_up_to()];
+            if error.error_len().is_none() && (is_full || !whole.is_ascii()) {
+                String::from_utf8_lossy(whole)
+            } else {
+                text.iter().map(|&byte| char::from(byte)).collect::<String>().into()
+            }
         }
-        Err(_) => bytes.iter().map(|&byte| char::from(byte)).collect::<String>().into(),
     }
 }
 
 /// The text of a field of a binary file without its padding; `None` if there is nothing else.
 pub(super) fn unpadded(bytes: &[u8]) -> Option<String> {
     let end = bytes.iter().rposition(|byte| *byte != 0).map_or(0, |last| last + 1);
-    let text = title(&bytes[..end]);
+    let text = title_in(&bytes[..end], end == bytes.len());
     let text = text.trim_matches(|c: char| c.is_whitespace() || c == '\0');
     (!text.is_empty()).then(|| text.to_string())
 }
@@ -290,6 +303,24 @@ mod tests {
         }
         stream.go_to(1_000_000);
         assert!(stream.fill_buf().unwrap().is_empty());
+    }
+
+    /// A field that ends in half a character is cut only if it is full.
+    #[test]
+    fn titles_keep_their_last_letter() {
+        for (bytes, expected) in [
+            (&b"Sto\xdf   \0\0"[..], "Sto\u{df}"),
+            (b"Sto\xdf\0", "Sto\u{df}"),
+            (b"\xdc ", "\u{dc}"),
+            (b"Sto\xc3\x9f, Caf\xc3", "Sto\u{df}, Caf"),
+            (b"Caf\xc3", "Caf"),
+            (b"Sto\xc3\x9f ", "Sto\u{df}"),
+        ] {
+            assert_eq!(unpadded(bytes).as_deref(), Some(expected), "{bytes:?}");
+        }
+        assert_eq!(title(b"Sto\xdf"), "Sto\u{df}");
+        let wide = [&[b'a'; 79][..], b"\xc3"].concat();
+        assert_eq!(title(&wide), "a".repeat(79));
     }
 
     #[test]

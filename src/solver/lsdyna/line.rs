@@ -104,7 +104,10 @@ impl<R: BufRead> Lines<R> {
             self.buffer.pop();
         }
         self.number += 1;
-        Ok(Some(Line { text: &self.buffer, number: self.number, byte: start, ended, overlong }))
+        // Editors of Windows begin a file with it.
+        let mark = if start == 0 { "\u{feff}" } else { "" };
+        let text = self.buffer.strip_prefix(mark.as_bytes()).unwrap_or(&self.buffer);
+        Ok(Some(Line { text, number: self.number, byte: start, ended, overlong }))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::solver::lsdyna::line::{Line, integer, shown};
 use crate::solver::problem::Place;
+use crate::solver::source;
 
 /// Bytes kept of a keyword; the longest of the manual has 70.
 const MAX_NAME: usize = 200;
@@ -264,7 +265,8 @@ impl<'a> Card<'a> {
 pub(super) fn text(bytes: &[u8]) -> Option<String> {
     let bytes = bytes.trim_ascii();
     let kept = bytes.get(..MAX_TEXT).unwrap_or(bytes);
-    let text = shown(kept);
+    let plain = |c: char| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c };
+    let text: String = source::title(kept).chars().map(plain).collect();
     (!text.is_empty()).then_some(text)
 }
 

@@ -4,12 +4,12 @@ use std::cell::Cell;
 use std::io::{self, BufRead, Read};
 use std::rc::Rc;
 
-use super::super::line::{Line, Lines, shown};
+use super::super::line::{Line, Lines};
 use super::context::{Block, Context, MAX_INCLUDES};
 use super::keyword::{Card, Keyword, Kind, STANDARD, kind, start, text};
 use super::{Deck, DeckEntity, DeckInclude, Scope, cards};
 use crate::solver::problem::{Place, ProblemCode};
-use crate::solver::source::read_buffered;
+use crate::solver::source::{self, read_buffered};
 
 /// Bytes read of a deck and its includes, each as often as it is included; real ones have a
 /// tenth of it.
@@ -308,7 +308,7 @@ impl<'a, 'o> Includes<'a, 'o> {
             None => (line, false),
         };
         let mut name = block.text.take().unwrap_or_default();
-        name.push_str(&shown(part));
+        name.push_str(&source::title(part));
         if name.len() > MAX_FILE_NAME {
             let message = format!("expected a file name, found more than {MAX_FILE_NAME} bytes");
             context.problem(ProblemCode::BadLine, card.place, None, message);
