@@ -689,6 +689,8 @@ fn what_a_rise_from_the_origin_changes_is_said() {
         let is_said = said.contains("the force begins with 0.300 MN, which the file reaches on a line of 10.4 MN/m from the origin; its forces are 3.9 % larger");
         assert_eq!(is_said, raised > 0.0, "{output}: {said}");
         assert_eq!(said.contains("the force begins with"), is_said, "{output}: {said}");
+        let file = String::from_utf8_lossy(&fs::read(here.join(output)).unwrap()).into_owned();
+        assert_eq!(file.contains("changed: the force begins with 0.300 MN"), is_said, "{output}");
         if ["a.cmd", "a.inp"].contains(&output) {
             continue;
         }
@@ -996,6 +998,9 @@ fn the_targets_rebound_is_said() {
             file,
             &[&["--force", "contact", "--tail", "none"], more].concat(),
         );
+        let written = fs::read_to_string(here.join(file)).unwrap();
+        let says_so = written.contains("# changed: rises steeper than");
+        assert_eq!(says_so, file == "soft.csv", "{file}");
     }
     assert!((work("soft.csv") / work("hard.csv") - 1.0).abs() < 1e-3);
 }

@@ -29,9 +29,8 @@ pub struct ExportCurve {
     /// How the target continues beyond the maximum crush.
     pub tail: Tail,
     follows_faster_runs: bool,
-    /// Largest force before and after, in N, and the mean change of the forces over their mean, where a steep rise was made less
-    /// steep.
-    pub softening: Option<(f64, f64, f64)>,
+    /// What was changed of the forces of `predicted`, in words.
+    pub changes: Vec<String>,
     /// Ordinal among the curves of the same group and speed of one export, counted from 1.
     pub ordinal: usize,
 }
@@ -65,7 +64,7 @@ impl ExportCurve {
         let end = loading.deflection_m().len() - 1;
         let stiffness = predicted.unloading_stiffness_n_per_m;
         let own_peak_n = loading.peak_force_n();
-        let mut softening = None;
+        let mut changes = Vec::new();
         if soften {
             match softened(&loading, stiffness, end) {
                 Softened::Nothing => {}
@@ -75,7 +74,13 @@ impl ExportCurve {
                         (0..=1000).map(|k| curve.force_at(end_m * f64::from(k) / 1e3)).collect()
                     };
                     let changed = l1_ratio(&even(&loading), &even(&soft));
-                    softening = Some((own_peak_n, soft.peak_force_n(), changed));
+                    changes.push(format!(
+                        "rises steeper than {} have been made less steep, with the same energy up to the maximum crush; the peak force changes from {} to {}, and forces by {:.1} % of their mean on average",
+                        Shown::one_stiffness(stiffness),
+                        Shown::one_force(own_peak_n),
+                        Shown::one_force(soft.peak_force_n()),
+                        100.0 * changed
+                    ));
                     loading = soft;
                 }
                 Softened::Impossible => {
@@ -105,13 +110,13 @@ impl ExportCurve {
             Ok(edge.iter().copied().chain(tail).collect())
         };
         let no_band = match (band.is_some(), curve.force_low_n.is_some()) {
-            (true, _) => softening.map(|_| "it is not that of a softened curve"),
+            (true, _) => changes.first().map(|_| "it is not that of a softened curve"),
             (false, true) => Some(
                 "only that of the contact force is known (--force contact), until the model is trained again",
             ),
             (false, false) => Some("the model gives none here"),
         };
-        let band = match band.filter(|_| softening.is_none()) {
+        let band = match band.filter(|_| changes.is_empty()) {
             Some((low, high)) => Some((edge(low)?, edge(high)?)),
             None => None,
         };
@@ -123,7 +128,7 @@ impl ExportCurve {
             no_band: no_band.filter(|_| !is_recorded),
             tail,
             follows_faster_runs,
-            softening,
+            changes,
             ordinal: 1,
             predicted,
         })
@@ -154,29 +159,24 @@ impl ExportCurve {
             return Ok(self.clone());
         };
         let raised = loading.force_n()[end] / self.end_n() - 1.0;
+        let slope_n_per_m = loading.force_n()[1] / loading.deflection_m()[1];
+        let mut begun = self.clone().through(loading, end);
         if raised > 2.0 * RAMP {
-            notes.push(format!(
-                "{}: the force begins with {}, which the file reaches on a line of {} from the origin; its forces are {:.1} % larger, so that the energy up to the maximum crush is the same",
-                self.headline(),
+            begun.changes.push(format!(
+                "the force begins with {}, which the file reaches on a line of {} from the origin; its forces are {:.1} % larger, so that the energy up to the maximum crush is the same",
                 Shown::one_force(first_n),
-                Shown::one_stiffness(loading.force_n()[1] / loading.deflection_m()[1]),
+                Shown::one_stiffness(slope_n_per_m),
                 100.0 * raised
             ));
+            notes.extend(begun.change_notes().pop());
         }
-        Ok(self.clone().through(loading, end))
+        Ok(begun)
     }
 
-    /// What softening has changed, in one line.
-    pub(crate) fn softening_note(&self) -> Option<String> {
-        let (before, after, changed) = self.softening?;
-        Some(format!(
-            "{}: rises steeper than {} have been made less steep, with the same energy up to the maximum crush; the peak force changes from {} to {}, and forces by {:.1} % of their mean on average",
-            self.headline(),
-            Shown::one_stiffness(self.stiffness_n_per_m()),
-            Shown::one_force(before),
-            Shown::one_force(after),
-            100.0 * changed
-        ))
+    /// What was changed, with the name of the curve.
+    pub(crate) fn change_notes(&self) -> Vec<String> {
+        let headline = self.headline();
+        self.changes.iter().map(|change| format!("{headline}: {change}")).collect()
     }
 
     /// Why there is no band, in one line; nothing for a recorded curve, which needs none.
@@ -433,6 +433,7 @@ impl ExportCurve {
                 "none beyond the recipe's, so that a body moves as in the run; body_force_N in the database is filtered, and its peaks are lower".into(),
             ));
         }
+        facts.extend(self.changes.iter().map(|change| ("changed", change.clone())));
         if let Some(case) = &curve.provenance.case {
             facts.insert(1, ("case", case.replace(char::is_control, " ")));
         }

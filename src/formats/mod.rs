@@ -396,7 +396,7 @@ impl Format {
 
     /// Changes to the curves, and omissions, after the target's own notes.
     fn with_notes(&self, mut exported: Exported, curves: &[ExportCurve]) -> Exported {
-        exported.notes.extend(curves.iter().filter_map(ExportCurve::softening_note));
+        exported.notes.extend(curves.iter().flat_map(ExportCurve::change_notes));
         if self.band {
             exported.notes.extend(curves.iter().filter_map(ExportCurve::no_band_note));
         }
