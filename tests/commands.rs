@@ -569,6 +569,8 @@ fn warnings_stand_in_text_and_json() {
     let (code, human) = text("80km/h");
     assert_eq!(code, Some(3));
     says(&human, "80 km/h is 8 km/h above the highest training speed");
+    let plot = ["plot", "lead.model", "--speed", "80km/h", "-o", "fast.svg", "--strict"];
+    says(&crumple_fails(folder.path(), 3, &plot), "80 km/h is 8 km/h above the highest");
     assert!(codes("10km/h").contains(&"out_of_range".into()));
     let train = ["train", "curves.h5", "--group", WALL];
     crumple_ok(folder.path(), &[&train[..], &forest[..]].concat());

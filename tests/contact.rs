@@ -363,7 +363,10 @@ fn a_run_states_contact_gap_offset_end_and_sign() {
     says(&fails("sign = 2"), "sign = 2: expected 1 or -1");
     let error = fails("gap = \"3mm\"\ncontact_time = \"1ms\"");
     says(&error, "contact_time and gap both say when contact begins");
-    says(&fails("truncate = \"0ms\""), "truncate = 0 ms lies outside the record");
+    says(
+        &fails("truncate = \"0ms\""),
+        "the record up to truncate holds 1 state: at least 2 are needed",
+    );
 }
 
 #[test]

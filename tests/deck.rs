@@ -368,6 +368,8 @@ fn units_of_the_card_stand_above_comments() {
     );
     assert_eq!(d.units.unwrap().system, None);
     assert_eq!(deck("*CONTROL_UNITS\n\n").units.unwrap().system, Some(UnitSystem::SI));
+    // Blanks part no fields.
+    assert_eq!(deck("*CONTROL_UNITS\nmm sec mtrc_ton\n").units.unwrap().system, None);
 }
 
 #[test]

@@ -1019,6 +1019,26 @@ fn the_only_group_needs_no_name() {
     assert!(!here.join("c.model").exists());
 }
 
+/// What was cut off in copying is that, wherever it was cut: not another kind of file, and not whole.
+#[test]
+fn a_database_that_is_cut_off_is_known() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let whole = fs::read(here.join("curves.h5")).unwrap();
+    let of = whole.len();
+    for bytes in [40, 3000, of / 2, of - 3000, of - 1] {
+        fs::write(here.join("cut.h5"), &whole[..bytes]).unwrap();
+        let said = format!(
+            "cut.h5: this HDF5 file is cut off: it has {bytes} of {of} bytes; copy it again"
+        );
+        for command in
+            ["db check cut.h5", "db ls cut.h5", "train cut.h5 --group lead-car-wall -o x.model"]
+        {
+            says(&crumple_fails(here, 1, command), &said);
+        }
+    }
+}
+
 /// Changed numbers of a database stop every command that reads them, with the case named;
 /// `--accept-changed` continues, and what changes or removes the case is let through.
 #[test]

@@ -1590,7 +1590,15 @@ fn parts_of_a_restart_are_named() {
     assert!(!warned(folder.path(), "init car -o whole.toml").contains("restart"));
     fs::copy(run.join("nodout"), run.join("nodout01")).unwrap();
     let said = warned(folder.path(), "init car -o parts.toml");
-    says(&said, "nodout01: it is named like the file of a restart");
+    let unread = "nodout01 is not read: it is named like the file of a restart";
+    says(&said, unread);
+    says(&crumple_ok(folder.path(), "inspect car/50kmh/nodout"), unread);
+    for output in ["h.h5", "h.csv"] {
+        let arguments = ["histories", "car/50kmh/nodout", "-o", output, "--strict"];
+        says(&crumple_fails(folder.path(), 3, &arguments), unread);
+    }
+    let said = warned(folder.path(), "build parts.toml -o c.h5");
+    says(&said, &format!("50kmh: nodout: {unread}"));
 }
 
 /// CFC 60 would smooth away the pulse of a crash of some milliseconds.

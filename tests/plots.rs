@@ -65,6 +65,14 @@ fn texts_of_all_charts_are_free() {
             check(&charts::group_curves(group, cases, force), group);
         }
     }
+    // Of several kinds of speed each curve says its own.
+    let both = [database.cases("lead-car-wall"), database.cases("vehicle-pair")].concat();
+    let chart = charts::group_curves("both", &both, ForceKind::Contact);
+    check(&chart, "both");
+    assert_eq!(chart.title, "both: contact force by speed");
+    let names: Vec<&str> = chart.panels[0].series.iter().map(|series| &*series.name).collect();
+    assert!(names.contains(&"FE at 18 km/h (wall)"), "{names:?}");
+    assert!(names.contains(&"FE at 9 km/h (closing)"), "{names:?}");
     let cases = database.cases("lead-car-wall");
     let chosen = Choice::Kind(crumple::surrogate::ModelKind::linear());
     check(
@@ -408,6 +416,9 @@ fn wrong_wishes_are_refused() {
         (2, "lead.model --speed 50km/h -o lead.model", "pictures are written"),
         (2, "fe/lead-car-wall/36kmh/nodout --cfc 60 -o a.svg", "--units"),
         (2, "lead50.json -o a.svg --width 10", "expected a number from 80 to 5000"),
+        (2, "curves.h5 --group lead-car-wall --quantity energy -o a.svg", "--quantity is for a scenario or result"),
+        (2, "train-set.toml --train --body A1 -o a.svg", "--train draws the speeds of all vehicles: remove --quantity, --body"),
+        (2, "scenario.toml --cfc 180 -o a.svg", "--cfc is for accelerations: add --quantity acceleration"),
     ];
     for (code, arguments, says) in cases {
         let mut all = vec!["plot"];

@@ -82,6 +82,8 @@ pub struct BuildReport {
     /// Groups that were built from the manifest when it had another study or group and other runs
     /// or recipe, and that stay; looked for when the database has nothing of the study yet.
     pub earlier: Vec<String>,
+    /// Whether the file was written: not if nothing has changed.
+    pub(crate) is_written: bool,
     /// The database as it is now.
     pub database: Database,
     /// Where it has the cases.
@@ -181,7 +183,8 @@ pub(crate) fn build_runs(
     let changed = !previous.left.is_empty()
         || !moved.is_empty()
         || runs.iter().any(|run| matches!(run.outcome, RunOutcome::Built));
-    if changed || !is_there {
+    let is_written = changed || !is_there;
+    if is_written {
         database.write(path)?;
     }
     let all = database.groups().flat_map(|group| database.cases(group).iter().enumerate());
@@ -194,6 +197,7 @@ pub(crate) fn build_runs(
         replaced,
         moved,
         earlier: previous.earlier.into_iter().collect(),
+        is_written,
         database,
     })
 }

@@ -81,7 +81,13 @@ pub fn group_curves(group: &str, cases: &[Case], force: ForceKind) -> Chart {
         let step = |k: usize| drawn[k * (cases.len() - 1) / (MOST_CURVES - 1)];
         drawn = (0..MOST_CURVES).map(step).collect();
     }
-    let names = names(cases);
+    let mut names = names(cases);
+    let kind = |case: &Case| case.conditions.speed.kind;
+    let is_mixed = cases.windows(2).any(|pair| kind(&pair[0]) != kind(&pair[1]));
+    if is_mixed {
+        let of = names.iter_mut().zip(cases);
+        of.for_each(|(name, case)| *name += &format!(" ({})", kind(case).name()));
+    }
     for (k, (case, name)) in drawn.iter().map(|&k| (&cases[k], names[k].clone())).enumerate() {
         match both_ways(case, force) {
             Some((d, f)) => {
@@ -92,11 +98,14 @@ pub fn group_curves(group: &str, cases: &[Case], force: ForceKind) -> Chart {
         }
     }
     let panel = Panel { series, ..axes(top) };
-    let kind = cases.first().map_or("speed", |case| case.conditions.speed.kind.name());
+    let kind = match cases.first() {
+        Some(case) if !is_mixed => format!("{} speed", kind(case).name()),
+        _ => "speed".into(),
+    };
     // From the motion it is drawn as a run on it has it; models and the database have it filtered.
     let of_motion = |case: &Case| force == ForceKind::Body && case.curves.force_kind != force;
     let unfiltered = if cases.iter().any(of_motion) { " (not filtered)" } else { "" };
-    let title = format!("{group}: {} force{unfiltered} by {kind} speed", force.name());
+    let title = format!("{group}: {} force{unfiltered} by {kind}", force.name());
     let mut chart = Chart::of(&title, panel);
     if !missing.is_empty() {
         chart.notes.push(format!("Without a {} force: {}.", force.name(), missing.join(", ")));

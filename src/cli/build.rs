@@ -206,7 +206,8 @@ fn print(out: &mut dyn Write, report: &BuildReport, database: &str) -> io::Resul
         groups.push(&report.group);
     }
     let word = if groups.len() > 1 { "groups" } else { "group" };
-    writeln!(out, "wrote {database} ({word} {})", groups.join(", "))
+    let done = if report.is_written { "wrote" } else { "nothing has changed in" };
+    writeln!(out, "{done} {database} ({word} {})", groups.join(", "))
 }
 
 /// Says what has moved: a whole group in one line.

@@ -71,7 +71,8 @@ pub(crate) struct GlobalOptions {
     /// Accept databases, models and unfinished sweeps that were changed after they were written
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub accept_changed: bool,
-    /// Replace an output that exists and is of another kind (a database, a model, a manifest, a solver file), or the study of init
+    /// Replace an output that exists and is of another kind (a database, a model, a manifest, a solver file), or the study of init;
+    /// not what build, db add and db copy are to add to
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub overwrite: bool,
 }

@@ -66,9 +66,9 @@ pub(super) struct Args {
     /// Of a model: value of a further parameter, as NAME=VALUE; may be repeated
     #[arg(long, value_parser = arguments::parameter, value_name = "NAME=VALUE")]
     parameter: Vec<(String, Parameter)>,
-    /// Of a scenario or result: quantity to draw
-    #[arg(long, value_parser = one_of(QUANTITIES), default_value = "velocity")]
-    quantity: Quantity,
+    /// Of a scenario or result: quantity to draw (default: velocity)
+    #[arg(long, value_parser = one_of(QUANTITIES))]
+    quantity: Option<Quantity>,
     /// Of a scenario or result: body to draw; may be repeated (default: every vehicle)
     #[arg(long = "body", value_name = "NAME")]
     bodies: Vec<String>,
@@ -240,8 +240,8 @@ fn chart(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
     }
     match kind {
         FileKind::Database => of_database(args, file, options),
-        FileKind::Model => of_model(args, file),
-        FileKind::Curve => of_force(args, json::predicted(file)?, &[]),
+        FileKind::Model => of_model(args, file, options),
+        FileKind::Curve => of_force(args, json::predicted(file)?, &[], options),
         FileKind::Scenario if args.train => of_train(file, options),
         FileKind::Scenario | FileKind::Result => of_runs(args, options),
         FileKind::Sweep => {
@@ -279,6 +279,7 @@ impl Args {
                 of_solver || of_run,
                 "--cfc is for a solver file, scenario or result",
             ),
+            (self.quantity.is_some(), of_run, "--quantity is for a scenario or result"),
             (!self.bodies.is_empty(), of_run, "--body is for a scenario or result"),
             (!self.interfaces.is_empty(), of_run, "--interface is for a scenario or result"),
             (!self.over.is_empty(), is(&[FileKind::Sweep]), "--over is for a sweep"),
@@ -292,7 +293,17 @@ impl Args {
         if of_solver && self.cfc.is_some() && self.units.is_none() {
             return usage("--cfc needs the units of the solver file: give --units, such as mm-t-s");
         }
-        let (unused, of) = match self.quantity.is_of_interfaces() {
+        let chooses = !self.bodies.is_empty() || !self.interfaces.is_empty();
+        if self.train && (self.quantity.is_some() || chooses || self.cfc.is_some()) {
+            return usage(
+                "--train draws the speeds of all vehicles: remove --quantity, --body, --interface and --cfc",
+            );
+        }
+        let quantity = self.quantity();
+        if of_run && self.cfc.is_some() && quantity != Quantity::Acceleration {
+            return usage("--cfc is for accelerations: add --quantity acceleration");
+        }
+        let (unused, of) = match quantity.is_of_interfaces() {
             true => (&self.bodies, "--interface"),
             false => (&self.interfaces, "--body"),
         };
@@ -300,6 +311,10 @@ impl Args {
             return usage(format!("this quantity is chosen with {of}, see --quantity"));
         }
         Ok(())
+    }
+
+    fn quantity(&self) -> Quantity {
+        self.quantity.unwrap_or(Quantity::Velocity)
     }
 }
 
@@ -335,14 +350,14 @@ fn of_database(args: &Args, file: &Path, options: GlobalOptions) -> Result<Chart
 }
 
 /// A model's curve over its neighbours.
-fn of_model(args: &Args, file: &Path) -> Result<Chart, Failure> {
+fn of_model(args: &Args, file: &Path, options: GlobalOptions) -> Result<Chart, Failure> {
     let model = Model::read(file)?;
     let Some(speed) = args.speed else { return Err(speed_of_model(&model)) };
     let parameters = arguments::parameters(&args.parameter)?;
     let named: Vec<String> =
         parameters.iter().map(|(name, value)| format!(", {name} = {value}")).collect();
     let query = Query { parameters, ..Query::at(speed) };
-    let mut chart = of_force(args, predict(&model, &query)?, &query.runs_of(&model))?;
+    let mut chart = of_force(args, predict(&model, &query)?, &query.runs_of(&model), options)?;
     chart.title += &named.concat();
     Ok(chart)
 }
@@ -352,7 +367,9 @@ fn of_force(
     args: &Args,
     curve: PredictedCurve,
     neighbours: &[ModelCase],
+    options: GlobalOptions,
 ) -> Result<Chart, Failure> {
+    options.warn_all(&curve.warnings);
     let curve = match args.force {
         Some(force) => curve.of_force(force)?,
         None => curve,
@@ -397,13 +414,13 @@ fn of_runs(args: &Args, options: GlobalOptions) -> Result<Chart, Failure> {
         let is_alone = args.files.iter().filter(|other| stem(other) == stem(file)).count() == 1;
         runs.push((if is_alone { stem(file) } else { file.display().to_string() }, motion));
     }
-    let (quantity, ..) =
-        QUANTITIES.iter().find(|(_, q, _)| *q == args.quantity).expect("one of the list");
+    let drawn = args.quantity();
+    let (quantity, ..) = QUANTITIES.iter().find(|(_, q, _)| *q == drawn).expect("one of the list");
     let names: Vec<&str> = runs.iter().map(|(name, _)| &**name).collect();
     let title = format!("{}: {quantity}", names.join(", "));
-    let chosen = if args.quantity.is_of_interfaces() { &args.interfaces } else { &args.bodies };
+    let chosen = if drawn.is_of_interfaces() { &args.interfaces } else { &args.bodies };
     let class = args.cfc.unwrap_or(charts::USUAL_CLASS);
-    Ok(charts::motion(&title, &runs, args.quantity, chosen, class)?)
+    Ok(charts::motion(&title, &runs, drawn, chosen, class)?)
 }
 
 fn of_solver_file(args: &Args, file: &Path, options: GlobalOptions) -> Result<Chart, Failure> {

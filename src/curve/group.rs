@@ -34,6 +34,15 @@ pub(crate) type Remark = (String, &'static str, String);
 pub(crate) fn remarks(cases: &[Case]) -> Vec<Remark> {
     let mut all = copies(cases);
     all.extend(titles(cases));
+    let filter = |case: &Case| case.filter();
+    all.extend(unlike_most(&cases.iter().collect::<Vec<_>>(), filter, str::to_string).map(
+        |(case, own, usual)| {
+            let words = format!(
+                "the filter of its recipe is \"{own}\", that of others in the group \"{usual}\": their forces are not comparable; build all runs with one recipe"
+            );
+            (case.id.name.clone(), "filter_differs", words)
+        },
+    ));
     let runs: Vec<&Case> =
         cases.iter().filter(|c| c.id.study != IMPORTED && !c.is_truncated()).collect();
     // What a crush zone stops is less of a heavier body: all are compared as if they had the largest mass.
@@ -229,25 +238,36 @@ fn titles(cases: &[Case]) -> Vec<Remark> {
 
 fn titles_of(cases: &[&Case]) -> Vec<Remark> {
     let title = |case: &Case| case.provenance.sources.iter().find_map(|s| s.title.clone());
-    let titled: Vec<(&Case, String)> =
-        cases.iter().filter_map(|&case| Some((case, title(case)?))).collect();
-    let mut counts: HashMap<String, usize> = HashMap::new();
-    for (_, title) in &titled {
-        *counts.entry(wording(title)).or_default() += 1;
-    }
-    let most = counts.values().copied().max().unwrap_or(0);
-    let usual = titled.iter().find(|(_, title)| counts[&wording(title)] == most);
-    let Some((_, usual)) = usual else { return Vec::new() };
-    let others = titled.iter().filter(|(_, title)| wording(title) != wording(usual));
-    let remark = |(case, title): &(&Case, String)| {
+    let remark = |(case, own, usual): (&Case, String, String)| {
         let words = format!(
             "the title of its files is \"{}\", that of others in the group \"{}\": it may be another design",
-            title.trim().escape_debug(),
+            own.trim().escape_debug(),
             usual.trim().escape_debug()
         );
         (case.id.name.clone(), "title_differs", words)
     };
-    others.map(remark).collect()
+    unlike_most(cases, title, wording).map(remark).collect()
+}
+
+/// The cases whose text, as compared, is not that of most, with both.
+fn unlike_most<'a>(
+    cases: &[&'a Case],
+    of: impl Fn(&Case) -> Option<String>,
+    compared: fn(&str) -> String,
+) -> impl Iterator<Item = (&'a Case, String, String)> {
+    let known: Vec<(&Case, String)> =
+        cases.iter().filter_map(|&case| Some((case, of(case)?))).collect();
+    let mut counts: HashMap<String, usize> = HashMap::new();
+    for (_, text) in &known {
+        *counts.entry(compared(text)).or_default() += 1;
+    }
+    let most = counts.values().copied().max().unwrap_or(0);
+    let usual = known.iter().find(|(_, text)| counts[&compared(text)] == most);
+    let usual = usual.map(|(_, text)| text.clone()).unwrap_or_default();
+    let is_other = move |(case, own): (&'a Case, String)| {
+        (compared(&own) != compared(&usual)).then(|| (case, own, usual.clone()))
+    };
+    known.into_iter().filter_map(is_other)
 }
 
 /// Mean forces over equal parts of the deflection, up to `end_m`.
@@ -286,7 +306,9 @@ fn designs(runs: &[&Case]) -> Vec<Remark> {
         let ratio = b.iter().sum::<f64>() / a.iter().sum::<f64>();
         let most = MOST_RATIO * libm::pow(other.speed.m_per_s / one.speed.m_per_s, RATE_POWER);
         let likeness = correlation(&a, &b);
-        let why = if !(LEAST_RATIO..=most).contains(&ratio) {
+        let why = if !ratio.is_finite() {
+            continue;
+        } else if !(LEAST_RATIO..=most).contains(&ratio) {
             format!("its mean force is {ratio:.2} times that of {}", slow.id.name)
         } else if likeness < LEAST_CORRELATION {
             format!("its peaks come in a different order from those of {}", slow.id.name)

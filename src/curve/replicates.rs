@@ -15,6 +15,12 @@ impl Case {
     pub(crate) fn is_measured_as(&self, other: &Self) -> bool {
         measured(&self.provenance.recipe) == measured(&other.provenance.recipe)
     }
+
+    /// The filter of its recipe; none of a curve from a table.
+    pub(crate) fn filter(&self) -> Option<String> {
+        let whole = serde_json::from_str::<serde_json::Value>(&self.provenance.recipe).ok()?;
+        Some(whole["recipe"]["filter"].as_str()?.to_string())
+    }
 }
 
 /// What of a recipe decides how force and deflection were measured.

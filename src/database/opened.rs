@@ -44,6 +44,7 @@ pub(crate) fn open(path: &Path) -> Result<Opened<'_>, Error> {
     let (file, fault) = hdf5::open(path).map_err(|e| match e {
         OpenError::Io(source) => Error::io(path, source),
         OpenError::InUse => error!(Locked, "{}: {e}", path.display()),
+        OpenError::Cut { .. } => error!(Database, "{}: {e}", path.display()),
         other => not_hdf5(path, other),
     })?;
     Opened::of(path, file, fault)

@@ -18,7 +18,7 @@
 
 pub(crate) mod table;
 
-use std::io::Write;
+use std::io::{Read, Write};
 use std::path::Path;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::{fs, io};
@@ -45,6 +45,14 @@ pub(crate) enum OpenError {
         "another program has this HDF5 file open for writing, or ended without closing it: close that program, or clear the mark it has left (h5clear -s FILE, of the HDF5 tools)"
     )]
     InUse,
+    /// Its end is missing.
+    #[error("this HDF5 file is cut off: it has {bytes} of {of} bytes; copy it again")]
+    Cut {
+        /// Its length.
+        bytes: u64,
+        /// The length that it states.
+        of: u64,
+    },
     /// It begins as HDF5 and cannot be read as such.
     #[error("this is not an HDF5 file ({detail})")]
     Damaged {
@@ -153,6 +161,11 @@ pub(crate) fn open(path: &Path) -> Result<(File, Fault), OpenError> {
     }
     let fault = Fault::default();
     let length = file.metadata()?.len();
+    let mut head = Vec::new();
+    (&file).take(SUPERBLOCK_BYTES).read_to_end(&mut head)?;
+    if let Some(of) = stated_length(&head).filter(|of| *of > length) {
+        return Err(OpenError::Cut { bytes: length, of });
+    }
     let opened =
         File::from_source(Blocks { file, length, latest: Mutex::default(), fault: fault.clone() });
     fault.check()?;
@@ -161,6 +174,22 @@ pub(crate) fn open(path: &Path) -> Result<(File, Fault), OpenError> {
         Err(Error::FileMarkedInUse(_) | Error::FileLocked(_)) => Err(OpenError::InUse),
         Err(other) => Err(OpenError::Damaged { detail: other.to_string() }),
     }
+}
+
+/// As many bytes hold the length that a file states.
+const SUPERBLOCK_BYTES: u64 = 52;
+
+/// The end-of-file address of the superblock at the beginning of a file, of addresses of 8 bytes (HDF5 file format specification,
+/// section II.A).
+fn stated_length(head: &[u8]) -> Option<u64> {
+    let (width_at, at) = match *head.get(8)? {
+        0 => (13, 40),
+        1 => (13, 44),
+        2 | 3 => (9, 28),
+        _ => return None,
+    };
+    let bytes = head.get(at..at + 8).filter(|_| head[width_at] == 8)?;
+    bytes.try_into().ok().map(u64::from_le_bytes)
 }
 
 /// Writes a file; to any place through one type, since the library would be compiled once more for each.

@@ -62,7 +62,7 @@ pub(crate) fn is_other_hdf5(path: &Path) -> bool {
             let attributes = file.root().attrs().ok();
             attributes.and_then(|a| Some(a.get("format")?.as_str()?.to_string()))
         }
-        Err(OpenError::Damaged { .. } | OpenError::InUse) => None,
+        Err(OpenError::Damaged { .. } | OpenError::Cut { .. } | OpenError::InUse) => None,
         Err(OpenError::Io(_) | OpenError::NoSignature) => return false,
     };
     format.as_deref() != Some(FORMAT)

@@ -152,8 +152,8 @@ fn is_named_nearly(name: &str, kind: &str) -> bool {
     }
 }
 
-/// Files that are not read and may hold what a run lacks: those of a restart, such as `nodout01`, and those with nearly the
-/// name of a file that is not there, such as `rwforc.gz` and `RWFORC`, unless a binary file has its histories; each with what to do.
+/// Files that are not read and may hold what a run lacks: those with nearly the name of a file that is not there, such as `rwforc.gz`
+/// and `RWFORC`, unless a binary file has its histories; each with what to do.
 pub(super) fn unread_beside(folder: &Path, is_read: impl Fn(&str) -> bool) -> Vec<String> {
     let entries = folder.read_dir().into_iter().flatten().filter_map(Result::ok);
     let paths = entries.map(|entry| entry.path()).filter(|path| path.is_file());
@@ -161,19 +161,10 @@ pub(super) fn unread_beside(folder: &Path, is_read: impl Fn(&str) -> bool) -> Ve
     names.sort();
     let mut found = Vec::new();
     for kind in [MOTION].into_iter().chain(FORCES).chain(ENERGIES) {
-        let is_there = names.iter().any(|name| without_job_id(name) == kind);
-        let is_read = is_there || is_read(kind);
+        let is_read = names.iter().any(|name| without_job_id(name) == kind) || is_read(kind);
         for name in &names {
-            let rest = without_job_id(name).strip_prefix(kind);
-            let is_of_restart = is_there
-                && rest.is_some_and(|rest| {
-                    !rest.is_empty() && rest.bytes().all(|b| b.is_ascii_digit())
-                });
             let end = name.rsplit('.').next().unwrap_or_default().to_lowercase();
             let what = match PACKED.contains(&&*end) {
-                _ if is_of_restart => {
-                    "it is named like the file of a restart: append its states to the first file to have them read".into()
-                }
                 _ if is_read || !is_named_nearly(name, kind) => continue,
                 true => format!("if it is the {kind}, unpack it and name it {kind}"),
                 false => format!("if it is the {kind}, rename it accordingly"),

@@ -270,7 +270,7 @@ impl Drawing {
         let fits = |side: f64| (1.0..=f64::from(MOST)).contains(&side);
         let size = error!(
             Plot,
-            "a picture of {width} by {height} pixels cannot be drawn: expected 1 to {MOST} each way",
+            "a picture of {width} by {height} pixels cannot be drawn: expected 1 to {MOST} each way; draw less in it, with fewer pixels (--scale), or as .svg",
             height = height as u64,
             width = width as u64
         );

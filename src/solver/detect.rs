@@ -189,6 +189,9 @@ fn look_at(
     if head.starts_with(b"\x89HDF\r\n\x1a\n") {
         return Err(unknown("this is an HDF5 file"));
     }
+    if head.is_empty() && named.is_none() {
+        return Err(unknown("this is an empty file"));
+    }
     if let Some(what) = source::encoded(&head) {
         return Err(error!(SolverFile at "format", "{}: {what}", path.display()));
     }

@@ -50,8 +50,8 @@ pub use lsdyna::deck::{
 };
 pub use problem::{Problem, ProblemCode};
 pub(crate) use runs::family;
-use runs::missing_continuation;
 pub use runs::output_files;
+use runs::{missing_continuation, unread_restart};
 use selection::check_selection;
 pub(crate) use selection::no_component;
 pub use selection::{Entity, NoDataReason, Selection, SolverFile, WantedId, WithoutData};
@@ -145,10 +145,7 @@ fn sections_of(
     let mut head = [0; 16];
     let count = source::fill_at(&*parts[0], 0, &mut head).map_err(io)?;
     let is_container = lsdyna::binout::recognises(&head[..count]);
-    if format.is_binary()
-        && let Some(message) = missing_continuation(path)?
-    {
-        let problem = Problem::new(ProblemCode::CutRecord, message);
+    if let Some(problem) = unread_beside(path, format)? {
         sections.iter_mut().for_each(|section| section.problems.push(problem.clone()));
     }
     if !format.is_binary() || !sections.is_empty() || selection.section.is_some() {
@@ -160,6 +157,15 @@ fn sections_of(
         _ => "it has no history that is read",
     };
     Err(unknown_format(path, looks_like))
+}
+
+/// Of files that continue this one, what is not read.
+fn unread_beside(path: &Path, format: &Format) -> Result<Option<Problem>, Error> {
+    let (code, message) = match format.is_binary() {
+        true => (ProblemCode::CutRecord, missing_continuation(path)?),
+        false => (ProblemCode::UnreadRows, unread_restart(path)?),
+    };
+    Ok(message.map(|message| Problem::new(code, message)))
 }
 
 /// What can be selected from several sections.
@@ -244,7 +250,7 @@ pub fn blocks(
     selection: &Selection,
 ) -> Result<Option<Blocks>, Error> {
     let (format, parts) = open(&family(path)?, format, selection)?;
-    if format.is_binary() && missing_continuation(path)?.is_some() {
+    if unread_beside(path, format)?.is_some() {
         return Ok(None);
     }
     let io = |source| Error::io(path, source);

@@ -211,6 +211,22 @@ fn restart(path: &Path, number: u32) -> PathBuf {
     path.with_file_name(format!("{stem}{number:02}"))
 }
 
+/// What to do with the file that a restart has written beside a text file, which is not read with it.
+pub(crate) fn unread_restart(path: &Path) -> Result<Option<String>, Error> {
+    for number in 1..=MOST_TEXT_RESTARTS {
+        let name = format!("{}{number:02}", name_of(path));
+        if is_file(&path.with_file_name(&name))? {
+            return Ok(Some(format!(
+                "{name} is not read: it is named like the file of a restart; append its states to this file, or move it away if they are in it"
+            )));
+        }
+    }
+    Ok(None)
+}
+
+/// Of a text file as many are looked for.
+const MOST_TEXT_RESTARTS: u32 = 9;
+
 fn with_continuations(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut parts = vec![path.to_path_buf()];
     loop {

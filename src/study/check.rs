@@ -119,12 +119,13 @@ fn check_run(entry: &RunEntry, kind: StudyKind, half_model: bool) -> Result<(), 
         )
         .itself());
     }
-    check_name("run.name", &entry.case_name(), false).map_err(|_| {
+    check_name("name", &entry.case_name(), false).map_err(|why| {
         let run = run.escape_debug();
-        error!(
-            Study at name_key(entry),
-            "run \"{run}\" gives no name for its case: add name = \"…\" to it"
-        )
+        let why = match entry.name {
+            Some(_) => format!(": {why}"),
+            None => " gives no name for its case: add name = \"…\" to it".into(),
+        };
+        error!(Study at name_key(entry), "run \"{run}\"{why}")
     })
 }
 

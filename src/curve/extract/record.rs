@@ -176,8 +176,12 @@ impl Record {
     /// Removes the states after the manifest's end of the record; says how many.
     fn truncate(&mut self, until_s: f64) -> Result<String, ExtractError> {
         let kept = self.time_s.iter().take_while(|&&t| t <= until_s).count();
-        if kept < 2 {
+        if kept == 0 {
             return Err(self.outside("truncate", until_s));
+        }
+        if kept < 2 {
+            let what = "the record up to truncate";
+            return Err(ExtractError::TooShort { origin: Origin::Motion, what, states: kept });
         }
         let removed = self.time_s.len() - kept;
         self.time_s.truncate(kept);
@@ -394,6 +398,10 @@ pub(super) fn sample(
         .take_while(|&t| t <= reach)
         .map(|t| t.min(last_s))
         .collect();
+    if times.len() < 2 {
+        let what = "the record at the recipe's interval";
+        return Err(ExtractError::TooShort { origin: Origin::Motion, what, states: times.len() });
+    }
     if times.len() < sampling.states {
         let short = format!(
             "short: the record holds {} of {} states from contact on",

@@ -323,7 +323,10 @@ fn from_words<'a>(words: impl Iterator<Item = &'a str>) -> Option<UnitSystem> {
 impl Context {
     /// Keeps the first statement that is recognised; `*CONTROL_UNITS` is above comments.
     pub(super) fn units(&mut self, stated: String, place: Place, on_card: bool) {
-        let mut new = StatedUnits { system: system(&stated), text: stated, at: self.at(place) };
+        // A card that is filled in with blanks between the units has parts of them in its fields.
+        let is_whole = !on_card || stated.split(' ').count() == 3;
+        let system = system(&stated).filter(|_| is_whole);
+        let mut new = StatedUnits { system, text: stated, at: self.at(place) };
         if let Some(known) = &self.deck.units {
             if new.system.zip(known.system).is_some_and(|(a, b)| a != b) {
                 let message = format!(
