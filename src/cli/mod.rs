@@ -71,8 +71,8 @@ pub(crate) struct GlobalOptions {
     /// Accept databases, models and unfinished sweeps that were changed after they were written
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub accept_changed: bool,
-    /// Replace an output that exists and is of another kind (a database, a model, a manifest, a solver file), or the study of init;
-    /// not what build, db add and db copy are to add to
+    /// Replace an output that exists and is of another kind (a database, a model, a manifest, a solver file), or the study of init
+    /// (build, db add and db copy add to a database, and replace no other file)
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub overwrite: bool,
 }
