@@ -169,6 +169,9 @@ pub(super) fn detect(path: &Path, source: &dyn Source) -> Result<&'static Format
             path,
             "this is an LS-DYNA text file of a kind that is not read, or one that ends after its header",
         )),
+        _ if source.size().is_ok_and(|size| size == 0) => {
+            Err(unknown_format(path, "this is an empty file"))
+        }
         _ => Err(unknown_format(path, NOT_RECOGNISED)),
     }
 }
@@ -188,9 +191,6 @@ fn look_at(
     Stream::new(source).take(16).read_to_end(&mut head).map_err(io)?;
     if head.starts_with(b"\x89HDF\r\n\x1a\n") {
         return Err(unknown("this is an HDF5 file"));
-    }
-    if head.is_empty() && named.is_none() {
-        return Err(unknown("this is an empty file"));
     }
     if let Some(what) = source::encoded(&head) {
         return Err(error!(SolverFile at "format", "{}: {what}", path.display()));
