@@ -164,7 +164,7 @@ fn a_wrong_speed_in_the_manifest_is_noticed() {
     let output = crumple_in(folder.path(), "build study/study.toml -o c.h5 --strict");
     assert_eq!(output.status.code(), Some(3));
     let error = String::from_utf8(output.stderr).unwrap();
-    says(&error, "36kmh: speed: the record states 36 km/h; the manifest's 38 km/h is used");
+    says(&error, "36kmh: speed: the record states 36 km/h; the study's 38 km/h is used");
 }
 
 /// Energy audits of all bundled runs: W/E between 0.99 and 1.05, as the runs' physics has it.
@@ -192,8 +192,8 @@ fn energy_audits_of_all_groups() {
     // At low speeds a quarter of a step is more than 1 % of the crush.
     let findings: Vec<&str> = check.lines().collect();
     for (found, case) in findings.iter().zip([
-        "3kmh: contact: between two states it is uncertain by about 0.16 mm (up to 0.47 mm where the force rises over several states), and",
-        "6kmh: contact: between two states it is uncertain by about 0.31 mm",
+        "3kmh: contact: its place between two states is uncertain by about 0.16 mm (up to 0.47 mm where the force rises over several states), 2.0 % of the crush",
+        "6kmh: contact: its place between two states is uncertain by about 0.31 mm",
     ]) {
         assert!(found.starts_with(&format!("vehicle-pair/{case}")), "{check}");
     }
@@ -618,7 +618,7 @@ fn a_contact_force_unlike_the_runs_is_warned_of() {
     assert!(!warnings("lead.model", "20km/h").contains("absorbs"));
     // Above the runs there is another way to the maximum crush, which is not taken.
     let above = warnings("lead.model", "80km/h");
-    says(&above, "assumption; their crush over the speed, continued, gives 1.885 m");
+    says(&above, "assumption; extrapolating the runs' crush over the speed gives 1.885 m");
     let printed = crumple_ok(here, "predict lead.model --speed 50km/h");
     says(&printed, "km/h, off by 3.7 % on average at the left-out speeds");
 }
@@ -1018,7 +1018,7 @@ fn scenarios_choose_the_force() {
         let with = |force: &str| crush(&format!("{source}, force = \"{force}\""));
         let (contact, body) = (with("contact"), with("body"));
         assert!(contact < 0.86 && (body - 0.8749).abs() < 0.01, "{source}: {contact} and {body}");
-        assert_eq!(crush(source), body, "{source}: a vehicle of one mass needs the body force");
+        assert_eq!(crush(source), body, "{source}: a single-mass vehicle needs the body force");
     }
     // A CSV file says itself which force it holds and how it unloads.
     let run = |nose: &str| {

@@ -205,7 +205,11 @@ fn the_crush_counts_from_the_crossing_and_not_from_the_next_state() {
                 error.abs() < most.unwrap().1,
                 "{speed} km/h, each {every}: crush is {error:+.4} off"
             );
-            let said = found.quality.warnings.iter().any(|w| w.contains("and so the crush by"));
+            let said = found
+                .quality
+                .warnings
+                .iter()
+                .any(|w| w.contains("% of the crush: set contact_time"));
             let step = f64::from(every as u32) * INTERVAL_S * f64::from(speed) / 3.6;
             assert_eq!(said, step > 0.01 * crush(&found), "{:?}", found.quality.warnings);
         }

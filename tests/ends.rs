@@ -255,7 +255,7 @@ fn fes_contact_force_gives_fes_velocity() {
 }
 
 /// Where the runs agree on no stopped mass, an end would move its whole vehicle by the contact force: that is further from
-/// FE than a vehicle of one mass.
+/// FE than a single-mass vehicle.
 #[test]
 fn an_end_without_stopped_mass_is_said() {
     let of = |front: &str, contact: &str| {
@@ -450,8 +450,8 @@ fn wrong_ends_are_refused() {
         (second, without, "rear of vehicle \"A1\" comes from a model and the end that it meets does not"),
         ("ends = \"end\"", "front = { curve = \"end\" }", "front of vehicle \"A2\" comes from a model"),
         ("ends = \"end\"", "ends = \"edn\"", "there is no curve \"edn\" in [curves]"),
-        ("[contact]", "[contact]\ncurve = \"nose\"", "lies between ends that come from models"),
-        ("ends = \"end\"", "behind = \"nose\", ends = \"end\"", "lies between ends that come from models"),
+        ("[contact]", "[contact]\ncurve = \"nose\"", "ends that come from models meet by their plates"),
+        ("ends = \"end\"", "behind = \"nose\", ends = \"end\"", "ends that come from models meet by their plates"),
     ];
     cases.into_iter().for_each(|(from, to, expected)| fails(from, to, expected));
     let file = "end = { file = \"lead50.csv\" }";

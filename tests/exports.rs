@@ -918,7 +918,7 @@ fn groups_and_several_speeds_are_exported_at_once() {
         (2, &["export", "lead50.json", "--to", "mat", "--units", UNITS][..], "mat is always in SI"),
         (1, &["export", "lead.model", "--speed", "36km/h,50km/h", "--to", "lsdyna", "--deck"][..], "one curve"),
         (2, &["export", "lead50.json", "--to", "iso-mme"][..], "iso-mme takes histories over time"),
-        (2, &["export", "lead50.json", "--to", "table"][..], "table takes a model"),
+        (2, &["export", "lead50.json", "--to", "table"][..], "table is made of a whole model"),
     ];
     cases.into_iter().for_each(|(code, arguments, expected)| t(code, arguments, expected));
     // What a format has no use for is refused.
@@ -1044,7 +1044,7 @@ fn curves_give_back_the_energy_of_their_unloading() {
 }
 
 /// A table that is said to hold the contact force does not become one of the force that moves the body; and a recorded contact
-/// force lets a body of one mass rebound as its run does.
+/// force lets a single-mass body rebound as its run does.
 #[test]
 fn contact_forces_stay_contact_forces() {
     let folder = demo_folder();

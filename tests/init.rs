@@ -984,23 +984,25 @@ fn a_single_run_is_enough() {
 #[test]
 fn nothing_is_overwritten() {
     let (_folder, here) = four_runs();
-    fs::write(here.join("study.toml"), "mine").unwrap();
+    fs::write(here.join("study.toml"), "[study]\nname = \"mine\"\n").unwrap();
     let error = crumple_fails(&here, 1, "init");
     says(
         &error,
         "study.toml exists already and is not overwritten: name another with -o, or replace it with --overwrite",
     );
-    assert_eq!(fs::read(here.join("study.toml")).unwrap(), b"mine");
+    assert!(fs::read_to_string(here.join("study.toml")).unwrap().contains("mine"));
     crumple_fails(&here, 1, "init -o 25kmh");
     let error = crumple_fails(&here, 1, "init -o 25kmh --overwrite");
     says(
         &error,
-        "25kmh exists already and is not a TOML file, which init writes: name another with -o",
+        "25kmh exists already and is not a study, which init writes: name another with -o",
     );
     // Runs are only read, whatever is asked.
     let nodout = fs::read(here.join("25kmh/nodout")).unwrap();
     let error = crumple_fails(&here, 1, "init -o 25kmh/nodout --overwrite");
-    says(&error, "is not a TOML file");
+    says(&error, "is not a study");
+    fs::write(here.join("Cargo.toml"), "[package]\n").unwrap();
+    says(&crumple_fails(&here, 1, "init -o Cargo.toml --overwrite"), "is not a study");
     assert!(fs::read(here.join("25kmh/nodout")).unwrap() == nodout);
     crumple_ok(&here, "init --overwrite");
     crumple_ok(&here, "build -q");
@@ -1114,7 +1116,7 @@ fn inches_are_taken_where_the_folder_says_so() {
     fs::write(here.join("mm.toml"), as_mm).unwrap();
     says(
         &warned(here, "build mm.toml -o mm.h5"),
-        &format!("units: the manifest states mm-t-s, but {metal}"),
+        &format!("units: the study states mm-t-s, but {metal}"),
     );
     let said = warned(here, "init unnamed --units mm-t-s -o given-mm.toml");
     says(&said, &format!("units: mm-t-s as given, but {metal}"));

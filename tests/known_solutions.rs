@@ -330,7 +330,7 @@ fn a_curve_that_ends_is_an_error_with_the_interface_named() {
     let error = simulate(&chain(&[(24.0 * TONNES, 10.0)], &[law]), &settings).unwrap_err();
     let message = error.to_string();
     assert!(message.starts_with("interface I0 is crushed 0.200"), "{message}");
-    says(&message, "give a longer curve, or end = \"hold\"");
+    says(&message, "give a longer curve (a model: train it with faster runs), or end = \"hold\"");
 }
 
 #[test]

@@ -879,7 +879,7 @@ fn a_legacy_curve_is_exported_directly() {
         (2, &["export", "nose.csv", "--to", "csv", "--kind", "wall"][..], "nose.csv: the file does not state its speed: give --speed"),
         (2, &["export", "nose.csv", "--to", "csv", "--speed", "10m/s", "--kind", "wall"][..], "the mass of the body: give --mass"),
         (2, &["export", "nose.csv", "--to", "csv", "--speed", "9m/s,10m/s"][..], "a file holds the curve of one impact"),
-        (2, &["export", "nose.csv", "--to", "table"][..], "table takes a model"),
+        (2, &["export", "nose.csv", "--to", "table"][..], "table is made of a whole model"),
         (2, &["export", "c.h5", "--to", "csv", "--kind", "wall"][..], "apply only to the file of a measured or legacy curve"),
     ];
     cases.into_iter().for_each(|(code, arguments, expected)| t(code, arguments, expected));

@@ -237,6 +237,12 @@ fn wrong_wishes_are_refused() {
         (2, "curves.h5 scenario.toml -o lead.model", "names the input itself"),
         (2, "curves.h5 ./curves.h5 -o a.html", "is named twice"),
         (2, "curves.h5", "--output"),
+        (2, "curves.h5 -o a.pdf", "a report is written as .html"),
+        (
+            1,
+            "curves.h5 fe/lead-car-wall/study.toml -o a.html",
+            "a study, which crumple build takes",
+        ),
         (
             2,
             "curves.h5 lead.model -o a.html",

@@ -153,7 +153,7 @@ fn couplings_pull() {
     let error = crumple_fails(folder.path(), 1, "simulate s.toml");
     says(
         &error,
-        "s, beyond the end of its tension curve's data (0.0010 m): give a longer tension curve, or end = \"hold\" in that",
+        "s, beyond the end of its tension curve's data (0.0010 m): give a longer tension curve (a model: train it with faster runs), or end = \"hold\" in that",
     );
     let marked = error.lines().find(|line| line.contains("tension = \"pull\"")).unwrap();
     let place = marked.find("tension = \"pull\"").unwrap() + "tension = ".len();

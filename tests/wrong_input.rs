@@ -336,7 +336,7 @@ fn outputs_replace_no_other_kind_of_file() {
         (
             "train curves.h5 --group lead-car-wall --model linear -o scenario.toml",
             "scenario.toml",
-            "a manifest",
+            "a study",
         ),
         ("train curves.h5 --group lead-car-wall --model linear -o kept", "kept", "a solver's file"),
         (

@@ -582,7 +582,7 @@ class Curve:
     def export(self, output, to=None, **options):
         """Write the curve for another tool; the format is that of the extension, or `to`: lsdyna, modelica, fmi3, ...
 
-        Options are those of `crumple export`: `force="body"`, the default, is what drives a body of one mass, `force="contact"` is for
+        Options are those of `crumple export`: `force="body"`, the default, is what drives a single-mass body, `force="contact"` is for
         bodies whose crush zone is a separate mass; `units="mm-t-s"`. The file goes on beyond `max_deflection` by an assumption,
         which it states, so that a run that crushes further has a force; with `tail="none"` it ends there.
         """

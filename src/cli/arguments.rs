@@ -106,7 +106,7 @@ pub(super) const MAX_CRUSH_RULES: &[(&str, MaxCrushRule, &str)] = &[
 
 /// Forces of a curve.
 pub(super) const FORCES: &[(&str, ForceKind, &str)] = &[
-    ("body", ForceKind::Body, "The force that drives a body of one mass"),
+    ("body", ForceKind::Body, "The force that drives a single-mass body"),
     (
         "contact",
         ForceKind::Contact,

@@ -27,7 +27,7 @@ Only runs that changed since the last build are read again. A run that cannot be
 reported and left out (exit code 1); the others are built. W/E is the work of a curve over the
 energy of its impact: within 5 % of 1 is usual; more points to a wrong mass, speed or unit.")]
 pub(super) struct Args {
-    /// Study manifest (TOML), or a folder with a study.toml; study.toml if absent
+    /// Study (TOML), or a folder with a study.toml; study.toml if absent
     study: Option<PathBuf>,
     /// Database to write or to update; curves.h5 next to the study if absent
     #[arg(short, long, value_parser = named())]
@@ -198,7 +198,7 @@ fn print(out: &mut dyn Write, report: &BuildReport, database: &str) -> io::Resul
     for group in &report.earlier {
         writeln!(
             out,
-            "note: group {group} was built from an earlier version of this manifest and is kept: crumple db rm removes it"
+            "note: group {group} was built from an earlier version of this study and is kept: crumple db rm removes it"
         )?;
     }
     let mut groups = Vec::from_iter(report.groups());

@@ -20,7 +20,7 @@ use crate::unit::UnitSystem;
 #[command(after_help = "Examples:
   crumple export lead50.json --to lsdyna --units mm-t-s -o lead50.k
   crumple export lead50.json --to csv
-  crumple export lead.model --speed 36km/h,50km/h --to modelica -o lead.mo
+  crumple export lead.model --speed 36km/h,50km/h --to modelica -o lead
   crumple export curves.h5 --group lead-car-wall --to lsdyna -o lead-car-wall.k
   crumple export lead.model --to table -o lead-table.h5
   crumple export ddtcm.model --to onnx -o ddtcm.onnx
@@ -191,7 +191,7 @@ impl Target {
         }
         format.export(curves, &self.options(path)).map_err(|error| {
             if self.force.is_none() && error.is_about("force") {
-                usage_error("the curve has no force that drives a body of one mass (its runs record no velocities, or its file states a contact force without times): use --force contact to export the force on the obstacle")
+                usage_error("the curve has no force that drives a single-mass body (its runs record no velocities, or its file states a contact force without times): use --force contact to export the force on the obstacle")
             } else {
                 error.into()
             }
@@ -308,7 +308,7 @@ fn export_curves(
         // The file itself holds both.
         curves[0] = curve.of_force(ForceKind::Body)?;
         if curve.provenance.force_kind == ForceKind::Contact {
-            notes.push("the body force alone is exported, which drives a body of one mass: --force contact exports the contact force, and the file itself has both".into());
+            notes.push("the body force alone is exported, which drives a single-mass body: --force contact exports the contact force, and the file itself has both".into());
         }
     }
     // Those of a file's case are its curve's, too.

@@ -57,7 +57,7 @@ impl Input {
         match self {
             Self::Model(model) => Ok(model),
             Self::Curve(_) | Self::Database(..) | Self::File(_) => usage(format!(
-                "{format} takes a model: crumple train, then crumple export MODEL --to {format}"
+                "{format} is made of a whole model: crumple export MODEL --to {format} (crumple train makes one)"
             )),
         }
     }

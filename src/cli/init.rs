@@ -36,7 +36,7 @@ pub(super) struct Args {
     #[arg(long)]
     scenario: bool,
 
-    /// Write vehicles of one mass, whose runs are faster, where the models know their ends
+    /// Write single-mass vehicles, which run faster, even where the models know their ends
     #[arg(long, requires = "scenario")]
     one_mass: bool,
     #[command(flatten)]
@@ -107,7 +107,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let default = if args.scenario { "scenario.toml" } else { "study.toml" };
     let output = args.output.clone().unwrap_or_else(|| default.into());
     if !options.on_stdout([&output])? {
-        init::refuse_existing(&output, options.overwrite)?;
+        init::refuse_existing(&output, options.overwrite, args.scenario)?;
     }
     if args.scenario { scenario(args, &output, options) } else { study(args, &output, options) }
 }
@@ -157,7 +157,7 @@ fn study(args: &Args, output: &Path, options: GlobalOptions) -> CommandResult {
     let text = proposal.to_toml();
     if !is_stdout(output) {
         // Another may have come there while the runs were read.
-        init::refuse_existing(output, options.overwrite)?;
+        init::refuse_existing(output, options.overwrite, false)?;
         write_whole(output, text.as_bytes())?;
     }
     let outcome = options

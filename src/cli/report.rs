@@ -95,6 +95,10 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         }
     }
     options.keep_others(&args.output, FileKind::Curve)?;
+    let extension = args.output.extension().map(|of| of.to_ascii_lowercase());
+    if extension.is_some_and(|of| of != "html" && of != "htm") {
+        return usage(format!("-o {}: a report is written as .html", args.output.display()));
+    }
     let to_stdout = options.on_stdout([&args.output])?;
     let read = |path: &PathBuf| {
         let database = Database::read(path)?;

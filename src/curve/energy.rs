@@ -70,7 +70,7 @@ pub(crate) struct EnergyBalance {
 /// Why a run cannot be what the manifest says.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
-    "{found}: such an impact is impossible; {}. Correct the manifest, or take the run as it is with accept_energy = true",
+    "{found}: such an impact is impossible; {}. Correct the study, or take the run as it is with accept_energy = true",
     cause.of_run()
 )]
 pub(crate) struct ImpossibleRun {
@@ -79,6 +79,16 @@ pub(crate) struct ImpossibleRun {
 }
 
 impl ImpossibleRun {
+    /// Whether the speed of the study is likely wrong.
+    pub(crate) fn is_of_speed(&self) -> bool {
+        matches!(self.cause, Cause::RecordedSpeed(_))
+    }
+
+    /// Whether its mass is.
+    pub(crate) fn is_of_mass(&self) -> bool {
+        matches!(self.cause, Cause::Half(_))
+    }
+
     /// Histories that cannot be one run's.
     pub(crate) fn of_histories(found: String, cause: &'static str) -> Self {
         Self { found, cause: Cause::Histories(cause) }
@@ -130,7 +140,7 @@ impl Cause {
                 format!("likely the units: read as \"{units}\" it would fit")
             }
             Self::OtherUnits => {
-                "likely the units: the solver files have others than the study states".into()
+                "likely the units: the solver files, or the mass of this run, have others than the study states".into()
             }
             Self::RecordedSpeed(speed) => format!("likely the speed: the record's is {speed}"),
             Self::OtherRun(run) => format!("likely speed, deck or files of the run {run}"),

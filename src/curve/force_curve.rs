@@ -89,7 +89,7 @@ impl ForceCurve {
         }
     }
 
-    /// A force that drives bodies of one mass, without further data.
+    /// A force that drives single-mass bodies, without further data.
     pub(crate) fn of_body(loading: Envelope) -> Self {
         Self { kind: Some(ForceKind::Body), ..Self::bare(loading) }
     }

@@ -128,7 +128,7 @@ impl ForceKind {
     /// Which runs a curve of this force may drive, for headers and messages.
     pub fn drives(self) -> &'static str {
         match self {
-            Self::Body => "bodies of one mass",
+            Self::Body => "single-mass bodies",
             Self::Contact => "bodies whose crush zone is a separate mass, not a single rigid mass",
         }
     }

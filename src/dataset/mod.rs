@@ -245,7 +245,7 @@ fn replicates<'a>(cases: &[&'a Case], features: &[Feature]) -> Result<Vec<Runs<'
             None => found.push((values, vec![case])),
             Some((_, runs)) if runs[0].is_measured_as(case) => runs.push(case),
             Some((_, runs)) => {
-                let hint = ", or tell them apart by parameters = { … } in the manifest";
+                let hint = ", or tell them apart by parameters = { … } in the study";
                 let alone = features.is_empty();
                 let (parameters, hint) = if alone { ("", hint) } else { (" and parameters", "") };
                 return Err(error!(

@@ -449,7 +449,7 @@ impl ExportCurve {
         let (stop_m, max_crush_m) = (self.stop_m(&self.loading), self.max_crush_m());
         // A force that does more work than the body has energy, as a contact force does, stops one mass sooner.
         let from = match stop_m < 0.99 * max_crush_m {
-            true => format!("{stop_m:.3} m, where it has stopped a body of one mass,"),
+            true => format!("{stop_m:.3} m, where it has stopped a single-mass body,"),
             false => "the maximum crush".into(),
         };
         let softer = self.stiffness_n_per_m() < steepest_n_per_m * (1.0 - 1e-9);

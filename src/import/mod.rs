@@ -204,7 +204,7 @@ pub(crate) fn case_of(
 }
 
 /// What a contact force over deflection leaves open, where it is stated to be one.
-const CONTACT_ALONE: &str = "force: only the contact force is known: a vehicle of one mass is driven by less, where its crush zone stops mass early";
+const CONTACT_ALONE: &str = "force: only the contact force is known: a single-mass vehicle is driven by less, where its crush zone stops mass early";
 
 /// Everything besides the file that determines the case's numbers, as JSON.
 // `document!` calls the type of a field as the field.

@@ -20,6 +20,7 @@ use std::str::FromStr;
 
 use self::sources::FORCES;
 use crate::error::{Error, error};
+use crate::file;
 use crate::history::Side;
 use crate::study::StudyKind;
 use crate::unit::UnitSystem;
@@ -28,11 +29,21 @@ pub(crate) use scenario::propose_scenario;
 pub(crate) use write::Proposal;
 pub(crate) use write::Proposed;
 
-/// Refuses a path where something is; with `overwrite` all but a TOML file, since runs and models are inputs.
-pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Result<(), Error> {
+/// No study is longer.
+const MOST_BYTES: u64 = 16 << 20;
+
+/// Refuses a path where something is; with `overwrite` all but what init writes there, a study or a scenario.
+pub(crate) fn refuse_existing(
+    path: &Path,
+    overwrite: bool,
+    is_scenario: bool,
+) -> Result<(), Error> {
     let Ok(there) = std::fs::symlink_metadata(path) else { return Ok(()) };
-    let is_toml = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
-    let is_ours = there.is_file() && is_toml;
+    let (what, table) = if is_scenario { ("a scenario", "train") } else { ("a study", "study") };
+    let has_table = |text: String| {
+        text.lines().any(|line| line.trim_start_matches([' ', '\t', '[']).starts_with(table))
+    };
+    let is_ours = there.is_file() && file::read_text(path, MOST_BYTES).is_ok_and(has_table);
     let path = path.display();
     match (is_ours, overwrite) {
         (true, true) => Ok(()),
@@ -42,7 +53,7 @@ pub(crate) fn refuse_existing(path: &Path, overwrite: bool) -> Result<(), Error>
         )),
         (false, _) => Err(error!(
             Study,
-            "{path} exists already and is not a TOML file, which init writes: name another with -o"
+            "{path} exists already and is not {what}, which init writes: name another with -o"
         )),
     }
 }

@@ -215,7 +215,7 @@ impl ScenarioProposal {
         }
         if self.ends {
             text.blank();
-            text.comment("Vehicles have the ends that the models know, the most accurate way; crumple init --scenario --one-mass writes vehicles of one mass, which run faster.");
+            text.comment("Vehicles have the ends that the models know, the most accurate way; crumple init --scenario --one-mass writes single-mass vehicles, which run faster.");
         }
         for train in &self.trains {
             self.train(&mut text, train);

@@ -33,9 +33,29 @@ pub(crate) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, E
         // As a proposal marks what it could not determine.
         let is_to_fill_in = message.starts_with("missing field") && text.contains("# fill in");
         let hint = if is_to_fill_in { ": fill in the lines marked \"fill in\"" } else { "" };
-        let message = format!("{message}{}{hint}", guess_of(&message));
+        let guess = of_another_kind(text, &message).unwrap_or_else(|| guess_of(&message));
+        let message = format!("{message}{guess}{hint}");
         error!(Toml, "{message}").placed(|_| place)
     })
+}
+
+/// What a text is, and what takes it, if the keys or signs that the parser does not know are those of another kind of file.
+fn of_another_kind(text: &str, message: &str) -> Option<String> {
+    let unknown = message.strip_prefix("unknown field `").and_then(|rest| rest.split('`').next());
+    let has = |table: &str| {
+        text.lines().any(|line| line.trim_start_matches([' ', '\t', '[']).starts_with(table))
+    };
+    let what = match unknown {
+        Some("study" | "recipe") if has("study") => "a study, which crumple build takes",
+        Some("curves" | "train" | "wall" | "contact") if has("train") => {
+            "a scenario, which crumple simulate takes"
+        }
+        None if text.trim_start().starts_with('{') => {
+            "JSON, as of models and curves, which crumple predict, export and plot take"
+        }
+        _ => return None,
+    };
+    Some(format!(": this is {what}"))
 }
 
 /// The message of a value of another type in the words of TOML: the parser names types of the program.

@@ -426,7 +426,7 @@ pub(super) fn curve_ended(
     let key = KeyPath::of("interfaces").item(k);
     error!(
         Simulation,
-        "interface {name} is {what} {deflection_m:.4} m at {time_s:.6} s, beyond the end of its {curve}'s data ({end_m:.4} m): give a longer {curve}, or end = \"hold\"{of}"
+        "interface {name} is {what} {deflection_m:.4} m at {time_s:.6} s, beyond the end of its {curve}'s data ({end_m:.4} m): give a longer {curve} (a model: train it with faster runs), or end = \"hold\"{of}"
     )
     .at(if is_tension { key.key("tension") } else { key })
 }

@@ -313,7 +313,9 @@ fn warnings(rating: &Rating, both: [&[f64]; 2], settings: &RatingSettings) -> Ve
             && share < MOST_OF_CHANGE
         {
             let remedy = match of.pulses > MOST_PULSES || to_s - from_s < SHORTEST_S {
-                true => "it swings about zero, filter it (--cfc 60)",
+                true => {
+                    "it swings about zero: check its sign (scale=-1), filter it (--cfc 60), or choose a pulse by --from and --to"
+                }
                 false => "another one is chosen by --from and --to",
             };
             warnings.push(format!(

@@ -345,7 +345,7 @@ impl<'a> Builder<'a> {
         Ok((Interface { stopping, ..interface }, used))
     }
 
-    /// An interface between vehicles of one mass whose crush force follows the run's own speeds;
+    /// An interface between single-mass vehicles whose crush force follows the run's own speeds;
     /// `sides` are the bodies behind and ahead.
     fn with_rate(
         &mut self,

@@ -229,7 +229,7 @@ fn check_vehicles(scenario: &Scenario, train: &TrainTable) -> Result<(), Error> 
 fn between_ends(scenario: &Scenario, curve: &str) -> Error {
     error!(
         Scenario,
-        "curve \"{curve}\" lies between ends that come from models, where plates meet: remove it"
+        "curve \"{curve}\": ends that come from models meet by their plates, without a curve: remove this key"
     )
     .at(scenario.use_of(curve))
 }
@@ -332,7 +332,7 @@ fn check_keys(name: &str, table: &CurveTable) -> Result<(), Error> {
         ("law", "the curve of a model, whose force follows the rate", rate && no_model),
         ("band", "law = \"memory\"", rate && table.band.is_some()),
         ("max_crush", "law = \"memory\"", rate && table.max_crush.is_some()),
-        ("force", "law = \"memory\"", rate && table.force.is_some()),
+        ("force", "law = \"memory\" or \"elastic\"", rate && table.force.is_some()),
         ("tension", "law = \"memory\"", rate && table.tension.is_some()),
     ];
     match foreign.into_iter().chain(of_rate).find(|(.., is_foreign)| *is_foreign) {

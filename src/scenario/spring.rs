@@ -162,8 +162,8 @@ fn texts(warnings: &[Warning]) -> Vec<String> {
 /// Said of a file without `# force_kind`.
 const UNKNOWN_FORCE: &str = "its file does not state which force it holds: taken as the body force; write \"# force_kind: body\" or \"# force_kind: contact\" into it, or force = \"…\" beside it";
 
-/// Warning for a contact force that drives bodies of one mass without being requested.
-const ONLY_CONTACT: &str = "it has a contact force only, which includes mass that the crush zone stops early and is wrong for a vehicle of one mass; use a body force, or split the vehicles (front, rear)";
+/// Warning for a contact force that drives single-mass bodies without being requested.
+const ONLY_CONTACT: &str = "it has a contact force only, which includes mass that the crush zone stops early and is wrong for a single-mass vehicle; use a body force, or split the vehicles (front, rear)";
 
 /// The force that drives the interface: what was requested, or what the vehicles need; `None` for
 /// the recipe's own. One mass per vehicle moves by the body force; where the crush zone has a mass
@@ -303,7 +303,7 @@ pub(super) struct Crush {
     /// Loads from (0, 0); of an end over its own deflection.
     pub curve: ForceCurve,
     pub rate: RateFactor,
-    /// Of an end; between vehicles of one mass the curve contains it.
+    /// Of an end; between single-mass vehicles the curve contains it.
     pub stopping: Option<Stopping>,
     /// Speed at which the model was evaluated, in m/s of its kind.
     pub speed_m_per_s: f64,
@@ -370,7 +370,7 @@ pub(super) fn crush_end(
     let mut warnings = warnings(model, speed_m_per_s);
     if model.has_own_body_forces() && !model.knows_stopped_mass() {
         warnings.push(
-            "its runs agree on no stopped mass, so the contact force moves the whole vehicle: a vehicle of one mass, which the body force moves, follows these runs more closely".into(),
+            "its runs agree on no stopped mass, so the contact force moves the whole vehicle: a single-mass vehicle, which the body force moves, follows these runs more closely".into(),
         );
     }
     if model.speed_kind == SpeedKind::Wall && end.at != Role::Wall {
@@ -400,7 +400,7 @@ pub(super) fn crush_end(
     })
 }
 
-/// The crush force between two vehicles of one mass, or one and the wall, that close at
+/// The crush force between two single-mass vehicles, or one and the wall, that close at
 /// `speed_m_per_s`: each is moved by `F_f M/(M − m_s)`.
 pub(super) fn crush_between(
     model: &Model,

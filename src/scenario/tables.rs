@@ -143,9 +143,9 @@ pub(crate) struct CurveTable {
     /// Name of the curve of the extension, for coupled vehicles; its gap is the slack. It counts from the initial distance, also
     /// after a crush.
     pub(crate) tension: Option<String>,
-    /// Damper in parallel with the curve. It acts while the curve has contact, also on a stretch
-    /// without force, but not where memory has left a gap; then it only pushes. With a tension
-    /// curve it acts along both and may pull.
+    /// Damper in parallel with the curve. It acts while the curve is in contact (also at zero force, but
+    /// not in a gap left by earlier crush), and only pushes. With a tension curve it acts along both and
+    /// may pull.
     pub(crate) damping: Option<DampingTable>,
     /// Force law.
     #[serde(default)]

@@ -46,12 +46,12 @@ impl LocatedRun<'_> {
         if let Some(units) = self.study.manifest.study.units {
             if let Some((name, stated, _)) = stated.filter(|(.., system)| *system != units) {
                 remarks.warn(format!(
-                    "units: the deck {name} states \"{}\", the manifest states others; those of the manifest are used",
+                    "units: the deck {name} states \"{}\", the study states others; those of the study are used",
                     stated.text.trim()
                 ));
             }
             if let Some((_, said)) = metals.filter(|(metals, _)| *metals != units) {
-                remarks.warn(format!("units: the manifest states {units}, but {said}"));
+                remarks.warn(format!("units: the study states {units}, but {said}"));
             }
             return Ok(units);
         }
@@ -80,7 +80,7 @@ impl LocatedRun<'_> {
         };
         Err(error!(
             Run,
-            "the manifest gives no units and {deck}: add units = \"mm-t-s\" (or the actual ones) to [study]"
+            "the study gives no units and {deck}: add units = \"mm-t-s\" (or the actual ones) to [study]"
         )
         .at(KeyPath::of("study")))
     }
@@ -111,9 +111,16 @@ impl LocatedRun<'_> {
                 return error.clone().at(KeyPath::of("recipe").key("sampling"));
             }
             let read = if source.is_of_force() { &files.force } else { &files.motion };
+            let key = match &source {
+                ExtractError::ImpossibleRun(run) if run.is_of_speed() && entry.speed.is_some() => {
+                    "speed"
+                }
+                ExtractError::ImpossibleRun(run) if run.is_of_mass() => "mass",
+                _ => "path",
+            };
             Error::below(ErrorCode::Run, source)
                 .of(read.located.path.display())
-                .at(study.run_key(entry).key("path"))
+                .at(study.run_key(entry).key(key))
         })
     }
 
@@ -157,7 +164,7 @@ impl LocatedRun<'_> {
         let ratio = found_j / stated_j;
         ((ratio - 1.0).abs() > SAME_ENERGY).then(|| {
             format!(
-                "mass: glstat has {} at the start, the masses of the manifest give {}: the mass of the run is wrong ({} would agree), or more than its bodies is moving",
+                "mass: glstat has {} at the start, the masses of the study give {}: the mass of the run is wrong ({} would agree), or more than its bodies is moving",
                 Shown::one_energy(found_j),
                 Shown::one_energy(stated_j),
                 Shown::one_mass(ratio * masses.body_kg)

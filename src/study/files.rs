@@ -201,10 +201,9 @@ impl Study {
         let error = match there {
             Some(meta) if meta.is_dir() => None,
             Some(_) => Some(error!(Run, "{path} is a file: path is the folder of the run")),
-            None => Some(error!(
-                Run,
-                "the run's folder {path} does not exist: check path in the manifest"
-            )),
+            None => {
+                Some(error!(Run, "the run's folder {path} does not exist: check path in the study"))
+            }
         };
         if let Some(error) = error {
             return Err(error.at(self.run_key(entry).key("path")));

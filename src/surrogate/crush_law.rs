@@ -26,7 +26,7 @@ use crate::dataset::grid;
 /// no crush zones as heavy.
 const LEAST_FREE: f64 = 0.5;
 
-/// Force on a body of one mass for each newton of crush force: `M / (M − m_s)`.
+/// Force on a single-mass body for each newton of crush force: `M / (M − m_s)`.
 pub(crate) fn per_crush_force(stopped_kg: f64, mass_kg: f64) -> f64 {
     mass_kg / (mass_kg - stopped_kg).max(LEAST_FREE * mass_kg)
 }

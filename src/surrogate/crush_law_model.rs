@@ -52,14 +52,14 @@ fn interval_s(set: &TrainingSet) -> f64 {
 }
 
 impl OfCrushLaw {
-    /// Force on a body of one mass for each newton of crush force.
+    /// Force on a single-mass body for each newton of crush force.
     fn per_crush_force(&self, deflection_m: f64, mass_kg: f64) -> f64 {
         per_crush_force(self.law.stopped.at(deflection_m), mass_kg)
     }
 
     /// Closing speeds in m/s at increasing deflections, of a body that the law itself slows down from the
     /// speed of the query: trapezoids, each end's force once corrected by the speed that it leads to.
-    /// `per_crush` is that of a body of one mass at each deflection.
+    /// `per_crush` is that of a single-mass body at each deflection.
     fn closing_m_per_s(
         &self,
         standing_n: &[f64],

@@ -5,7 +5,7 @@
 //! makes `rate` more than an interpolation.
 //!
 //! A model has two forces. The **declared** one is the recipe's: it is exported and compared along FE's crush. The
-//! **body force**, −m dv/dt of the recorded closing speed with CFC 60 (`curve/body`), drives a body of one mass. FE's own
+//! **body force**, −m dv/dt of the recorded closing speed with CFC 60 (`curve/body`), drives a single-mass body. FE's own
 //! contact force in a one-mass model misses FE's velocity by some per cent, because the crush zone
 //! stops part of the mass early.
 //!

@@ -31,7 +31,7 @@ pub struct PredictedCurve {
     #[serde(rename = "force_high_N", default, skip_serializing_if = "Option::is_none")]
     pub force_high_n: Option<Vec<f64>>,
     /// The force that moves the body, where `force_N` is what the obstacle feels, which also
-    /// stops mass in the crush zone ahead of the body. It drives bodies of one mass.
+    /// stops mass in the crush zone ahead of the body. It drives single-mass bodies.
     #[serde(rename = "body_force_N", default, skip_serializing_if = "Option::is_none")]
     pub body_force_n: Option<Vec<f64>>,
     /// Band around the body force, where the model gives one.
@@ -394,7 +394,7 @@ impl PredictedCurve {
             .unwrap_or_else(without_rebound)
     }
 
-    /// The curve of one force that drives a body of one mass.
+    /// The curve of one force that drives a single-mass body.
     ///
     /// # Errors
     /// If the curve does not have that force, or its points are not an envelope.
@@ -473,7 +473,7 @@ impl PredictedCurve {
         envelope(loading.deflection_m().to_vec(), force_n)
     }
 
-    /// The curve that moves a body of one mass: the body force, or the only force there is.
+    /// The curve that moves a single-mass body: the body force, or the only force there is.
     pub(crate) fn driving_envelope(&self) -> Result<Envelope, Error> {
         let declared = self.envelope()?;
         match &self.body_force_n {

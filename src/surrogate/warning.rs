@@ -317,12 +317,12 @@ impl Warning {
     ) -> Self {
         let mut other = String::new();
         if let Some(m) = by_speed_m {
-            other = format!("; their crush over the speed, continued, gives {m:.3} m");
+            other = format!("; extrapolating the runs' crush over the speed gives {m:.3} m");
         }
         let fully_m = FULLY_CRUSHED * data_end_m;
         if crush_m > fully_m {
             other.push_str(&format!(
-                "; a run of crumple takes the structure as fully crushed from {fully_m:.3} m on, and stops earlier, at a higher force"
+                "; in multi-body runs the structure is fully crushed from {fully_m:.3} m on, so that they stop earlier, at a higher force"
             ));
         }
         Self {
@@ -337,7 +337,7 @@ impl Warning {
         let shown = |of: Masses| match of.other_kg.map(Shown::one_mass) {
             None => Shown::one_mass(of.body_kg),
             Some(_) if of.other_kg == Some(of.body_kg) => {
-                format!("{} each", Shown::one_mass(of.body_kg))
+                format!("{} each (by the reduced mass)", Shown::one_mass(of.body_kg))
             }
             Some(other) => format!("{} against {other}", Shown::one_mass(of.body_kg)),
         };

@@ -128,7 +128,7 @@ pub(super) fn masses(measured: &Measured<'_>, masses: Masses) -> Option<String> 
             false => "they are swapped",
         };
         format!(
-            "mass: by the velocity changes of the two bodies, the other one has {found:.3} times the mass of the first, by the manifest {stated:.3} times ({} and {}): {what_to_do}",
+            "mass: by the velocity changes of the two bodies, the other one has {found:.3} times the mass of the first, by the study {stated:.3} times ({} and {}): {what_to_do}",
             Shown::one_mass(masses.body_kg),
             Shown::one_mass(stated * masses.body_kg)
         )

@@ -55,7 +55,7 @@ pub(crate) enum ExtractError {
     NoDeflection,
     /// Neither manifest nor file contains the speed.
     #[error(
-        "the manifest gives no speed and the file has no {component} to take it from: add speed = \"…km/h\""
+        "the study gives no speed and the file has no {component} to take it from: add speed = \"…km/h\""
     )]
     NoSpeed { component: String },
     /// The body does not move in the first state.

@@ -135,7 +135,7 @@ impl Start {
                     )
                 });
                 remarks.warn(format!(
-                    "contact: between two states it is uncertain by about {:.2} mm{}, and so the crush by {:.1} % (contact_time or gap in the run, or contact_threshold in the recipe, sets it)",
+                    "contact: its place between two states is uncertain by about {:.2} mm{}, {:.1} % of the crush: set contact_time or gap in the run, or contact_threshold in the recipe",
                     step_m(interval_s) * 1e3,
                     most_mm.unwrap_or_default(),
                     100.0 * step_m(interval_s) / crush_m
@@ -442,7 +442,7 @@ impl ImpactSpeed {
             ));
         }
         let (m_per_s, by, name) = match (setup.manifest_speed_m_per_s, recorded) {
-            (Some(speed), _) => (speed, SpeedBy::Manifest, "manifest's"),
+            (Some(speed), _) => (speed, SpeedBy::Manifest, "study's"),
             (None, Some(speed)) => (speed, SpeedBy::Record, "record's"),
             (None, None) => match &setup.deck_speed {
                 Some((deck, _)) => (*deck, SpeedBy::Deck, "deck's"),

@@ -133,7 +133,9 @@ impl Reader<'_, '_> {
     }
 
     fn comment(&mut self, line: &Line<'_>) {
-        if let Some(stated) = cards::in_comment(line.text) {
+        // Of what units a comment speaks is not always what the deck is in: a system must be named.
+        let named = |text: &String| cards::system(text).is_some();
+        if let Some(stated) = cards::in_comment(line.text).filter(named) {
             self.context.units(stated, line.into(), false);
         }
     }
