@@ -158,8 +158,8 @@ fn the_page_says_what_the_tests_find() {
     page += "\n## Real files\n\nFiles of public projects and of our own runs, read without problems or with the problem that their project \
              reports; `fixtures/samples` contains those whose licence permits redistribution.\n\n| kind | files | written by |\n|---|---|---|\n";
     real_files(&mut page);
-    page += "\n## Not detectable\n\nA force that is recorded less than about 5 ms late, or less than about 8 ms early (more of a run without two others of \
-             its design); force, mass and speed that are wrong \
+    page += "\n## Not detectable\n\nA force that is recorded up to about 5 ms late or 8 ms early (earlier still with fewer than two other runs of the \
+             design); force, mass and speed that are wrong \
              together; one design that replaces another at a single speed and has the same title, level and order of peaks.\n";
     hold(&page);
 }
