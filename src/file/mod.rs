@@ -90,7 +90,10 @@ pub(crate) fn read(path: &Path, most: u64) -> io::Result<Vec<u8>> {
 pub(crate) fn read_text(path: &Path, most: u64) -> io::Result<String> {
     String::from_utf8(read(path, most)?).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
-        let message = format!("byte {at} is not UTF-8: save the file as UTF-8 text");
+        let message = match e.as_bytes().contains(&0) {
+            true => "this is a binary file: expected text".into(),
+            false => format!("byte {at} is not UTF-8: save the file as UTF-8 text"),
+        };
         io::Error::new(io::ErrorKind::InvalidData, message)
     })
 }

@@ -115,7 +115,10 @@ impl Model {
                 path = path.display()
             )
         };
-        let at_its_place = |e: serde_json::Error| no_model(e.line(), e.column(), e.to_string());
+        let at_its_place = |e: serde_json::Error| match e.to_string().starts_with("missing field") {
+            true => no_model(1, 1, "it has no \"format\", as curves have none".into()),
+            false => no_model(e.line(), e.column(), e.to_string()),
+        };
         let file: Result<ModelFile<'_>, _> = serde_json::from_slice(text);
         let file = match file {
             Ok(file) if file.format == FORMAT && file.version == VERSION => file,
