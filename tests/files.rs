@@ -1019,6 +1019,28 @@ fn the_only_group_needs_no_name() {
     assert!(!here.join("c.model").exists());
 }
 
+/// Runs that were built by a recipe of another filter are named, but not where a parameter tells them apart.
+#[test]
+fn a_group_of_several_filters_is_said() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let study = here.join("fe/lead-car-wall/study.toml");
+    crumple_ok(here, "build fe/lead-car-wall/study.toml -o g.h5 -q");
+    let text = fs::read_to_string(&study).unwrap();
+    let (none, cfc) = ("filter     = \"none\"", "filter = \"CFC60\"");
+    assert!(text.contains(none), "{text}");
+    fs::write(&study, text.replace(none, cfc)).unwrap();
+    let said = |line: &str| String::from_utf8(crumple_in(here, line).stderr).unwrap();
+    let build = said("build fe/lead-car-wall/study.toml -o g.h5 --run 25kmh");
+    let filter =
+        "25kmh: the filter of its recipe is \"CFC60\", that of others in the group \"none\"";
+    says(&build, filter);
+    says(&said("db ls g.h5"), filter);
+    assert!(
+        !said("build fe/lead-car-wall/study.toml -o g.h5").contains("the filter of its recipe")
+    );
+}
+
 /// What was cut off in copying is that, wherever it was cut: not another kind of file, and not whole.
 #[test]
 fn a_database_that_is_cut_off_is_known() {

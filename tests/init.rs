@@ -1002,7 +1002,13 @@ fn nothing_is_overwritten() {
     let error = crumple_fails(&here, 1, "init -o 25kmh/nodout --overwrite");
     says(&error, "is not a study");
     fs::write(here.join("Cargo.toml"), "[package]\n").unwrap();
-    says(&crumple_fails(&here, 1, "init -o Cargo.toml --overwrite"), "is not a study");
+    fs::write(here.join("notes.md"), "study =\n").unwrap();
+    for other in ["Cargo.toml", "notes.md"] {
+        let error = crumple_fails(&here, 1, &["init", "-o", other, "--overwrite"]);
+        says(&error, "is not a study");
+    }
+    fs::write(here.join("empty.toml"), "").unwrap();
+    crumple_ok(&here, "init -o empty.toml --overwrite");
     assert!(fs::read(here.join("25kmh/nodout")).unwrap() == nodout);
     crumple_ok(&here, "init --overwrite");
     crumple_ok(&here, "build -q");
@@ -1599,8 +1605,13 @@ fn parts_of_a_restart_are_named() {
         let arguments = ["histories", "car/50kmh/nodout", "-o", output, "--strict"];
         says(&crumple_fails(folder.path(), 3, &arguments), unread);
     }
-    let said = warned(folder.path(), "build parts.toml -o c.h5");
-    says(&said, &format!("50kmh: nodout: {unread}"));
+    let build = || warned(folder.path(), "build parts.toml -o c.h5");
+    says(&build(), &format!("50kmh: nodout: {unread}"));
+    // The case is made anew when it is moved away, and when another comes.
+    fs::rename(run.join("nodout01"), folder.path().join("elsewhere")).unwrap();
+    assert!(!build().contains("restart"));
+    fs::write(run.join("nodout12"), "").unwrap();
+    says(&build(), "nodout12 is not read");
 }
 
 /// CFC 60 would smooth away the pulse of a crash of some milliseconds.

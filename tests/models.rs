@@ -987,6 +987,19 @@ fn the_motion_has_the_mass_in_it() {
         let error = force_error(&model, run);
         assert!(error < 0.01, "{} is predicted with {error}", run.name);
     }
+    // Between their masses nothing jumps.
+    let of = |mass_kg: f64| {
+        let at = Query { mass_kg: Some(mass_kg), ..Query::at(11.0) };
+        let curve = predict(&model, &at).unwrap();
+        Envelope::new(curve.deflection_m, curve.force_n).unwrap()
+    };
+    let masses = [20e3, 22e3, 24.4e3, 24.6e3, 27e3, 30e3];
+    for (light, heavy) in masses.map(|m| (of(m), of(m + 10.0))) {
+        for d in (1..50).map(|k| light.end_m() * f64::from(k) / 50.0) {
+            let jump = (heavy.force_at(d) / light.force_at(d) - 1.0).abs();
+            assert!(jump < 0.005, "{jump} at {d} m");
+        }
+    }
     // A change of mode is found between the runs of two masses, too; a dead run of a mass of its own narrows nothing.
     let softer = |v: f64, m: f64| {
         let force = |d: f64, u: f64| if v > 12.0 && d > 0.25 { 0.5 * law(d, u) } else { law(d, u) };

@@ -71,6 +71,7 @@ def _key(entity):
     """An id as it is looked up: 900001, 900001.0 (as pandas has it), "900001" and NumPy's numbers are one."""
     if entity is None or isinstance(entity, str):
         return _id(entity)
+    entity = entity.item() if isinstance(entity, np.ndarray) and entity.ndim == 0 else entity
     # NaN, infinity and what is not a number are no entity's id.
     is_whole = isinstance(entity, Number) and math.isfinite(entity) and entity == int(entity)
     return int(entity) if is_whole else entity
@@ -96,10 +97,11 @@ def _listed(of):
     if of is None:
         return None
     of = of.tolist() if isinstance(of, np.ndarray) else of
-    if isinstance(of, bytes):
-        raise TypeError(f"ids and components are numbers and texts, not bytes: {of!r}")
-    is_one = isinstance(of, (str, Number))
-    return [str(_key(one)) for one in ([of] if is_one else of)]
+    all_of = [of] if isinstance(of, (str, bytes, Number)) else list(of)
+    for one in all_of:
+        if isinstance(one, bytes):
+            raise TypeError(f"ids and components are numbers and texts, not bytes: {one!r}")
+    return [str(_key(one)) for one in all_of]
 
 
 class _Mapping(Mapping):

@@ -162,8 +162,10 @@ def test_one_or_several_of_any_kind():
             component = crumple.read(NODOUT, ids=ids, components=components).only()["x_velocity"]
             assert np.array_equal(component[np.int32(900001)], whole) and 900001.0 in component
     assert "\u00b2" not in component and None not in component and np.nan not in component and (900001,) not in component
-    with pytest.raises(TypeError, match="ids and components are numbers and texts, not bytes"):
-        crumple.read(NODOUT, ids=b"900001")
+    assert np.array(900001) in component
+    for ids in (b"900001", [b"900001"], np.array([b"900001"])):
+        with pytest.raises(TypeError, match="ids and components are numbers and texts, not bytes"):
+            crumple.read(NODOUT, ids=ids)
     del component
     histories = crumple.read(NODOUT)
     view = histories.only()["x_velocity"][900001]

@@ -95,8 +95,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         }
     }
     options.keep_others(&args.output, FileKind::Curve)?;
+    const OTHERS: [&str; 7] = ["pdf", "docx", "odt", "md", "txt", "svg", "png"];
     let extension = args.output.extension().map(|of| of.to_ascii_lowercase());
-    if extension.is_some_and(|of| of != "html" && of != "htm") {
+    if extension.is_some_and(|of| OTHERS.iter().any(|other| of == *other)) {
         return usage(format!("-o {}: a report is written as .html", args.output.display()));
     }
     let to_stdout = options.on_stdout([&args.output])?;

@@ -34,15 +34,6 @@ pub(crate) type Remark = (String, &'static str, String);
 pub(crate) fn remarks(cases: &[Case]) -> Vec<Remark> {
     let mut all = copies(cases);
     all.extend(titles(cases));
-    let filter = |case: &Case| case.filter();
-    all.extend(unlike_most(&cases.iter().collect::<Vec<_>>(), filter, str::to_string).map(
-        |(case, own, usual)| {
-            let words = format!(
-                "the filter of its recipe is \"{own}\", that of others in the group \"{usual}\": their forces are not comparable; build all runs with one recipe"
-            );
-            (case.id.name.clone(), "filter_differs", words)
-        },
-    ));
     let runs: Vec<&Case> =
         cases.iter().filter(|c| c.id.study != IMPORTED && !c.is_truncated()).collect();
     // What a crush zone stops is less of a heavier body: all are compared as if they had the largest mass.
@@ -227,13 +218,24 @@ fn wording(title: &str) -> String {
     words.collect::<Vec<_>>().join(" ").to_lowercase()
 }
 
-/// Titles of the solver files that differ by more than numbers from those of most cases that no parameter distinguishes.
+/// Titles of the solver files that differ by more than numbers, and filters that differ, from those of most cases that no parameter
+/// distinguishes.
 fn titles(cases: &[Case]) -> Vec<Remark> {
     let mut alike: BTreeMap<String, Vec<&Case>> = BTreeMap::new();
     for case in cases {
         alike.entry(format!("{:?}", case.conditions.parameters)).or_default().push(case);
     }
-    alike.values().flat_map(|cases| titles_of(cases)).collect()
+    alike.values().flat_map(|cases| [titles_of(cases), filters_of(cases)].concat()).collect()
+}
+
+fn filters_of(cases: &[&Case]) -> Vec<Remark> {
+    let remark = |(case, own, usual): (&Case, String, String)| {
+        let words = format!(
+            "the filter of its recipe is \"{own}\", that of others in the group \"{usual}\": their forces are not comparable; build all runs with one recipe"
+        );
+        (case.id.name.clone(), "filter_differs", words)
+    };
+    unlike_most(cases, Case::filter, str::to_string).map(remark).collect()
 }
 
 fn titles_of(cases: &[&Case]) -> Vec<Remark> {

@@ -185,7 +185,8 @@ fn stated_length(head: &[u8]) -> Option<u64> {
     let (width_at, at) = match *head.get(8)? {
         0 => (13, 40),
         1 => (13, 44),
-        2 | 3 => (9, 28),
+        // One that a program has open for writing says so, and states more than there is yet.
+        2 | 3 if head.get(11)? & 1 == 0 => (9, 28),
         _ => return None,
     };
     let bytes = head.get(at..at + 8).filter(|_| head[width_at] == 8)?;

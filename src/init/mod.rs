@@ -40,10 +40,16 @@ pub(crate) fn refuse_existing(
 ) -> Result<(), Error> {
     let Ok(there) = std::fs::symlink_metadata(path) else { return Ok(()) };
     let (what, table) = if is_scenario { ("a scenario", "train") } else { ("a study", "study") };
+    let is_toml = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("toml"));
     let has_table = |text: String| {
-        text.lines().any(|line| line.trim_start_matches([' ', '\t', '[']).starts_with(table))
+        let heads = [format!("[{table}]"), format!("[[{table}]]"), format!("{table} =")];
+        // What holds nothing is nobody's.
+        let text = text.trim_start_matches('\u{feff}');
+        let mut lines = text.lines().map(str::trim_start).filter(|line| !line.starts_with('#'));
+        text.trim().is_empty() || lines.any(|line| heads.iter().any(|head| line.starts_with(head)))
     };
-    let is_ours = there.is_file() && file::read_text(path, MOST_BYTES).is_ok_and(has_table);
+    let is_text = || file::read_text(path, MOST_BYTES).is_ok_and(has_table);
+    let is_ours = there.is_file() && is_toml && is_text();
     let path = path.display();
     match (is_ours, overwrite) {
         (true, true) => Ok(()),

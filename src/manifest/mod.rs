@@ -42,15 +42,16 @@ pub(crate) fn parse<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, E
 /// What a text is, and what takes it, if the keys or signs that the parser does not know are those of another kind of file.
 fn of_another_kind(text: &str, message: &str) -> Option<String> {
     let unknown = message.strip_prefix("unknown field `").and_then(|rest| rest.split('`').next());
-    let has = |table: &str| {
-        text.lines().any(|line| line.trim_start_matches([' ', '\t', '[']).starts_with(table))
-    };
+    let has = |head: &str| text.lines().any(|line| line.trim_start().starts_with(head));
+    let (is_study, is_scenario) = (has("[study]"), has("[[train]]") || has("train ="));
     let what = match unknown {
-        Some("study" | "recipe") if has("study") => "a study, which crumple build takes",
-        Some("curves" | "train" | "wall" | "contact") if has("train") => {
+        Some("study" | "recipe") if is_study && !is_scenario => {
+            "a study, which crumple build takes"
+        }
+        Some("curves" | "train" | "wall" | "contact") if is_scenario && !is_study => {
             "a scenario, which crumple simulate takes"
         }
-        None if text.trim_start().starts_with('{') => {
+        None if ["{\"", "{\n", "{\r"].iter().any(|head| text.trim_start().starts_with(head)) => {
             "JSON, as of models and curves, which crumple predict, export and plot take"
         }
         _ => return None,

@@ -50,8 +50,9 @@ pub use lsdyna::deck::{
 };
 pub use problem::{Problem, ProblemCode};
 pub(crate) use runs::family;
+use runs::missing_continuation;
 pub use runs::output_files;
-use runs::{missing_continuation, unread_restart};
+pub(crate) use runs::unread_restart;
 use selection::check_selection;
 pub(crate) use selection::no_component;
 pub use selection::{Entity, NoDataReason, Selection, SolverFile, WantedId, WithoutData};
@@ -163,7 +164,7 @@ fn sections_of(
 fn unread_beside(path: &Path, format: &Format) -> Result<Option<Problem>, Error> {
     let (code, message) = match format.is_binary() {
         true => (ProblemCode::CutRecord, missing_continuation(path)?),
-        false => (ProblemCode::UnreadRows, unread_restart(path)?),
+        false => (ProblemCode::UnreadRows, unread_restart(path)),
     };
     Ok(message.map(|message| Problem::new(code, message)))
 }

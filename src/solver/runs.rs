@@ -6,6 +6,7 @@ use std::{fs, io};
 
 use super::detect::detect;
 pub(crate) use super::detect::is_named_like_output;
+use super::detect::{named, without_job_id};
 use super::is_output;
 use super::source::{self, Access};
 use crate::error::Error;
@@ -211,21 +212,22 @@ fn restart(path: &Path, number: u32) -> PathBuf {
     path.with_file_name(format!("{stem}{number:02}"))
 }
 
-/// What to do with the file that a restart has written beside a text file, which is not read with it.
-pub(crate) fn unread_restart(path: &Path) -> Result<Option<String>, Error> {
-    for number in 1..=MOST_TEXT_RESTARTS {
-        let name = format!("{}{number:02}", name_of(path));
-        if is_file(&path.with_file_name(&name))? {
-            return Ok(Some(format!(
-                "{name} is not read: it is named like the file of a restart; append its states to this file, or move it away if they are in it"
-            )));
-        }
-    }
-    Ok(None)
+/// What to do with the file that a restart has written beside a text file, such as `nodout01`, which is not read with it.
+pub(crate) fn unread_restart(path: &Path) -> Option<String> {
+    let own = name_of(path);
+    // Files of other names are counted by their users.
+    named(without_job_id(&own)).ok().filter(|format| !format.is_binary())?;
+    let is_of_restart = |name: &String| {
+        let number = name.strip_prefix(&own).filter(|number| !number.is_empty());
+        number.is_some_and(|number| number.bytes().all(|b| b.is_ascii_digit()))
+    };
+    let there = crate::file::folder_of(path).read_dir().into_iter().flatten().flatten();
+    let names = there.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let first = names.filter(is_of_restart).min()?;
+    Some(format!(
+        "{first} is not read: it is named like the file of a restart; append its states to this file, or move it away if they are in it"
+    ))
 }
-
-/// Of a text file as many are looked for.
-const MOST_TEXT_RESTARTS: u32 = 9;
 
 fn with_continuations(path: &Path) -> Result<Vec<PathBuf>, Error> {
     let mut parts = vec![path.to_path_buf()];

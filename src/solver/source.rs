@@ -128,7 +128,7 @@ pub(crate) fn encoded(head: &[u8]) -> Option<&'static str> {
 const UTF_16: &str = "this is UTF-16 text (convert it with iconv -f UTF-16 -t UTF-8)";
 
 /// Shorter lines are not cut by the width of a field.
-const LEAST_WIDTH: usize = 64;
+const LEAST_WIDTH: usize = 70;
 
 /// A title to the end of its line: UTF-8, of which a fixed width may have cut the last character, or else Latin-1, as in decks that
 /// were written on Windows.

@@ -236,6 +236,10 @@ impl Study {
         for file in files.iter().chain(deck.iter().map(|deck| &deck.file)) {
             hash.update(file.blake3.as_bytes());
         }
+        // A case is made anew when a restart has written beside them, or that is moved away.
+        for unread in files.iter().filter_map(|file| solver::unread_restart(&file.path)) {
+            hash.update(unread.as_bytes());
+        }
         let fingerprint = hash.finalize().to_hex().to_string();
         Ok(LocatedRun { study: self, entry, files, deck, deck_notes, recipe, fingerprint })
     }

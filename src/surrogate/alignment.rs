@@ -14,7 +14,7 @@
 //! the whole of the other branch's is as likely.
 
 use super::CaseCurve;
-use super::curves::{LEAST_WAY_M, mean_over, neighbouring};
+use super::curves::{LEAST_WAY_M, Twins, mean_over, neighbouring};
 use crate::curve::group::LEAST_RATIO;
 use crate::dataset::is_same_speed;
 use crate::piecewise;
@@ -90,12 +90,17 @@ impl Alignment {
         force_n: impl Fn(&[CaseCurve], &[f64]) -> Vec<f64>,
     ) -> Vec<f64> {
         let (low, high, share) = neighbouring(&self.curves, at);
-        let place = self.places[low].between(&self.places[high], share).inverse();
+        let of = |[(a, _), (b, share)]: Twins| match share > 0.0 {
+            true => self.places[a].between(&self.places[b], share),
+            false => self.places[a].clone(),
+        };
+        let (low, high) = (of(low), of(high));
+        let place = low.between(&high, share).inverse();
         let common_m: Vec<f64> = deflection_m.iter().map(|&d| place.at(d)).collect();
         let blend_n = force_n(&self.curves, &common_m);
         let parabola = (share * (1.0 - share)).sqrt();
         let half_m = |i: usize| {
-            let apart_m = self.places[low].at(common_m[i]) - self.places[high].at(common_m[i]);
+            let apart_m = low.at(common_m[i]) - high.at(common_m[i]);
             apart_m.abs() * parabola
         };
         mean_over(deflection_m, &blend_n, half_m)

@@ -9,7 +9,8 @@
 //!
 //! Tried and dropped: more variance of its own for what varies over a short way. Neighbouring runs share their folds, too.
 
-use super::curves::{nearest_twin, neighbours};
+use super::curves::{neighbours, twins};
+use crate::dataset::is_same_speed;
 use crate::signal::Cholesky;
 
 /// Length over which the runs are alike, relative to the range of their speeds.
@@ -45,18 +46,27 @@ impl<'a> Blend<'a> {
 
     /// The weights of the runs from the `first` on, 0 for those before, at an impact speed; beyond the speeds
     /// of all runs those of the outermost. The runs from the `first` on say nothing about speeds below that of the one
-    /// before. Their sum is 1. Of runs of one speed, the one that is least `apart` from the query is reproduced.
-    pub(super) fn weights(&self, first: usize, speed_m_per_s: f64, apart: &[f64]) -> Vec<f64> {
+    /// before. Their sum is 1. Of runs of one speed, `apart` from the query, those of the masses beside it are reproduced.
+    pub(super) fn weights(
+        &self,
+        first: usize,
+        speed_m_per_s: f64,
+        apart: &[(f64, f64)],
+    ) -> Vec<f64> {
         let all = self.speeds_m_per_s;
         let v = speed_m_per_s.clamp(all[first.saturating_sub(1)], all[all.len() - 1]);
         let mut weights = vec![0.0; all.len()];
         let smooth = |v: f64| self.smooth(all.len() - first, v);
         weights[first..].copy_from_slice(&smooth(v));
-        let (low, high, share) = neighbours(all, v);
+        let (low, high, share) = match neighbours(all, v) {
+            (low, high, _) if is_same_speed(all[low], all[high]) => (low, low, 0.0),
+            other => other,
+        };
         for (run, nearness) in [(low, (1.0 - share).powi(2)), (high, share.powi(2))] {
-            let run = nearest_twin(all, apart, run, first);
-            if run >= first && nearness > 0.0 {
-                weights[run] += nearness;
+            if nearness > 0.0 && all[first..].iter().any(|v| is_same_speed(*v, all[run])) {
+                for (twin, share) in twins(all, apart, run, first) {
+                    weights[twin] += nearness * share;
+                }
                 let slow = smooth(all[run]);
                 weights[first..].iter_mut().zip(slow).for_each(|(w, slow)| *w -= nearness * slow);
             }
@@ -123,7 +133,7 @@ mod tests {
 
     const SPEEDS: [f64; 5] = [3.0, 5.0, 7.0, 12.0, 20.0];
     /// Of queries that give no mass.
-    const ALIKE: &[f64] = &[0.0; 6];
+    const ALIKE: &[(f64, f64)] = &[(0.0, 0.0); 6];
 
     fn close(a: f64, b: f64) -> bool {
         (a - b).abs() < 1e-12

@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use crate::curve::Envelope;
+use crate::dataset::is_same_speed;
 use crate::error::{Error, ErrorCode};
 
 /// One force of one training case over its loading branch.
@@ -146,31 +147,51 @@ pub(crate) fn neighbours(speeds: &[f64], v: f64) -> (usize, usize, f64) {
     }
 }
 
-/// The two neighbours as [`neighbours`] has them, but of equal speeds the runs whose masses are nearest to those of the query.
+/// Runs of one speed that stand for it, with their shares, which add up to 1: of the masses on both sides of the query's.
+pub(super) type Twins = [(usize, f64); 2];
+
+/// The two neighbours as [`neighbours`] has them, with the runs of each that have the masses on both sides of the query's.
 pub(super) fn neighbouring(
     cases: &[CaseCurve],
     (v, features): (f64, &[f64]),
-) -> (usize, usize, f64) {
+) -> (Twins, Twins, f64) {
     let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
     let (low, high, share) = neighbours(&speeds, v);
     let apart = apart(cases, features);
-    let of = |run| nearest_twin(&speeds, &apart, run, 0);
+    let of = |run| twins(&speeds, &apart, run, 0);
+    if is_same_speed(speeds[low], speeds[high]) {
+        return (of(low), of(low), 0.0);
+    }
     (of(low), of(high), share)
 }
 
-/// How far the masses of each run, its features, lie from those of a query; 0 where it gives none.
-pub(super) fn apart(cases: &[CaseCurve], features: &[f64]) -> Vec<f64> {
+/// By how much the masses of each run, its features, exceed those of a query, as logarithms: their sum, and that of their
+/// magnitudes; 0 where the query gives none.
+pub(super) fn apart(cases: &[CaseCurve], features: &[f64]) -> Vec<(f64, f64)> {
     let of = |case: &CaseCurve| {
         let pairs = case.features.iter().zip(features);
-        pairs.map(|(run, asked)| libm::log(run / asked).abs()).sum()
+        let off = pairs.map(|(run, asked)| libm::log(run / asked));
+        off.fold((0.0, 0.0), |(sum, all), off| (sum + off, all + off.abs()))
     };
     cases.iter().map(of).collect()
 }
 
-/// Of the runs from the `first` on at the speed of one of them, the one whose masses are nearest; of several such, the last.
-pub(super) fn nearest_twin(speeds: &[f64], apart: &[f64], run: usize, first: usize) -> usize {
-    let twins = (first..speeds.len()).filter(|&i| speeds[i] == speeds[run]);
-    twins.rev().min_by(|&a, &b| apart[a].total_cmp(&apart[b])).unwrap_or(run)
+/// Of the runs from the `first` on at the speed of one of them, those that stand for it.
+pub(super) fn twins(speeds: &[f64], apart: &[(f64, f64)], run: usize, first: usize) -> Twins {
+    let all = || (first..speeds.len()).filter(|&i| is_same_speed(speeds[i], speeds[run]));
+    let alone = |i| [(i, 1.0), (i, 0.0)];
+    let by_sum = |a: &usize, b: &usize| apart[*a].0.total_cmp(&apart[*b].0);
+    let same = all().rfind(|&i| apart[i].1 == 0.0);
+    let lighter = all().filter(|&i| apart[i].0 <= 0.0).max_by(by_sum);
+    let heavier = all().filter(|&i| apart[i].0 > 0.0).min_by(by_sum);
+    match (same, lighter, heavier) {
+        (Some(i), ..) | (None, Some(i), None) | (None, None, Some(i)) => alone(i),
+        (None, Some(a), Some(b)) => {
+            let share = apart[a].0 / (apart[a].0 - apart[b].0);
+            [(a, 1.0 - share), (b, share)]
+        }
+        (None, None, None) => alone(run),
+    }
 }
 
 /// Most runs that answer a query together: with more of them the cost would grow with the third power of their number.
@@ -195,12 +216,17 @@ fn answering(speeds: &[f64], v: f64) -> Vec<usize> {
 }
 
 /// The curves that answer at a speed.
-pub(super) fn answering_at(cases: &[CaseCurve], v: f64) -> Cow<'_, [CaseCurve]> {
+pub(super) fn answering_at<'a>(cases: &'a [CaseCurve], at: (f64, &[f64])) -> Cow<'a, [CaseCurve]> {
     if cases.len() <= MOST_RUNS {
         return Cow::Borrowed(cases);
     }
     let speeds: Vec<f64> = cases.iter().map(|c| c.speed_m_per_s).collect();
-    answering(&speeds, v).into_iter().map(|i| cases[i].clone()).collect()
+    let mut chosen = answering(&speeds, at.0);
+    let (low, high, _) = neighbouring(cases, at);
+    chosen.extend(low.iter().chain(&high).filter(|(_, share)| *share > 0.0).map(|(i, _)| i));
+    chosen.sort_unstable();
+    chosen.dedup();
+    chosen.into_iter().map(|i| cases[i].clone()).collect()
 }
 
 /// Points in order of x, with one mean of those of equal x.

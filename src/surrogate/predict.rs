@@ -312,8 +312,11 @@ impl<'a> Prediction<'a> {
         let of_body = body.as_ref().map(|b| banded(ForceKind::Body, b)).unwrap_or_default();
         let end = declared.end_m();
         let mut curve = PredictedCurve {
-            unloading_stiffness_n_per_m: unloading.unwrap_or(0.0),
-            body_unloading_stiffness_n_per_m: body.as_ref().map(|_| unloading.unwrap_or(0.0)),
+            // Without a rebound a softer unloading than the steepest rise would create energy.
+            unloading_stiffness_n_per_m: unloading.unwrap_or(0.0).max(declared.max_slope()),
+            body_unloading_stiffness_n_per_m: body
+                .as_ref()
+                .map(|b| unloading.unwrap_or(0.0).max(b.max_slope())),
             drives: model.force_kind.drives().into(),
             body_drives: body.as_ref().map(|_| ForceKind::Body.drives().into()),
             rebound: asked.rebound(body.as_ref().unwrap_or(&declared)),
@@ -344,9 +347,9 @@ impl<'a> Prediction<'a> {
             },
         };
         curve.unloading_stiffness_n_per_m =
-            curve.stiffness_where_stopped(&declared, model.force_kind);
+            curve.stiffness_where_stopped(&declared, model.force_kind, model.force_kind);
         curve.body_unloading_stiffness_n_per_m =
-            body.map(|b| curve.stiffness_where_stopped(&b, ForceKind::Body));
+            body.map(|b| curve.stiffness_where_stopped(&b, ForceKind::Body, ForceKind::Body));
         curve
     }
 }

@@ -316,7 +316,8 @@ impl PredictedCurve {
     }
 
     fn of_contact_force(&self) -> Result<Self, Error> {
-        let stiffness = self.stiffness_where_stopped(&self.envelope()?, ForceKind::Contact);
+        let stiffness =
+            self.stiffness_where_stopped(&self.envelope()?, ForceKind::Contact, ForceKind::Contact);
         let mut curve = self.clone();
         curve.unloading_stiffness_n_per_m = stiffness;
         if let Some(rebound) = &mut curve.rebound {
@@ -330,7 +331,7 @@ impl PredictedCurve {
         let envelope = self.driving_envelope()?;
         let mut curve = self.clone();
         curve.unloading_stiffness_n_per_m =
-            self.stiffness_where_stopped(&envelope, ForceKind::Body);
+            self.stiffness_where_stopped(&envelope, ForceKind::Body, ForceKind::Body);
         if self.body_force_n.is_none() {
             return Ok(curve);
         }
@@ -368,13 +369,18 @@ impl PredictedCurve {
     /// Unloading stiffness with which a run leaves an envelope of one of the curve's forces where that has taken up the energy of the
     /// impact. The energy of the rebound is the same whichever force it comes from, but that a contact force below the body's
     /// drives less mass, down to [`LEAST_FREE`] of it: the rest is stopped in the crush zone.
-    /// In a model of one mass a contact force drives all of it, and `force` is the body's.
-    pub(crate) fn stiffness_where_stopped(&self, envelope: &Envelope, force: ForceKind) -> f64 {
+    /// In a model of one mass a contact force drives all of it, and `drives` is the body's; `of` is the force of the envelope.
+    pub(crate) fn stiffness_where_stopped(
+        &self,
+        envelope: &Envelope,
+        of: ForceKind,
+        drives: ForceKind,
+    ) -> f64 {
         let top_n = |of: &Envelope| stopping_force_n(of, self.provenance.kinetic_energy_j);
         let driving_n = self.driving_envelope().map(|driving| top_n(&driving));
         let share =
             |of: &Envelope| driving_n.as_ref().map_or(1.0, |driving_n| top_n(of) / driving_n);
-        let free = match (force, &self.body_force_n) {
+        let free = match (drives, &self.body_force_n) {
             // Of the curve itself: the edge of a band drives the same mass.
             (ForceKind::Contact, Some(_)) => {
                 self.envelope().map_or(1.0, |own| share(&own).clamp(LEAST_FREE, 1.0))
@@ -384,9 +390,7 @@ impl PredictedCurve {
         let share = share(envelope);
         let without_rebound = || {
             let of_body = self.body_unloading_stiffness_n_per_m;
-            let known = of_body.filter(|_| force == ForceKind::Body);
-            // A softer unloading than the steepest rise would create energy.
-            known.unwrap_or(self.unloading_stiffness_n_per_m).max(envelope.max_slope())
+            of_body.filter(|_| of == ForceKind::Body).unwrap_or(self.unloading_stiffness_n_per_m)
         };
         self.rebound
             .map(|r| r.stiffness_n_per_m * share * share / free)
@@ -428,7 +432,8 @@ impl PredictedCurve {
         });
         // The force law keeps to its bounds by itself; the one constant is for other tools.
         let drives = if is_split { force } else { ForceKind::Body };
-        let unloading = CurveUnloading::Stiffness(self.stiffness_where_stopped(&loading, drives));
+        let unloading =
+            CurveUnloading::Stiffness(self.stiffness_where_stopped(&loading, force, drives));
         Ok(ForceCurve {
             unloading,
             kind: Some(force),

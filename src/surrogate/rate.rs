@@ -19,7 +19,7 @@ use serde_json::value::RawValue;
 use super::alignment::Alignment;
 use super::blend::{Blend, own_share};
 use super::cached::Cached;
-use super::curves::{answering_at, apart, neighbouring};
+use super::curves::{Twins, answering_at, apart, neighbouring};
 use super::entry::{ModelEntry, loaded};
 use super::{CaseCurve, QueryPoint, Surrogate};
 
@@ -179,7 +179,7 @@ impl Rate {
         at: (f64, &[f64]),
         deflection_m: &[f64],
     ) -> Vec<f64> {
-        let cases = &*answering_at(cases, at.0);
+        let cases = &*answering_at(cases, at);
         let of = || cases.iter().map(|c| [c.speed_m_per_s, c.end_m(), c.envelope().work()]);
         let prepare = || {
             let alignment = self.alignment(cases);
@@ -251,11 +251,15 @@ impl Rate {
         &self,
         cases: &[CaseCurve],
         levels: &[f64],
-        (low, high, share): (usize, usize, f64),
+        (low, high, share): (Twins, Twins, f64),
         deflection_m: &[f64],
     ) -> Vec<f64> {
         let standing_n = |d: f64| {
-            let of = |i| self.quotient(cases, levels, i, d);
+            let own = |(i, share)| match share > 0.0 {
+                true => share * self.quotient(cases, levels, i, d),
+                false => 0.0,
+            };
+            let of = |[a, b]: Twins| own(a) + own(b);
             if low == high { of(low) } else { (1.0 - share) * of(low) + share * of(high) }
         };
         deflection_m.iter().map(|&d| standing_n(d)).collect()

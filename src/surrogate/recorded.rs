@@ -51,8 +51,11 @@ impl PredictedCurve {
         let mut curve = Self {
             body_force_n: body.as_ref().map(|b| at(&b.loading)),
             body_drives: body.as_ref().map(|_| ForceKind::Body.drives().into()),
-            body_unloading_stiffness_n_per_m: body.as_ref().map(|_| 0.0),
-            unloading_stiffness_n_per_m: declared.unloading.stiffness_n_per_m().unwrap_or(0.0),
+            body_unloading_stiffness_n_per_m: body.as_ref().map(|b| b.loading.max_slope()),
+            unloading_stiffness_n_per_m: declared
+                .unloading
+                .stiffness_n_per_m()
+                .unwrap_or_else(|| declared.loading.max_slope()),
             force_low_n: None,
             force_high_n: None,
             beyond: None,
@@ -73,9 +76,9 @@ impl PredictedCurve {
             force_n,
         };
         curve.unloading_stiffness_n_per_m =
-            curve.stiffness_where_stopped(&loading, case.curves.force_kind);
-        curve.body_unloading_stiffness_n_per_m =
-            body.map(|b| curve.stiffness_where_stopped(&b.loading, ForceKind::Body));
+            curve.stiffness_where_stopped(&loading, case.curves.force_kind, case.curves.force_kind);
+        curve.body_unloading_stiffness_n_per_m = body
+            .map(|b| curve.stiffness_where_stopped(&b.loading, ForceKind::Body, ForceKind::Body));
         Ok(curve)
     }
 }

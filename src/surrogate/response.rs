@@ -89,7 +89,9 @@ pub(super) fn with_response(
     };
     let time_s = times_s(deflection_m, closing, at.speed_m_per_s);
     let (low, high, share) = neighbouring(runs, (at.speed_m_per_s, at.features));
-    for (i, weight) in [(low, 1.0 - share), (high, share)] {
+    let beside = [(low, 1.0 - share), (high, share)];
+    let beside = beside.into_iter().flat_map(|(of, weight)| of.map(|(i, own)| (i, weight * own)));
+    for (i, weight) in beside {
         if weight == 0.0 {
             continue;
         }

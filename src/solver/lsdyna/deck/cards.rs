@@ -273,12 +273,11 @@ fn number<T>(read: Result<Option<T>, Missing>, value: fn(T) -> Value) -> Value {
     read.ok().flatten().map_or(Value::Unknown, value)
 }
 
-/// What a comment such as `$# Units: kg / mm / ms / kN / GPa` states; our own decks have `$ units of the points: mm-t-s`.
+/// What a comment such as `$# Units: kg / mm / ms / kN / GPa` states.
 pub(super) fn in_comment(line: &[u8]) -> Option<String> {
     const WORD: &[u8] = b"units";
     let at = line.windows(WORD.len()).position(|w| w.eq_ignore_ascii_case(WORD))?;
     let behind = line.get(at + WORD.len()..)?.trim_ascii_start();
-    let behind = behind.strip_prefix(b"of the points").unwrap_or(behind);
     text(behind.strip_prefix(b":").or_else(|| behind.strip_prefix(b"="))?)
 }
 

@@ -134,7 +134,7 @@ impl Reader<'_, '_> {
 
     fn comment(&mut self, line: &Line<'_>) {
         // Of what units a comment speaks is not always what the deck is in: a system must be named.
-        let named = |text: &String| cards::system(text).is_some();
+        let named = |text: &String| text.trim() == "SI" || cards::system(text).is_some();
         if let Some(stated) = cards::in_comment(line.text).filter(named) {
             self.context.units(stated, line.into(), false);
         }
