@@ -337,10 +337,12 @@ impl Warning {
         let shown = |of: Masses| match of.other_kg.map(Shown::one_mass) {
             None => Shown::one_mass(of.body_kg),
             Some(_) if of.other_kg == Some(of.body_kg) => {
-                format!("{} each (by the reduced mass)", Shown::one_mass(of.body_kg))
+                format!("{} each", Shown::one_mass(of.body_kg))
             }
             Some(other) => format!("{} against {other}", Shown::one_mass(of.body_kg)),
         };
+        // Of unequal bodies two equal ones that move alike.
+        let by = if asked.other_kg == Some(asked.body_kg) { " (by the reduced mass)" } else { "" };
         let ratio = asked.effective_kg() / trained.effective_kg();
         let effect = if is_unlike(ratio) {
             "so far from it, the curve is not reliable: check the unit"
@@ -350,7 +352,7 @@ impl Warning {
         Self {
             code: WarningCode::OtherMass,
             message: format!(
-                "the mass of {} differs from the training runs' {}: {effect}",
+                "the mass of {}{by} differs from the training runs' {}: {effect}",
                 shown(asked),
                 shown(trained)
             ),
