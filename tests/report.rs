@@ -104,7 +104,7 @@ fn its_numbers_are_those_of_the_commands() {
     assert!(!page.contains("vehicle-pair"), "only the group that was asked for");
 }
 
-/// Limits that lie within what the bands give are no verdict, nor is one where an edge of them leaves the data.
+/// Limits that lie within what the bands give have no verdict, nor have those where an edge of them leaves the data.
 #[test]
 fn limits_are_held_against_the_bands() {
     let folder = demo_folder();

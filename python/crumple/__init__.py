@@ -72,7 +72,7 @@ def _key(entity):
     if entity is None or isinstance(entity, str):
         return _id(entity)
     entity = entity.item() if isinstance(entity, np.ndarray) and entity.ndim == 0 else entity
-    # NaN, infinity and what is not a number are no entity's id.
+    # NaN, infinity and what is not a number are not an entity's id.
     is_whole = isinstance(entity, Number) and math.isfinite(entity) and entity == int(entity)
     return int(entity) if is_whole else entity
 
@@ -324,7 +324,7 @@ def read(path, ids=None, components=None, section=None, format=None):
 
     Raises `crumple.Error` if the file cannot be opened or read.
     """
-    # Once: each of a folder's files is asked for the same.
+    # Here, since an iterator has its items once, and a folder has several files.
     ids, components = _listed(ids), _listed(components)
 
     def sections(file):

@@ -58,10 +58,7 @@ impl<'a> Blend<'a> {
         let mut weights = vec![0.0; all.len()];
         let smooth = |v: f64| self.smooth(all.len() - first, v);
         weights[first..].copy_from_slice(&smooth(v));
-        let (low, high, share) = match neighbours(all, v) {
-            (low, high, _) if is_same_speed(all[low], all[high]) => (low, low, 0.0),
-            other => other,
-        };
+        let (low, high, share) = neighbours(all, v);
         for (run, nearness) in [(low, (1.0 - share).powi(2)), (high, share.powi(2))] {
             if nearness > 0.0 && all[first..].iter().any(|v| is_same_speed(*v, all[run])) {
                 for (twin, share) in twins(all, apart, run, first) {

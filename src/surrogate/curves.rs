@@ -142,6 +142,10 @@ pub(crate) fn neighbours(speeds: &[f64], v: f64) -> (usize, usize, f64) {
         n if n == speeds.len() => (n - 1, n - 1, 0.0),
         n => {
             let high = speeds.partition_point(|&s| s <= speeds[n]) - 1;
+            // Speeds that differ by rounding are one.
+            if is_same_speed(speeds[n - 1], speeds[n]) {
+                return (n - 1, n - 1, 0.0);
+            }
             (n - 1, high, (v - speeds[n - 1]) / (speeds[n] - speeds[n - 1]))
         }
     }
@@ -159,9 +163,6 @@ pub(super) fn neighbouring(
     let (low, high, share) = neighbours(&speeds, v);
     let apart = apart(cases, features);
     let of = |run| twins(&speeds, &apart, run, 0);
-    if is_same_speed(speeds[low], speeds[high]) {
-        return (of(low), of(low), 0.0);
-    }
     (of(low), of(high), share)
 }
 
