@@ -127,6 +127,9 @@ fn other_tools_read_the_exported_points() {
                 assert!(of("akima").abs() < 1e-3, "{curve} {name}: energy, {seen}");
                 assert!(of("cubic").abs() < 1e-3, "{curve} {name}: energy, {seen}");
                 assert!(of("points") >= 200.0);
+                // Neither pulls before the contact.
+                let before = |spline: usize| seen["before"][spline].as_f64().unwrap();
+                assert!(before(0) < 5e-3 && before(1) < 5e-3, "{curve} {name}: {seen}");
             }
         }
     }
@@ -382,6 +385,8 @@ fn packages_have_the_names_of_their_files() {
         ("lead-50 b.mo", "lead_50_b"),
         ("50.mo", "curve_50"),
         ("model.mo", "curve_model"),
+        ("stream.mo", "curve_stream"),
+        ("Real.mo", "curve_Real"),
         ("nöse.mo", "n_se"),
     ] {
         export(here, "lead50.json", file, &[]);
@@ -424,6 +429,15 @@ fn uneven_curves_for_lsdyna_are_noted() {
     says(&record, "its points are unevenly spaced, so LCINT is 20000, the largest used");
     assert!(fs::read_to_string(here.join("x.k")).unwrap().contains("         0     20000\n"));
     assert!(!notes(&["lead50.json"]).contains("LCINT"));
+    // The smallest of uneven intervals, 25 mm of 1.2 m, would be 49 points, and cut a fifth off this peak.
+    fs::write(
+        here.join("peak.csv"),
+        "d_m,F_N\n0,0\n0.05,9e5\n0.085,3.2e6\n0.11,1.5e6\n0.5,1.6e6\n1.2,2.5e6\n",
+    )
+    .unwrap();
+    let of = "export peak.csv --speed 50km/h --kind wall --mass 24t --unloading 80MN/m --accept-energy --tail none --units SI -q -o peak.k";
+    crumple_ok(here, of);
+    assert!(fs::read_to_string(here.join("peak.k")).unwrap().contains("         0       961\n"));
 }
 
 /// Channels of an earlier record stay in a folder that is written anew, and that is said.
@@ -556,6 +570,92 @@ fn our_readers_give_back_what_was_exported() {
                 assert!(close(read.force_n[i], f[i]), "{file} {tail} point {i}");
             }
         }
+    }
+}
+
+/// The straight line that stands for a curve's unloading is not taken for its own stiffness; one that was changed by hand is.
+#[test]
+fn a_line_does_not_replace_the_stiffness() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let facts = "# force_kind: body\n# speed_kind: wall\n# speed_m_per_s: 10\n# mass_kg: 6440\n# unloading_stiffness_N_per_m: 7e6\n";
+    let table = format!("{facts}d_m,force_N\n0,0\n0.3,1.2e6\n0.37,1.4e6\n0.4,2.0e6\n");
+    fs::write(here.join("0.csv"), table).unwrap();
+    for (format, extension) in
+        [("mat", "mat"), ("lsdyna --material mat121", "k"), ("lsdyna --material s06", "k")]
+    {
+        crumple_ok(here, &format!("export 0.csv --to {format} -o 1.{extension} -q"));
+        let of = if extension == "k" { "1.k --curve 101" } else { "1.mat" };
+        let again = format!("export {of} --to {format} -o 2.{extension} -q");
+        crumple_ok(here, &again);
+        for file in ["1", "2"] {
+            let file = here.join(format!("{file}.{extension}"));
+            let curve = (extension == "k").then(|| "101".into());
+            let (read, _) = read(&file, &ReadOptions { curve, ..ReadOptions::default() }).unwrap();
+            let found = read.facts.unloading_stiffness_n_per_m.unwrap();
+            assert!((found / 7e6 - 1.0).abs() < 1e-8, "{format}: {found}");
+            let text = String::from_utf8_lossy(&fs::read(&file).unwrap()).replace('\0', "");
+            assert!(extension == "mat" || text.contains("line_stiffness_N_per_m: "), "{text}");
+        }
+    }
+    let mut bytes = fs::read(here.join("1.mat")).unwrap();
+    let at = bytes.windows(4).position(|w| w == b"k_u\0").unwrap() + 4;
+    bytes[at..at + 8].copy_from_slice(&9e6_f64.to_le_bytes());
+    fs::write(here.join("3.mat"), bytes).unwrap();
+    let (read, _) = read(&here.join("3.mat"), &ReadOptions::default()).unwrap();
+    assert_eq!(read.facts.unloading_stiffness_n_per_m, Some(9e6));
+}
+
+/// A force that has fallen to 0 keeps the stiffness that was given for it; points that nine digits cannot tell from one another are
+/// set apart; and what fewer points change is in file and note.
+#[test]
+fn what_is_given_reaches_the_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let table = |name: &str, force: &dyn Fn(f64) -> f64| {
+        let row = |i: u32| format!("{},{}\n", f64::from(i) / 2e3, force(f64::from(i) / 2e3));
+        let rows: String = (0..=2000).map(row).collect();
+        fs::write(here.join(name), format!("d_m,F_N\n{rows}")).unwrap();
+    };
+    let of = "--speed 50km/h --kind wall --mass 24t --unloading 150MN/m --accept-energy --units SI";
+    table("sine.csv", &|d| (3e6 * (std::f64::consts::PI * d).sin()).max(0.0));
+    let said = export_notes(
+        here,
+        "sine.csv",
+        &[&of.split(' ').collect::<Vec<_>>()[..], &["-o", "a.k"]].concat(),
+    );
+    says(&said, "unloading: a line of 150.0 MN/m from the maximum deflection");
+    let deck = fs::read_to_string(here.join("a.k")).unwrap();
+    says(&deck, "$ unloading_stiffness_N_per_m: 1.50000000E+08\n");
+    // As waves of 8 mm are for 200 points.
+    table("rough.csv", &|d| 3e6 * (d / 0.05).min(1.0) * (1.0 + 0.2 * (800.0 * d).sin()));
+    for output in ["a.inp", "a.mo"] {
+        let args = [&of.split(' ').collect::<Vec<_>>()[..], &["-o", output]].concat();
+        let args: Vec<&str> = args
+            .into_iter()
+            .filter(|a| output == "a.inp" || !["--units", "SI"].contains(a))
+            .collect();
+        let said = export_notes(here, "rough.csv", &args);
+        let changed = |text: &str| {
+            let share = text.split("where forces change by up to ").nth(1)?;
+            share.split(' ').next()?.parse::<f64>().ok()
+        };
+        let share = changed(&said).unwrap();
+        assert!((5.0..30.0).contains(&share), "{output}: {said}");
+        let text = fs::read_to_string(here.join(output)).unwrap();
+        assert_eq!(changed(&text), Some(share), "{output}");
+    }
+    let near = "d_m,F_N\n0,0\n0.5,1e6\n1.5,1e6\n1.500000000001,2e6\n2.0,2e6\n";
+    fs::write(here.join("near.csv"), near).unwrap();
+    for output in ["b.rad", "b.cmd", "b.csv"] {
+        crumple_ok(here, &format!("export near.csv {of} -q -o {output}"));
+        let text = fs::read_to_string(here.join(output)).unwrap();
+        let numbers = text
+            .lines()
+            .flat_map(|l| l.split([' ', ',', '=', 'x']))
+            .map(|n| n.trim_start_matches('-'));
+        let same = numbers.filter(|n| *n == "1.50000000E+00").count();
+        assert_eq!(same, 1, "{output}: {text}");
     }
 }
 

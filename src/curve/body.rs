@@ -226,7 +226,7 @@ pub(crate) fn recorded_force(case: &Case) -> Option<RecordedForce> {
 
 /// Shortest distance between states that are used, as a share of the maximum deflection: over a shorter one the digits of a file make steps of
 /// the force, and their slopes would pass for stiffness.
-const LEAST_STEP: f64 = 1.0 / 2000.0;
+pub(crate) const LEAST_STEP: f64 = 1.0 / 2000.0;
 
 /// States on the way to the `end` of the loading branch whose deflection advances, with the first
 /// and the last one.

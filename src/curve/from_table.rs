@@ -93,6 +93,10 @@ fn retraced(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quali
     let interval_s = Sampling::default().interval_s;
     let motion = retrace(table, impact, interval_s)?;
     let (mut notes, mut warnings) = (motion.notes, motion.warnings);
+    // A force that has fallen to 0 has no branch from which to take it.
+    let most_m = table.deflection_m.iter().copied().fold(0.0, f64::max);
+    let has_branch = table.deflection_m.last() < Some(&most_m);
+    let stated = impact.unloading_stiffness_n_per_m.filter(|_| !has_branch);
     let original = Curve::new(motion.time_s, motion.deflection_m, motion.force_n)?;
     let claim = energy::StatedConditions {
         curve: &original,
@@ -144,7 +148,7 @@ fn retraced(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quali
         sampled: Curve::new(times, sampled.0, sampled.1)?,
         closing_speed_m_per_s,
         contact_time_s: 0.0,
-        unloading_stiffness_n_per_m: loading::unloading_stiffness(&original),
+        unloading_stiffness_n_per_m: loading::unloading_stiffness(&original).or(stated),
         original,
     };
     Ok((curves, Quality { audit, notes, warnings }))

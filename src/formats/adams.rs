@@ -12,6 +12,8 @@ use crate::unit::{FORCE, LENGTH, UnitSystem};
 /// Numbers per line of a statement.
 const PER_LINE: usize = 4;
 const COMMENT_WIDTH: usize = 200;
+/// Least share of the table's length that its points without force reach to before the contact.
+const GUARDED: f64 = 0.01;
 
 pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {
     // mm and N, as of Adams' own default units (MMKS).
@@ -57,10 +59,17 @@ struct Spline<'a> {
 impl<'a> Spline<'a> {
     fn of(curve: &'a ExportCurve, units: UnitSystem, id: u32) -> Result<Self, Error> {
         let loading = for_splines(&curve.loading)?;
-        let guard = |share: f64| (-share * loading.end_m(), 0.0);
+        // The first as close to the kink at the contact as on its other side, each further one twice as far: otherwise a spline would pull.
+        let first_m = loading.deflection_m()[1];
+        let reach_m = GUARDED * loading.end_m();
+        let guards = std::iter::successors(Some(first_m), |d| (*d < reach_m).then_some(2.0 * d));
+        let mut guards: Vec<f64> = guards.collect();
+        guards.extend(guards.last().map(|last| 2.0 * last));
         let force = std::iter::once(0.0).chain(loading.force_n().iter().copied().skip(1));
-        let points = [guard(0.02), guard(0.01)]
-            .into_iter()
+        let points = guards
+            .iter()
+            .rev()
+            .map(|d| (-d, 0.0))
             .chain(loading.deflection_m().iter().copied().zip(force))
             .map(|(d, f)| (d / units.length_m, f / units.force()))
             .collect();

@@ -4,7 +4,6 @@
 
 use super::lsdyna::InUnits;
 use super::text::{line, nine_digits};
-use super::thin::thinned;
 use super::{ExportCurve, Exported, NUMBER_OF_STATES, Options, TargetUnloading, run_time_s};
 use crate::error::Error;
 use crate::unit::UnitSystem;
@@ -21,18 +20,11 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
     for (k, curve) in curves.iter().enumerate() {
         let curve = &curve.begun_at_origin(true, &mut notes)?;
         let id = options.id + k as u32;
-        let given = curve.deflection_m().len();
-        let loading = thinned(&curve.loading, MOST_ROWS - 1, curve.end)?;
-        if loading.deflection_m().len() < given {
-            notes.push(format!(
-                "{}: {} of {given} points are kept (CalculiX takes {MOST_ROWS} rows), with the same energy up to the maximum crush",
-                curve.headline(),
-                loading.deflection_m().len()
-            ));
-        }
+        let takes = format!(" (CalculiX takes {MOST_ROWS} rows)");
+        let few = curve.of_at_most(MOST_ROWS - 1, &takes, &mut notes)?;
         notes.push(curve.restitution_note("CalculiX", TargetUnloading::Elastic));
         line!(lines, "** {}", units.stated());
-        for (key, value) in curve.facts_by_elongation() {
+        for (key, value) in few.facts_by_elongation() {
             line!(lines, "** {key}: {}", ascii(&value));
         }
         if options.deck {
@@ -40,7 +32,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
         }
         // The empty data line is that of an orientation, which SPRINGA does not have.
         line!(lines, "*SPRING, ELSET=IF{id}, NONLINEAR\n");
-        let rows = loading.deflection_m().iter().zip(loading.force_n()).skip(1).rev();
+        let rows = few.deflection_m().iter().zip(few.force_n()).skip(1).rev();
         for (d, f) in rows {
             line!(lines, "{}, {}", units.force(-f), units.length(-d));
         }

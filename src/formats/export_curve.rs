@@ -2,7 +2,7 @@
 
 use super::Options;
 use super::text::nine_digits;
-use super::thin::{Softened, from_origin, softened};
+use super::thin::{Softened, from_origin, set_apart, softened, thinned};
 use crate::curve::force_curve::{FULLY_CRUSHED, with_tail};
 use crate::curve::{Envelope, ForceCurve, ForceKind, Tail};
 use crate::dataset::{MASS, OTHER_MASS};
@@ -35,8 +35,14 @@ pub struct ExportCurve {
     pub ordinal: usize,
 }
 
+/// Name of a line's stiffness that returns as much energy as the curve's own law.
+pub(super) const LINE_STIFFNESS: &str = "line_stiffness_N_per_m";
+
 /// Share of the energy that a rise from the origin to the first force may change unsaid.
 const RAMP: f64 = 1e-3;
+
+/// Change of a force in % of the peak force that a file with fewer points need not state.
+const MOST_UNSAID: f64 = 2.0;
 
 /// How a target releases the energy stored at the maximum crush.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -100,7 +106,7 @@ impl ExportCurve {
         let with = |curve: &Envelope| {
             with_tail(curve, beyond.as_ref(), predicted.data_end_m(), stiffness, tail)
         };
-        let continued = with(&loading)?;
+        let continued = set_apart(&with(&loading)?)?;
         let band = predicted.force_low_n.as_ref().zip(predicted.force_high_n.as_ref());
         // An edge goes on by the rule of the curve. It is not that of a softened curve.
         let edge = |edge: &[f64]| -> Result<Vec<f64>, Error> {
@@ -137,6 +143,37 @@ impl ExportCurve {
     /// The same curve through other points; `end` is the index of the maximum crush among them.
     pub fn through(self, loading: Envelope, end: usize) -> Self {
         Self { loading, end, band: None, ..self }
+    }
+
+    /// The same curve with at most `most` points, for a target that `takes` no more; the notes and `changes` say what that changes.
+    ///
+    /// # Errors
+    /// If the result is not a valid curve.
+    pub(crate) fn of_at_most(
+        &self,
+        most: usize,
+        takes: &str,
+        notes: &mut Vec<String>,
+    ) -> Result<Self, Error> {
+        let points = self.deflection_m().len();
+        let loading = thinned(&self.loading, most, self.end)?;
+        let left = loading.deflection_m().len();
+        if left == points {
+            return Ok(self.clone());
+        }
+        let own = || self.deflection_m()[..=self.end].iter().zip(self.force_n());
+        let off_n = own().map(|(&d, f)| (loading.force_at(d) - f).abs()).fold(0.0, f64::max);
+        let share = 100.0 * off_n / own().map(|(_, f)| *f).fold(0.0, f64::max);
+        let changed = format!(
+            "{left} of {points} points are kept{takes}, with the same energy up to the maximum crush, where forces change by up to {share:.1} % of the peak force"
+        );
+        notes.push(format!("{}: {changed}", self.headline()));
+        let end = loading.deflection_m().partition_point(|&d| d < self.max_crush_m());
+        let mut curve = self.clone().through(loading, end);
+        if share > MOST_UNSAID {
+            curve.changes.push(changed);
+        }
+        Ok(curve)
     }
 
     /// The same curve for tools that need the origin: a force at contact is reached as steeply as the curve rises or unloads,
@@ -218,11 +255,10 @@ impl ExportCurve {
         if more > 1.01 && more.is_finite() { own * more.powi(2) } else { own }
     }
 
-    /// The same curve with that stiffness for its own.
-    pub(crate) fn along_a_line(&self) -> Self {
-        let mut curve = self.clone();
-        curve.predicted.unloading_stiffness_n_per_m = self.line_stiffness_n_per_m();
-        curve
+    /// What states that stiffness, for files that hold it, where it is not the curve's own.
+    pub(crate) fn line_fact(&self) -> Option<(&'static str, String)> {
+        let line = nine_digits(self.line_stiffness_n_per_m());
+        (line != nine_digits(self.stiffness_n_per_m())).then_some((LINE_STIFFNESS, line))
     }
 
     /// The curve as it drives an interface, tail included.

@@ -64,11 +64,9 @@ fn matrix(bytes: &mut Vec<u8>, name: &str, columns: &[Vec<f64>]) {
 
 /// One line per fact, as rows of characters; each character is a double.
 fn text(bytes: &mut Vec<u8>, name: &str, curve: &ExportCurve) {
-    let lines: Vec<Vec<char>> = curve
-        .facts()
-        .iter()
-        .map(|(key, value)| format!("{key}: {value}").chars().collect())
-        .collect();
+    let facts = curve.facts().into_iter().chain(curve.line_fact());
+    let lines: Vec<Vec<char>> =
+        facts.map(|(key, value)| format!("{key}: {value}").chars().collect()).collect();
     let width = lines.iter().map(Vec::len).max().unwrap_or(0);
     head(bytes, 1, name, lines.len(), width);
     for column in 0..width {

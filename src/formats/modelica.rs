@@ -9,17 +9,18 @@ use std::fmt::Write;
 
 use super::export_curve::identifier;
 use super::text::{line, nine_digits, title};
-use super::thin::thinned;
 use super::{ExportCurve, Exported, Options, TargetUnloading};
 use crate::curve::Tail;
 
 const COMMENT_WIDTH: usize = 200;
 /// Maximum number of points of the package's table: a translator unrolls the search through them.
 const MOST_POINTS: usize = 200;
-/// Reserved words that cannot be package names (Modelica 3.6, 2.3.3), as far as they are likely file names.
-const KEYWORDS: &str = "algorithm and block class connect connector constant discrete each else end equation \
-    extends external false final flow for function if import initial inner input model \
-    operator outer output package record true type";
+/// Names that a package cannot have: reserved words (Modelica 3.6, 2.3.3), predefined types and `time`.
+const KEYWORDS: &str = "algorithm and annotation block break class connect connector constant constrainedby der discrete \
+    each else elseif elsewhen encapsulated end enumeration equation expandable extends external false final flow for \
+    function if import impure in initial inner input loop model not operator or outer output package parameter partial \
+    protected public pure record redeclare replaceable return stream then true type when while within \
+    Boolean Integer Real String time";
 /// Numbers per line of an array.
 const PER_LINE: usize = 6;
 
@@ -30,27 +31,17 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
     }
     let mut exported = Exported::default();
     for curve in curves {
-        let points = curve.deflection_m().len();
-        let loading = thinned(&curve.loading, MOST_POINTS, curve.end)?;
-        let end = loading.deflection_m().partition_point(|&d| d < curve.max_crush_m());
-        if loading.deflection_m().len() < points {
-            exported.notes.push(format!(
-                "{}: {} of {points} points are kept in the package, with the same energy up to the maximum crush",
-                curve.headline(),
-                loading.deflection_m().len()
-            ));
-        }
+        let few = curve.of_at_most(MOST_POINTS, " in the package", &mut exported.notes)?;
         exported.notes.push(format!(
             "{}: restitution {}",
             curve.headline(),
             curve.own_restitution_text("as in")
         ));
-        let curve = curve.clone().through(loading, end);
         let name = match (&options.stem, curves) {
             (Some(stem), [_]) => package_name(stem),
             _ => curve.identifier(),
         };
-        exported.files.push((format!("{name}.mo"), package(&curve, &name)));
+        exported.files.push((format!("{name}.mo"), package(&few, &name)));
     }
     Ok(exported)
 }

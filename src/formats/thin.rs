@@ -107,6 +107,18 @@ fn kept_points(d: &[f64], f: &[f64], most: usize, kept: usize) -> Vec<usize> {
     (0..n).filter(|&i| is_left[i]).collect()
 }
 
+/// Share of a deflection by which the next must exceed it, so that nine digits of the two differ in any unit: tools refuse equal ones.
+const DISTINCT: f64 = 1.1e-8;
+
+/// The curve with each deflection distinct from the one before.
+pub(crate) fn set_apart(curve: &Envelope) -> Result<Envelope, Error> {
+    let mut deflection_m = curve.deflection_m().to_vec();
+    for i in 1..deflection_m.len() {
+        deflection_m[i] = deflection_m[i].max(deflection_m[i - 1] * (1.0 + DISTINCT));
+    }
+    Envelope::new(deflection_m, curve.force_n().to_vec())
+}
+
 /// Minimum number of points of a table that splines go through.
 const FEWEST: usize = 200;
 /// A kink is fenced by two points at this share of the intervals beside it.
@@ -124,9 +136,10 @@ pub(crate) fn for_splines(curve: &Envelope) -> Result<Envelope, Error> {
     for i in 0..d.len() - 1 {
         let step = d[i + 1] - d[i];
         let is_kink = |k: usize| {
-            k == 0
+            let is_kink = k == 0
                 || k + 1 == d.len()
-                || (slope(k) - slope(k - 1)).abs() * step > KINK * curve.peak_force_n()
+                || (slope(k) - slope(k - 1)).abs() * step > KINK * curve.peak_force_n();
+            is_kink && FENCE * step > 2.0 * DISTINCT * d[i + 1]
         };
         if is_kink(i) {
             deflection_m.push(d[i] + FENCE * step);

@@ -198,7 +198,14 @@ impl Beyond {
                 body.unwrap_or(0)
             ));
         }
-        Ok(())
+        let forces_n = self.force_n.iter().chain(self.body_force_n.iter().flatten());
+        match forces_n.into_iter().find(|f| **f < 0.0) {
+            Some(force_n) => Err(error!(
+                Prediction,
+                "a force of beyond is {force_n} N, below 0: an interface only pushes"
+            )),
+            None => Ok(()),
+        }
     }
 
     fn envelope(&self, force_n: &[f64]) -> Result<Envelope, Error> {
@@ -272,6 +279,18 @@ impl PredictedCurve {
                     "{name} has {} values, force_N {}",
                     values.len(),
                     self.force_n.len()
+                ));
+            }
+        }
+        for (name, low, high) in [
+            ("force", &self.force_low_n, &self.force_high_n),
+            ("body_force", &self.body_force_low_n, &self.body_force_high_n),
+        ] {
+            let mut edges = low.iter().flatten().zip(high.iter().flatten());
+            if let Some(point) = edges.position(|(low, high)| low > high) {
+                return Err(error!(
+                    Prediction,
+                    "{name}_low_N of point {point} is above {name}_high_N"
                 ));
             }
         }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use super::Warning;
 use super::max_crush::MaxCrush;
 use super::predicted::{PredictedCurve, Provenance, Rebound, envelope};
+use crate::curve::body::LEAST_STEP;
 use crate::curve::force_curve::ForceCurveError;
 use crate::curve::{Case, Envelope, ForceCurve, ForceKind, Parameter};
 use crate::dataset::OTHER_MASS;
@@ -16,7 +17,7 @@ pub(crate) const RECORDED: &str = "recorded";
 impl PredictedCurve {
     /// The curve of one recorded run: its declared force, and beside a contact force the one that
     /// moved the body, both at the points of either. Exact between the points, as both are
-    /// piecewise linear.
+    /// piecewise linear, but for the last 1/2000 of a record's crush.
     ///
     /// # Errors
     /// If the case's states contain no loading branch.
@@ -34,7 +35,12 @@ impl PredictedCurve {
             ForceKind::Contact if !case.has_contact_alone() => of_case(ForceKind::Body).ok(),
             _ => None,
         };
-        let deflection_m = union(&declared.loading, body.as_ref().map(|b| &b.loading));
+        let mut deflection_m = union(&declared.loading, body.as_ref().map(|b| &b.loading));
+        // Where the body turns, a step of the force between two states is not a stiffness.
+        let end_m = deflection_m.last().copied().unwrap_or_default();
+        if !case.moves_by_its_force() {
+            deflection_m.retain(|d| *d == end_m || *d < (1.0 - LEAST_STEP) * end_m);
+        }
         let at = |e: &Envelope| -> Vec<f64> {
             deflection_m.iter().map(|&d| e.force_at(d).max(0.0)).collect()
         };

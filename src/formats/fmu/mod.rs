@@ -13,7 +13,6 @@ use std::io::{Cursor, Write};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
-use super::thin::thinned;
 use super::{ExportCurve, Exported};
 use crate::error::{Error, error};
 use crate::formats::text::{escaped, identifier};
@@ -133,19 +132,7 @@ const MOST_POINTS: usize = 4096;
 
 pub(crate) fn write(curve: &ExportCurve, version: FmiVersion) -> Result<Exported, Error> {
     let mut notes = Vec::new();
-    let points = curve.deflection_m().len();
-    let thin;
-    let mut curve = curve;
-    if points > MOST_POINTS {
-        let loading = thinned(&curve.loading, MOST_POINTS, curve.end)?;
-        let end = loading.deflection_m().partition_point(|&d| d < curve.max_crush_m());
-        thin = curve.clone().through(loading, end);
-        curve = &thin;
-        notes.push(format!(
-            "{}: {MOST_POINTS} of {points} points are kept, with the same energy up to the maximum crush",
-            curve.headline()
-        ));
-    }
+    let curve = &curve.of_at_most(MOST_POINTS, "", &mut notes)?;
     let law = curve.law();
     let (name, description, facts) = (curve.identifier(), curve.headline(), curve.facts());
     let spring = Spring { name: &name, description: &description, law: &law, facts: &facts };

@@ -11,6 +11,9 @@ const TITLE_WIDTH: usize = 80;
 /// Maximum number of points to which LS-DYNA resamples a curve.
 const MOST_RESAMPLED: usize = 20_000;
 
+/// Intervals of the even points for the smallest one of an uneven curve.
+const FINER: f64 = 20.0;
+
 /// Spring materials of LS-DYNA.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Material {
@@ -62,16 +65,11 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
         let units = InUnits(options.units.or(units).unwrap_or(UnitSystem::SI));
         // Of the loading branch and of the material; that of the unloading is one more.
         let id = options.id + 2 * k as u32;
-        // These unload along a line whatever the curve's slopes are.
-        let written = &match options.material {
-            Material::S08 => curve.clone(),
-            Material::Mat121 | Material::S06 => curve.along_a_line(),
-        };
-        describe(&mut lines, written, units, options.material);
+        describe(&mut lines, curve, units, options.material);
         match options.material {
-            Material::S08 => inelastic(&mut lines, written, units, id),
-            Material::Mat121 => discrete_beam(&mut lines, written, units, id),
-            Material::S06 => general(&mut lines, written, units, id),
+            Material::S08 => inelastic(&mut lines, curve, units, id),
+            Material::Mat121 => discrete_beam(&mut lines, curve, units, id),
+            Material::S06 => general(&mut lines, curve, units, id),
         }
         notes.extend(note(curve, options.material));
         notes.extend(resampling_note(curve));
@@ -111,16 +109,19 @@ fn resampling_note(curve: &ExportCurve) -> Option<String> {
 
 fn describe(lines: &mut String, curve: &ExportCurve, units: InUnits, material: Material) {
     line!(lines, "$ {}", units.stated());
+    // These unload along a line whatever the curve's slopes are.
+    let (stiffness_n_per_m, facts, line) = match material {
+        Material::S08 => (curve.stiffness_n_per_m(), curve.facts(), None),
+        Material::Mat121 | Material::S06 => {
+            (curve.line_stiffness_n_per_m(), curve.facts_by_elongation(), curve.line_fact())
+        }
+    };
     line!(
         lines,
         "$ unloading stiffness in these units: {}",
-        nine_digits(units.stiffness(curve.stiffness_n_per_m()))
+        nine_digits(units.stiffness(stiffness_n_per_m))
     );
-    let facts = match material {
-        Material::S08 => curve.facts(),
-        Material::Mat121 | Material::S06 => curve.facts_by_elongation(),
-    };
-    for (key, value) in facts {
+    for (key, value) in facts.into_iter().chain(line) {
         line!(lines, "$ {key}: {value}");
     }
 }
@@ -148,7 +149,7 @@ fn discrete_beam(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u3
     define_curve(lines, (id + 1, &format!("{text} unloaded")), &nothing, units, 0);
     // A discrete beam needs its own mass: with VOL 1, a millionth of the body's.
     let density = ten_columns(1e-6 * curve.predicted.mass_kg / units.0.mass_kg);
-    let k = ten_columns(units.stiffness(curve.stiffness_n_per_m()));
+    let k = ten_columns(units.stiffness(curve.line_stiffness_n_per_m()));
     let (text, unloading) = (title(&text, TITLE_WIDTH), id + 1);
     line!(lines, "*MAT_GENERAL_NONLINEAR_1DOF_DISCRETE_BEAM_TITLE\n{text}");
     line!(lines, "$#     mid        ro         k   unldopt    offset     dampf");
@@ -164,7 +165,7 @@ fn general(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u32) {
     let text = curve.headline();
     define_curve(lines, (id, &text), &points, units, resampling(&points));
     let highest = curve.loading.peak_force_n();
-    let length = highest / curve.stiffness_n_per_m();
+    let length = highest / curve.line_stiffness_n_per_m();
     // Of the 100 points to which it is resampled, one lies at the origin.
     let unloading = [(-length, -highest), (0.0, 0.0), (0.5 * length, 0.0)];
     define_curve(lines, (id + 1, &format!("{text} unloading")), &unloading, units, 0);
@@ -213,10 +214,17 @@ fn define_curve(
 }
 
 /// Points to which LS-DYNA resamples a curve evenly, 100 by default: a curve with more would
-/// lose its peaks. The number that the smallest interval requires keeps every point of an even curve.
+/// lose its peaks. The number that the smallest interval requires keeps every point of an even curve; an uneven one gets
+/// [`FINER`] times as many, so that little is cut off beside its points.
 fn resampling(points: &[(f64, f64)]) -> usize {
-    let reach = points[points.len() - 1].0 - points[0].0;
-    let intervals = (reach / smallest_interval(points) - 1e-6).ceil();
+    let (first, smallest) = (points[0].0, smallest_interval(points));
+    let reach = points[points.len() - 1].0 - first;
+    let is_on_grid = |p: &(f64, f64)| {
+        let at = (p.0 - first) / smallest;
+        (at - at.round()).abs() < 1e-3
+    };
+    let finer = if points.iter().all(is_on_grid) { 1.0 } else { FINER };
+    let intervals = (finer * reach / smallest - 1e-6).ceil();
     if intervals < 100.0 { 0 } else { (intervals as usize + 1).min(MOST_RESAMPLED) }
 }
 

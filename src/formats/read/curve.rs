@@ -3,6 +3,7 @@
 use crate::error::{Error, error};
 use std::path::Path;
 
+use super::super::export_curve::LINE_STIFFNESS;
 use super::encoding::number;
 use crate::curve::contact::{THRESHOLD, onset, threshold_n};
 use crate::curve::loading::{loading_branch, stiffness_of_unloading_energy};
@@ -115,6 +116,8 @@ pub struct Metadata {
     pub speed_kind: Option<SpeedKind>,
     /// From the maximum deflection, in N/m.
     pub unloading_stiffness_n_per_m: Option<f64>,
+    /// That of the straight line which stands for it in the file, where that is another.
+    pub(super) line_stiffness_n_per_m: Option<f64>,
     /// The same for the force that moves the body, where that is another.
     pub body_unloading_stiffness_n_per_m: Option<f64>,
     /// Mass of the body in kg.
@@ -149,6 +152,7 @@ impl Metadata {
         };
         match key {
             "unloading_stiffness_N_per_m" => self.unloading_stiffness_n_per_m = above_zero()?,
+            LINE_STIFFNESS => self.line_stiffness_n_per_m = above_zero()?,
             "speed_m_per_s" => self.speed_m_per_s = above_zero()?,
             "mass_kg" => self.mass_kg = above_zero()?,
             "other_mass_kg" => self.other_mass_kg = above_zero()?,

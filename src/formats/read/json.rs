@@ -28,6 +28,7 @@ fn parse(bytes: &[u8]) -> Result<PredictedCurve, Error> {
         .caused_by(source)
     })?;
     curve.envelope()?;
+    curve.driving_envelope()?;
     Ok(curve)
 }
 
@@ -63,6 +64,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
         _ => None,
     };
     let facts = Metadata {
+        line_stiffness_n_per_m: None,
         force: Some(curve.provenance.force_kind),
         speed_m_per_s: Some(curve.speed_m_per_s),
         speed_kind: Some(curve.speed_kind),

@@ -58,8 +58,12 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     let stiffness = stiffness.and_then(|m| m.values(0, 1).next());
     let stiffness = stiffness.map(|k| k * system.force() / system.length_m);
     let stiffness = stiffness.filter(|k| *k > 0.0 && k.is_finite());
+    // A line that stands for the curve's own stiffness is not that; another one is a change by hand.
+    let stands = |k: &f64| {
+        columns.facts.line_stiffness_n_per_m.is_some_and(|line| (k / line - 1.0).abs() < 1e-8)
+    };
     columns.facts.unloading_stiffness_n_per_m =
-        stiffness.or(columns.facts.unloading_stiffness_n_per_m);
+        stiffness.filter(|k| !stands(k)).or(columns.facts.unloading_stiffness_n_per_m);
     if beside("fd_unload").is_some() {
         notes.push("unloading: that of k_u, fd_unload is not read".into());
     }
