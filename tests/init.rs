@@ -1892,7 +1892,43 @@ fn a_record_that_starts_in_contact_is_named() {
     assert!((mass / 24.0 - 1.0).abs() < 0.03, "{mass} t");
     let said = warned(&here, "build late.toml -o late.h5");
     says(&said, "are missing, and the run's speed is that of its first state, by when it has been");
-    says(&said, "less any gap that the body had to cross first, or provide the earlier states");
+    // No offset makes up for the work of a third of the crush.
+    says(&said, "(37.3 %, less any gap that the body had to cross first) are missing");
+    says(&said, "slowed down: provide the earlier states, or leave the run out");
+    let text = fs::read_to_string(here.join("late.toml")).unwrap();
+    let speed = text.lines().find(|l| l.starts_with("speed = ")).unwrap().to_string();
+    let stated = text.replace(&speed, "speed = \"60km/h\"\noffset = \"461.6mm\"");
+    fs::write(here.join("stated.toml"), stated).unwrap();
+    let said = warned(&here, "build stated.toml -o stated.h5");
+    assert!(!said.contains("contribute less than"), "{said}");
+    let stated = fs::read_to_string(here.join("stated.toml")).unwrap();
+    fs::write(here.join("stated.toml"), stated.replace("60km/h\"\noffset", "80km/h\"\noffset"))
+        .unwrap();
+    let error = crumple_fails(&here, 1, "build stated.toml -o faster.h5");
+    says(&error, "likely the offset: the record lacks that crush, and the work done there");
+}
+
+/// A record may begin at a moment without force within the crash.
+#[test]
+fn a_record_that_may_start_in_contact_is_named() {
+    let (_folder, here) = four_runs();
+    let path = here.join("60kmh/nodout");
+    let text = fs::read_to_string(&path).unwrap();
+    let at = |n: usize| text.match_indices("\n\n\n n o d a l   p r i n t").nth(n).unwrap().0;
+    fs::write(&path, format!("{}{}", &text[..at(0)], &text[at(12)..])).unwrap();
+    let path = here.join("60kmh/rwforc");
+    let text = fs::read_to_string(&path).unwrap();
+    let (head, states) = text.split_once("z-force\n").unwrap();
+    let states: Vec<&str> = states.lines().skip(12).collect();
+    // Two states of the record without a force.
+    let bounce =
+        states[..2].iter().map(|line| format!("{}{}\n", &line[..20], "   0.000000E+00".repeat(4)));
+    let bounce: String = bounce.collect();
+    fs::write(&path, format!("{head}z-force\n{bounce}{}\n", states[2..].join("\n"))).unwrap();
+    let said = warned(&here, "init 60kmh -o bounce.toml");
+    says(&said, "run 60kmh: the record starts in contact");
+    let said = warned(&here, "build bounce.toml -o bounce.h5");
+    says(&said, "contact: the body had moved 148.1 mm before the record's first state");
 }
 
 /// In tonnes and metres only the masses differ from SI: a train of some kilograms is doubted.
@@ -1942,4 +1978,16 @@ fn one_component_of_the_motion_is_enough() {
         let speed = number(&study["run"][0]["speed"], "km/h");
         assert!((speed / 48.0 - 1.0).abs() < 2e-3, "{speed}");
     }
+}
+
+/// Speed and crush of a body that meets a moving wall are not those of the impact.
+#[test]
+fn a_wall_that_moves_is_named() {
+    let (_folder, here) = four_runs();
+    let deck = "*KEYWORD\n*RIGIDWALL_PLANAR_MOVING\n         0\n       0.0       0.0       0.0       1.0\n      1.25    3333.3\n*END\n";
+    fs::write(here.join("36kmh/main.k"), deck).unwrap();
+    let said = warned(&here, "init 36kmh -o moving.toml");
+    says(&said, "run 36kmh: the wall of the deck main.k, line 2, moves: speed and crush");
+    let said = warned(&here, "build moving.toml -o moving.h5");
+    says(&said, "36kmh: the wall of the deck main.k, line 2, moves: speed, deflection and energy");
 }

@@ -11,7 +11,7 @@ pub(crate) const THRESHOLD: f64 = 0.005;
 /// Before the crossing the force is gone where it is below this share of the threshold.
 const GONE: f64 = 0.1;
 /// Force pulses closer than this belong together: a nose plate may bounce.
-const PAUSE_S: f64 = 0.010;
+pub(super) const PAUSE_S: f64 = 0.010;
 /// By about this share of an interval contacts that are found within it are off: those of vehicle-pair, whose plates begin 0.5 mm from
 /// the plane at every speed, by up to 0.2; of a force that begins with a step by nothing, of one that rises over one to two intervals
 /// and then stays by up to 0.6.

@@ -94,6 +94,12 @@ impl ImpossibleRun {
         Self { found, cause: Cause::Histories(cause) }
     }
 
+    /// The same with another cause: a record that begins with an offset.
+    pub(crate) fn by_offset(self) -> Self {
+        let cause = "likely the offset: the record lacks that crush, and the work done there; provide the earlier states, or leave the run out";
+        Self::of_histories(self.found, cause)
+    }
+
     /// The same with another cause: a force before the contact that was found.
     pub(crate) fn by_earlier_force(self) -> Self {
         let cause = "likely a force before the contact that was found, which the curve leaves out: contact_time in the run takes it in";

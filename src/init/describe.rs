@@ -553,6 +553,16 @@ fn doubts_of_speed(record: &Record, impact: &Impact) -> Vec<String> {
                 .into(),
         );
     }
+    if record.velocities.len() == 1
+        && let Some((path, deck)) = &run.sources.deck
+        && let Some(wall) = deck.moving_wall()
+    {
+        notes.push(format!(
+            "the wall of the deck {}, {}, moves: speed and crush of the record are the body's own",
+            shown_name(path),
+            deck.line(wall.at)
+        ));
+    }
     if let Some(named) = named
         && !is_as_named
     {

@@ -109,6 +109,8 @@ pub(super) struct MassEstimates {
     /// Interval of the states over the time from contact to the largest crush, of which a mass by momentum may be off by
     /// half; after the contact that of the forces alone.
     pub coarseness: f64,
+    /// Whether the record starts in contact: what is stopped already has no part in a mass by momentum.
+    pub is_late: bool,
 }
 
 /// Above it other forces are warned of; the waves in a body that has left the contact look like less.
@@ -214,8 +216,11 @@ pub(super) fn agree(
             ));
         }
     }
+    let is_late =
+        |mass: &MassEstimates| mass.is_late && mass.kg().is_some_and(|(_, by_energy)| !by_energy);
+    let are_all_late = runs.iter().all(|(_, mass)| mass.kg().is_none() || is_late(mass));
     let of = |(k, (_, mass)): (usize, &(String, MassEstimates))| {
-        let (kg, by_energy) = mass.kg()?;
+        let (kg, by_energy) = mass.kg().filter(|_| are_all_late || !is_late(mass))?;
         Some((k, kg, if by_energy { 0.0 } else { (0.5 * mass.coarseness).min(MOST_COARSE) }))
     };
     let mut by_mass: Vec<(usize, f64, f64)> = runs.iter().enumerate().filter_map(of).collect();
@@ -242,6 +247,21 @@ pub(super) fn agree(
                 from = format!("{from}; median of {} runs, {range}", one.len());
             }
             found[k] = Proposed::found(rounded(median), Computed, from);
+        }
+    }
+    for (k, (_, mass)) in runs.iter().enumerate().filter(|(_, (_, mass))| is_late(mass)) {
+        let off = |kg: &f64| mass.kg().map_or(0.0, |(own, _)| libm::log(kg / own).abs());
+        let others: Vec<f64> = found.iter().filter_map(|mass| mass.value().copied()).collect();
+        if let (None, Some((own, _)), Some(kg)) = (
+            found[k].value(),
+            mass.kg(),
+            others.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))),
+        ) {
+            let from = format!(
+                "that of other runs; this record starts in contact, and momentum gives {}",
+                shown_mass(own)
+            );
+            found[k] = Proposed::found(kg, Computed, from);
         }
     }
     found
@@ -376,6 +396,14 @@ mod tests {
         );
         assert_eq!(warnings, [""; 0]);
         assert!(differ(&found).unwrap().contains("(20.2, 24 t)"));
+        // What is stopped before a record begins has no part in its mass.
+        let late = |kg: f64| MassEstimates { is_late: true, ..by_momentum(kg) };
+        let runs = [("a", by_momentum(24e3)), ("b", late(22_100.0)), ("c", by_momentum(60e3))];
+        let found = agree(&runs.map(|(name, mass)| (name.into(), mass)), "", &mut warnings);
+        assert_eq!(found[1].value(), Some(&24e3));
+        assert!(found[1].to_string().ends_with("starts in contact, and momentum gives 22.1 t"));
+        let found = agree(&[("b".into(), late(22_100.0))], "", &mut warnings);
+        assert_eq!(found[0].value(), Some(&22.1e3));
         // A state every 2 ms of a crash of 60 ms leaves a few per cent open.
         let coarse = |kg: f64, coarseness| MassEstimates { coarseness, ..by_momentum(kg) };
         assert!(warnings.is_empty());

@@ -24,6 +24,10 @@ pub(super) struct Run {
 
 /// A force below this share of its largest is none.
 const NO_FORCE: f64 = 0.01;
+/// A force that begins within this share of its contact after the first state may have acted before that.
+const AT_ONCE: f64 = 0.02;
+/// A constant force beside the contact's is seen where it leaves less than this share of the squares.
+const EXPLAINED: f64 = 0.01;
 /// A body that has moved by this share of what follows is slower than at the impact.
 const MOVED: f64 = 0.1;
 /// A motion that goes on for more states than this goes on without its force.
@@ -154,7 +158,13 @@ impl Record {
             impact: None,
         };
         if record.time.len() < 2 || record.closing(0) == 0.0 {
-            return unusable("the bodies do not move towards each other in its first state");
+            return unusable(&match &recipe.nodes[..] {
+                [node] => format!(
+                    "node {} does not move in its first state; if another body meets it, name both nodes (--kind pair --node ID --minus-node ID)",
+                    node.id
+                ),
+                _ => "the bodies do not move towards each other in its first state".into(),
+            });
         }
         Ok(record)
     }
@@ -196,13 +206,13 @@ impl Record {
         Some((self.force_time[first], self.force_time[last]))
     }
 
-    /// Whether the body had moved and the force acted before the motion's first state, so that its speed there is not that of
-    /// the impact.
+    /// Whether the body had moved and the force acted before the motion's first state, or just after it, so that its speed there may
+    /// not be that of the impact.
     pub(super) fn starts_in_contact(&self) -> bool {
         let moved = self.travel.iter().map(|d| (d - self.travel[0]).abs()).fold(0.0, f64::max);
-        let acts = self
-            .contact()
-            .is_some_and(|(first, last)| first <= self.time[0] && self.time[0] < last);
+        let acts = self.contact().is_some_and(|(first, last)| {
+            first - self.time[0] <= AT_ONCE * (last - first) && self.time[0] < last
+        });
         acts && self.travel[0].abs() > MOVED * moved
     }
 
@@ -244,6 +254,7 @@ impl Record {
                 .is_some_and(|e| e.name == ENERGIES[0]),
             is_shared: self.velocities.len() > 1,
             coarseness: self.coarseness().unwrap_or_default(),
+            is_late: self.starts_in_contact(),
         };
         (0..self.velocities.len()).map(estimates).collect()
     }
@@ -311,8 +322,13 @@ impl Record {
         };
         let most = acceleration(0, before).max(acceleration(free.unwrap_or(all), all));
         let change = (velocity[at] - velocity[0]).abs();
+        let while_loading = if free.is_none() {
+            constant_force(&self.impulse[..=end], &velocity[..=end], &self.time[..=end])
+        } else {
+            0.0
+        };
         let share = most * span / change;
-        if share.is_finite() { share } else { 0.0 }
+        if share.is_finite() { share.max(while_loading) } else { while_loading }
     }
 
     /// Mass of the other body over the first one's, by their changes of velocity: no force is needed for that. After the
@@ -350,6 +366,29 @@ impl Record {
         let body = 2.0 * kinetic / squares.sum::<f64>();
         (kinetic > 0.0 && body.is_finite()).then(|| shares.iter().map(|s| s * body).collect())
     }
+}
+
+/// By what share the mass from momentum changes with a constant force beside the contact's, such as a weight: where `∫F dt = m Δv + c t`
+/// leaves hardly anything of what `c = 0` leaves; else 0.
+fn constant_force(impulse: &[f64], velocity: &[f64], time: &[f64]) -> f64 {
+    let since_first = |all: &[f64], i: usize| all[i] - all[0];
+    let sum = |of: &dyn Fn(f64, f64, f64) -> f64| -> f64 {
+        let row = |i: usize| of(impulse[i], since_first(velocity, i), since_first(time, i));
+        (0..impulse.len()).map(row).sum()
+    };
+    let [jv, jt, vv, vt, tt] = [
+        sum(&|j, v, _| j * v),
+        sum(&|j, _, t| j * t),
+        sum(&|_, v, _| v * v),
+        sum(&|_, v, t| v * t),
+        sum(&|_, _, t| t * t),
+    ];
+    let (alone, mass) = (jv / vv, (jv * tt - jt * vt) / (vv * tt - vt * vt));
+    let constant = (jt - mass * vt) / tt;
+    let left = sum(&|j, v, t| (j - mass * v - constant * t).powi(2));
+    let share = (mass / alone - 1.0).abs();
+    let is_explained = left < EXPLAINED * sum(&|j, v, _| (j - alone * v).powi(2));
+    if is_explained && share.is_finite() { share } else { 0.0 }
 }
 
 /// Slope of the line of least squares through values over time, less what values that scatter about it so widely may show
@@ -405,5 +444,20 @@ mod tests {
         }
         let noise = |t: f64| ((t * 1e5).sin() * 43758.5453).fract();
         assert_eq!(of(&noise), 0.0);
+    }
+
+    /// A mass of 250 kg that falls onto a crush zone: its weight shows in the loading; a crush zone with mass of its own does not pass for one.
+    #[test]
+    fn a_weight_is_told_from_a_crush_zone() {
+        let time: Vec<f64> = (0..200).map(|i| f64::from(i) * 2e-4).collect();
+        let velocity: Vec<f64> = time.iter().map(|t| 5.0 - 100.0 * t - 400.0 * t * t).collect();
+        let of = |more: &dyn Fn(f64) -> f64| {
+            let impulse = velocity.iter().zip(&time).map(|(v, &t)| 250.0 * (5.0 - v) + more(t));
+            constant_force(&impulse.collect::<Vec<f64>>(), &velocity, &time)
+        };
+        assert_eq!(of(&|_| 0.0), 0.0);
+        let share = of(&|t| 250.0 * 9.81 * t);
+        assert!((0.07..0.12).contains(&share), "{share}");
+        assert_eq!(of(&|t| 25.0 * 5.0 * (t / 0.03).min(1.0)), 0.0);
     }
 }

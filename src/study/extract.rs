@@ -11,7 +11,7 @@ use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::file::{absolute, is_file};
 use crate::history::{EntityId, History, Side};
 use crate::solver::{self, Selection, SolverFile, WantedId};
-use crate::unit::{Shown, UnitSystem};
+use crate::unit::{Shown, SpeedKind, UnitSystem};
 
 impl LocatedRun<'_> {
     pub(crate) fn extract(&self) -> Result<Case, Error> {
@@ -180,6 +180,16 @@ impl LocatedRun<'_> {
             remarks.note(format!(
                 "force: side {} of interface {id} is used, since the recipe names none",
                 side.name()
+            ));
+        }
+        if self.study.speed_kind() == SpeedKind::Wall
+            && let Some(RunDeck { file, deck }) = &self.deck
+            && let Some(wall) = deck.moving_wall()
+        {
+            remarks.warn(format!(
+                "the wall of the deck {}, {}, moves: speed, deflection and energy are the body's own, and not those of the impact",
+                shown_name(&file.path),
+                deck.line(wall.at)
             ));
         }
         compare_text_with_binary(&files.motion, remarks)?;

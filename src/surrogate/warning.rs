@@ -193,7 +193,7 @@ impl Warning {
         Self {
             code: WarningCode::ModeSwitch,
             message: format!(
-                "the training curves differ between {} and {} by more than a shift of their peaks and steps with the speed: the collapse mode changes there, and a run between the two may follow either",
+                "the training curves differ between {} and {} by more than a shift of their peaks and steps with the speed: the collapse mode may change there, and a run between the two may follow either",
                 km_per_h(below),
                 km_per_h(above)
             ),

@@ -129,9 +129,14 @@ pub(crate) fn curve_of(
             let is_second_hit = says("contact: ignored")
                 && recorded_m_per_s
                     .is_some_and(|v| v < (1.0 - SECOND_HIT) * record.first_rate_m_per_s.abs());
-            return Err(
-                if is_second_hit { impossible.by_earlier_force() } else { impossible }.into()
-            );
+            let is_cut =
+                setup.stated.offset_m > 0.0 && claim.balance().work.is_some_and(|work| work < 1.0);
+            let impossible = match is_second_hit {
+                true => impossible.by_earlier_force(),
+                false if is_cut => impossible.by_offset(),
+                false => impossible,
+            };
+            return Err(impossible.into());
         }
     };
     remarks.append(accepted(along_time)?);

@@ -37,8 +37,9 @@ enum StartBy {
     /// The first state, which is in contact already; the crush before it, at least and at most, and whether the run's speed is
     /// that of this state.
     FirstState { missing_m: (f64, f64), at_full_speed: bool, at_most_s: Option<f64> },
-    /// A crossing within an output interval of this length.
-    Crossing { interval_s: f64, at_most_s: Option<f64> },
+    /// A crossing within an output interval of this length; what the body had moved before the first state, if that is so near
+    /// that a contact before it would be the same.
+    Crossing { interval_s: f64, at_most_s: Option<f64>, moved_m: f64 },
     /// The deceleration of the body, which starts later: reported where it is found.
     Body,
 }
@@ -97,7 +98,11 @@ impl Start {
         }
         let by = match onset.interval_s {
             _ if of_body => StartBy::Body,
-            Some(interval_s) => StartBy::Crossing { interval_s, at_most_s: onset.at_most_s },
+            Some(interval_s) => {
+                let is_near = onset.time_s - record.time_s[0] < contact::PAUSE_S;
+                let moved_m = if is_near { record.deflection_m[0].abs() } else { 0.0 };
+                StartBy::Crossing { interval_s, at_most_s: onset.at_most_s, moved_m }
+            }
             None => {
                 let missing_m = missing_m(record, setup);
                 // Its displacement does not count from there, so it has been slowed down.
@@ -115,8 +120,15 @@ impl Start {
         let crush_m = curve.deflection_m()[loading::loading_end(curve)];
         let step_m = |interval_s: f64| contact.closing_m_per_s[0].abs() * interval_s;
         match self.by {
+            StartBy::Crossing { moved_m, .. } if moved_m > MISSING_SHARE * crush_m => {
+                remarks.warn(format!(
+                    "contact: the body had moved {:.1} mm before the record's first state, and the force begins less than 10 ms after it: if contact began before, that crush is missing and the speed is that of a body which has been slowed down; provide the earlier states",
+                    moved_m * 1e3
+                ));
+            }
             StartBy::Crossing { .. } | StartBy::FirstState { .. } | StartBy::Body
-                if impulse_share_to(curve, BEGINNING.0 * crush_m) < BEGINNING.1 =>
+                if setup.stated.offset_m <= 0.0
+                    && impulse_share_to(curve, BEGINNING.0 * crush_m) < BEGINNING.1 =>
             {
                 remarks.warn(format!(
                     "contact: the first {:.0} % of the crush ({:.0} mm) contribute less than {} % of the impulse: if contact starts later, set contact_time or gap in the run",
@@ -125,7 +137,7 @@ impl Start {
                     BEGINNING.1 * 100.0
                 ));
             }
-            StartBy::Crossing { interval_s, at_most_s }
+            StartBy::Crossing { interval_s, at_most_s, .. }
                 if step_m(interval_s) > CERTAIN_SHARE * crush_m =>
             {
                 let most_mm = at_most_s.filter(|&s| s > interval_s).map(|most_s| {
@@ -175,13 +187,22 @@ impl Start {
                         ),
                     ),
                 };
-                let speed = if at_full_speed && missing_m.1 > SLOWING_SHARE * crush_m {
-                    ", and the run's speed is that of its first state, by when it has been slowed down: state the impact speed"
-                } else {
-                    ""
+                // What the force did over so much of the crush no speed and no offset can tell.
+                let is_much = least_m > SLOWING_SHARE * crush_m;
+                let remedy = match at_full_speed && most_m > SLOWING_SHARE * crush_m {
+                    true if is_much => ", and the run's speed is that of its first state, by when it has been slowed down: provide the earlier states, or leave the run out".into(),
+                    true => format!(
+                        ", and the run's speed is that of its first state, by when it has been slowed down: state the impact speed; {offset}, or provide the earlier states"
+                    ),
+                    false if is_much => "; provide the earlier states, or leave the run out".into(),
+                    false => format!("; {offset}, or provide the earlier states"),
+                };
+                let gap = match is_much && least_m == most_m {
+                    true => ", less any gap that the body had to cross first",
+                    false => "",
                 };
                 remarks.warn(format!(
-                    "contact: the record starts at {}, in contact: the first {} of the crush ({shares}) are missing{speed}; {offset}, or provide the earlier states",
+                    "contact: the record starts at {}, in contact: the first {} of the crush ({shares}{gap}) are missing{remedy}",
                     milliseconds(self.time_s),
                     shown_missing(missing_m)
                 ));
@@ -354,7 +375,10 @@ impl FromContact {
             closed_s(record, contact_s, -offset_m, most_m, travel)?
         };
         if offset_m != 0.0 {
-            remarks.note(format!("offset: the deflection at contact is {} mm", offset_m * 1e3));
+            remarks.note(format!(
+                "offset: the deflection at contact is {} mm",
+                (offset_m * 1e6).round() / 1e3
+            ));
         }
         let next = record.time_s.partition_point(|&t| t <= start_s);
         let (mut time_s, mut deflection_m) = (vec![0.0], vec![offset_m.max(0.0)]);

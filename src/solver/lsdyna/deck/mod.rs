@@ -210,13 +210,18 @@ impl Deck {
         most.next().is_none().then_some((units, said))
     }
 
+    /// The first wall that moves, by its keyword.
+    pub(crate) fn moving_wall(&self) -> Option<&DeckEntity> {
+        let moves = |w: &&DeckEntity| w.keyword.split('_').any(|o| o == "MOVING" || o == "MOTION");
+        self.rigid_walls.iter().find(moves)
+    }
+
     /// The speed at which the model starts to move, in the deck's units, and where the first velocity
     /// is given: that of all initial velocities that are not zero, when they agree in size and
     /// direction (to 1e-6, since decks write seven digits). `None` when there is none, when they differ, when one turns or is
     /// not known, or when a wall moves. An include that is missing may hide more.
     pub fn impact_speed(&self) -> Option<(f64, DeckPlace)> {
-        let moves = |w: &DeckEntity| w.keyword.split('_').any(|o| o == "MOVING" || o == "MOTION");
-        if self.rigid_walls.iter().any(moves) {
+        if self.moving_wall().is_some() {
             return None;
         }
         let mut first: Option<([f64; 3], f64, DeckPlace)> = None;
