@@ -316,8 +316,8 @@ class Histories(_Table, _Mapping):
 def read(path, ids=None, components=None, section=None, format=None):
     """Read a solver's file: any that the program reads (nodout, rcforc, binout, T01, ...). Values are in the file's units.
 
-    Of a run's folder all these files are read, without those that lack what is selected; of two sections of one name each has that of
-    its file before it, "binout0000/nodout".
+    Of a run's folder all these files are read, each for those of the ids and components that it has, without those that have none;
+    of two sections of one name each has that of its file before it, "binout0000/nodout".
 
     Only what is selected is parsed: `ids` (numbers, or texts such as "3:surfa"), `components` (named as in binout), one or
     several, a `section` of a binout. Damage is not an error: `problems` names it.
@@ -327,15 +327,29 @@ def read(path, ids=None, components=None, section=None, format=None):
     # Here, since an iterator has its items once, and a folder has several files.
     ids, components = _listed(ids), _listed(components)
 
-    def sections(file):
+    def sections(file, ids=ids, components=components):
         return [Section(*of) for of in _crumple.read(os.fspath(file), ids, components, section, format)]
+
+    def held(all_of, is_held):
+        several = all_of is not None and len(all_of) > 1
+        return [one for one in all_of if is_held(one)] or all_of if several else all_of
+
+    def holds(file, *selected):
+        try:
+            return sections(file, *selected) is not None
+        except Error:
+            return False
 
     if not os.path.isdir(path):
         return Histories(Path(path), sections(path))
+    missing = {*(ids or ()), *(components or ())}
     found, error = [], Error(f"{os.fspath(path)}: there are no solver files in this folder")
     for file in _crumple.files(os.fspath(path)):
         try:
-            found += [(file, of) for of in sections(file)]
+            of_file = held(components, lambda one: holds(file, [], [one]))
+            ids_of_file = ids if holds(file, ids, of_file) else held(ids, lambda one: holds(file, [one], of_file))
+            found += [(file, of) for of in sections(file, ids_of_file, of_file)]
+            missing -= {*(ids_of_file or ()), *(of_file or ())}
         except Error as unread:
             if ids is components is section is None:
                 raise
@@ -345,6 +359,8 @@ def read(path, ids=None, components=None, section=None, format=None):
             error = unread
     if not found:
         raise error
+    if missing:
+        raise Error(f"{os.fspath(path)}: no file of this folder has {', '.join(sorted(missing))}")
     names = [of.name for _, of in found]
     for file, of in found:
         if names.count(of.name) > 1:

@@ -51,6 +51,13 @@ def test_a_run_is_read_from_its_folder(tmp_path):
         for components in ([component], iter([component])):
             read = crumple.read(NODOUT.parent, components=components)
             assert {name: list(section) for name, section in read.items()} == {name: [component]}
+    # Each file is read for what it has of them.
+    for selected in ({"components": ["x_velocity", "normal_force"]}, {"ids": [900001, 1], "components": ["x_velocity", "normal_force"]}):
+        read = crumple.read(NODOUT.parent, **selected)
+        assert {name: list(section) for name, section in read.items()} == {"nodout": ["x_velocity"], "rwforc": ["normal_force"]}
+    for selected in ({"components": ["x_velocity", "no_force"]}, {"ids": [900001, 5], "components": "x_velocity"}):
+        with pytest.raises(crumple.Error, match="no file of this folder has (no_force|5)"):
+            crumple.read(NODOUT.parent, **selected)
     with pytest.raises(crumple.Error):
         crumple.read(NODOUT.parent, ids=5)
     with pytest.raises(crumple.Error, match="there are no solver files in this folder"):
