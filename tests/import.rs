@@ -580,7 +580,7 @@ fn names_speeds_and_kinds_are_asked_for_and_nothing_is_written_before_all_fits()
         (2, &["--case", "a", "--case", "b"][..], "--case is given 2 times for 1 file"),
         (2, &["--other-mass", "3t"][..], "a wall has no mass: remove --other-mass"),
         (1, &["--case", "a/b"][..], "\"a/b\" cannot be the name of a case: it may not contain"),
-        (1, &["--from", "xyz"][..], "there is no format \"xyz\" of curves that can be read: use one of mat, mdf, json, lsdyna"),
+        (2, &["--from", "xyz"][..], "there is no format \"xyz\" of curves that can be read: use one of mat, mdf, json, lsdyna"),
     ];
     cases.into_iter().for_each(|(code, more, expected)| t_with(code, more, expected));
     #[rustfmt::skip]

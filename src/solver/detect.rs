@@ -143,7 +143,7 @@ pub(super) fn named(name: &str) -> Result<&'static Format, Error> {
     FORMATS.iter().find(|f| f.name == name).ok_or_else(|| {
         let known = format_names();
         let hint = guess::hint(name, &known);
-        error!(SolverFile, "there is no format \"{name}\": the readers take {known}{hint}")
+        error!(Usage, "there is no format \"{name}\": the readers take {known}{hint}")
     })
 }
 

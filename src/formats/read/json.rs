@@ -28,7 +28,9 @@ fn parse(bytes: &[u8]) -> Result<PredictedCurve, Error> {
         .caused_by(source)
     })?;
     curve.envelope()?;
-    curve.driving_envelope()?;
+    if curve.body_force_n.is_some() {
+        curve.driving_envelope()?;
+    }
     Ok(curve)
 }
 

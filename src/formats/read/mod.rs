@@ -321,7 +321,7 @@ fn reader(input: &Input<'_>) -> Result<&'static Reader, Error> {
         return found.ok_or_else(|| {
             let known = known();
             error!(
-                CurveFile,
+                Usage,
                 "there is no format \"{name}\" of curves that can be read: use one of {known}{}",
                 guess::hint(name, &known)
             )
