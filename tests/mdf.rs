@@ -221,6 +221,7 @@ fn what_asammdf_writes_is_read() {
             "two.mf4",
             "the file holds several curves: choose one with --curve: 1 (\"time [s], crush [m], load [N]\"), 2",
         ),
+        ("apart.mf4", "; deflection and force are in different groups: resample them to"),
         ("none.mf4", "expected"),
         ("old.mdf", "expected MDF of version 4, found an earlier version: save it as MDF 4"),
     ] {

@@ -53,6 +53,10 @@ def write(folder, curve):
         file.append(signals("double", time, deflection, share * force), common_timebase=True)
     file.save(f"{folder}/two.mf4", overwrite=True)
     file = MDF(version="4.10")
+    for name, unit, values in (("Displacement", "m", deflection), ("Force", "N", force)):
+        file.append([Signal(values, time, name=name, unit=unit)])
+    file.save(f"{folder}/apart.mf4", overwrite=True)
+    file = MDF(version="4.10")
     file.append([Signal(np.arange(10.0), np.arange(10.0), name="temperature", unit="C")])
     file.save(f"{folder}/none.mf4", overwrite=True)
     # Every tenth force is marked as invalid, and wrong; arrays; conversions by a table; a comment like our facts.

@@ -382,14 +382,24 @@ fn chosen(groups: &[Group], asked: Option<&str>) -> Result<usize, Error> {
     let curves: Vec<usize> = (0..groups.len()).filter(|k| groups[*k].is_curve()).collect();
     match (asked, &*curves) {
         (None, [only]) => Ok(*only),
+        (None, [])
+            if groups.iter().any(|of| of.has(Quantity::Deflection))
+                && groups.iter().any(|of| of.has(Quantity::Force)) =>
+        {
+            let apart = "; deflection and force are in different groups: resample them to the same times, in one group";
+            choose(listed, asked).map_err(|error| error.followed_by(apart))
+        }
         _ => choose(listed, asked),
     }
 }
 
 impl Group {
+    fn has(&self, wanted: Quantity) -> bool {
+        self.channels.iter().any(|channel| channel.quantity() == Some(wanted))
+    }
+
     fn is_curve(&self) -> bool {
-        let has = |wanted| self.channels.iter().any(|channel| channel.quantity() == Some(wanted));
-        has(Quantity::Deflection) && has(Quantity::Force)
+        self.has(Quantity::Deflection) && self.has(Quantity::Force)
     }
 
     /// Its header and rows as the lines of a table; how many rows are left out, since a value in them is marked as invalid.
