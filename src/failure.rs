@@ -3,7 +3,6 @@
 use std::error::Error;
 use std::io;
 
-use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::error::{self, ErrorCode, Place};
@@ -26,14 +25,16 @@ pub const EXIT_CODES: [(u8, &str); 4] = [
 ];
 
 /// What `--json` prints on standard output when a command fails.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct ErrorDocument {
     /// The error.
     pub(crate) error: ErrorReport,
 }
 
 /// One error.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct ErrorReport {
     /// Its kind; a code never changes its meaning.
     pub code: ErrorCode,

@@ -27,7 +27,8 @@ pub(crate) const M_PER_S_PER_KM_PER_H: f64 = 1.0 / 3.6;
 pub(crate) const M_PER_S_PER_MPH: f64 = 0.44704;
 
 /// What a speed is measured against. A speed is never stated without it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum SpeedKind {
     /// Speed of one body that hits a rigid wall.
@@ -457,6 +458,7 @@ impl Serialize for UnitSystem {
     }
 }
 
+#[cfg(test)]
 impl schemars::JsonSchema for UnitSystem {
     fn schema_name() -> std::borrow::Cow<'static, str> {
         "UnitSystem".into()
@@ -511,6 +513,7 @@ macro_rules! texts_with_units {
             }
         }
 
+        #[cfg(test)]
         impl schemars::JsonSchema for $name {
             fn schema_name() -> std::borrow::Cow<'static, str> {
                 stringify!($name).into()

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::surrogate::leave_one_out::{LeftOut, Validation};
@@ -11,7 +10,8 @@ use crate::surrogate::leave_one_out::{LeftOut, Validation};
 pub(crate) type Pair = [Option<f64>; 2];
 
 /// An earlier validation of the same group beside this one.
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Against {
     /// The model chosen before.
     pub chosen_before: String,
@@ -28,7 +28,8 @@ pub(crate) struct Against {
 }
 
 /// Errors before and now.
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Changed {
     /// The model or the case.
     pub name: String,

@@ -10,7 +10,6 @@
 //! Tried and dropped: a mean of `crush-law` with `rate` or `gaussian-process`. It takes a little off the force error where runs are few,
 //! and adds to the velocity error where they are many.
 
-use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::dataset::{TrainingSet, is_within, nearly_same};
@@ -160,7 +159,8 @@ pub(crate) fn scores<'a>(
 }
 
 /// The speed whose FE run would help most.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct NextRun {
     /// The speed to run, in m/s.
     pub speed_m_per_s: f64,
@@ -176,7 +176,8 @@ pub(crate) struct NextRun {
 }
 
 /// A gap between two neighbouring training speeds, and what a run in its middle would bring.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Gap {
     /// The two speeds, in m/s.
     pub between_m_per_s: (f64, f64),

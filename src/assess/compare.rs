@@ -1,7 +1,6 @@
 //! Comparison of the methods at a left-out speed: the curve of each in the same multi-body
 //! model, against FE.
 
-use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::left_out::{LeftOutCase, NotLeftOut};
@@ -19,7 +18,8 @@ use crate::plural::counted;
 use crate::unit::{SpeedKind, km_per_h};
 
 /// Errors of every method at one left-out speed.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Comparison {
     /// Name of the group.
     pub group: String,
@@ -56,7 +56,8 @@ pub(crate) struct Comparison {
 }
 
 /// What the fits of the spring and damper are worth.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct NsdmReport {
     /// Name of the case that they are fitted to.
     pub fitted_to: String,
@@ -67,12 +68,13 @@ pub(crate) struct NsdmReport {
     /// Of each seed: errors at the speed it was fitted at, and here.
     pub fits: Vec<NsdmFit>,
     /// How far the fits differ; null for fewer than three.
-    #[schemars(with = "Option<serde_json::Value>")]
+    #[cfg_attr(test, schemars(with = "Option<serde_json::Value>"))]
     pub identifiability: Option<Identifiability>,
 }
 
 /// One fit of the spring and damper.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct NsdmFit {
     /// Seed of its random draws.
     pub seed: u64,
@@ -88,7 +90,7 @@ pub(crate) struct NsdmFit {
     pub fit_time_s: f64,
     /// Secant stiffness over the deflection and damping over the speed, linear between the points and held beyond:
     /// `deflection_m`, `stiffness_N_per_m`, `speed_m_per_s`, `damping_N_s_per_m`; the force is `k(x) x + c(|x'|) x'`.
-    #[schemars(with = "serde_json::Value")]
+    #[cfg_attr(test, schemars(with = "serde_json::Value"))]
     pub law: Nsdm,
 }
 

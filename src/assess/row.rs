@@ -2,7 +2,6 @@
 
 use std::time::Instant;
 
-use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::left_out::{STEPS, forces_n};
@@ -17,7 +16,8 @@ use crate::rating::{Quantity, Rating, RatingSettings, Signal, rate};
 use crate::signal::l1_ratio;
 
 /// One method.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Row {
     /// `fe` (FE's own curve of the recipe's force: the floor of a one-mass model), `fe_body` (of the
     /// body's motion, made from FE's speeds: a check of consistency), `fdrm`, `nsdm`, `ddtcm`,

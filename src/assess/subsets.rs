@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
 use rayon::prelude::*;
-use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::choose::{Purpose, physical, scores};
@@ -28,7 +27,8 @@ const SIZES: [u32; 2] = [4, 5];
 const SPEEDS: RangeInclusive<usize> = 5..=12;
 
 /// A model, or the choice among all, over the subsets of a group.
-#[derive(Clone, Debug, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct OverSubsets {
     /// Name of the model, or `auto`.
     pub model: String,

@@ -8,7 +8,6 @@
 use std::collections::BTreeMap;
 
 use rayon::prelude::*;
-use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::against::Against;
@@ -34,14 +33,16 @@ pub(crate) const MOST_SPEEDS: usize = 20;
 const FURTHER_ENDS: usize = 2;
 
 /// What `crumple validate --json` prints.
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Report {
     /// In the order of the database.
     pub(crate) groups: Vec<GroupReport>,
 }
 
 /// One group: its table, or why there is none.
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(untagged)]
 pub(crate) enum GroupReport {
     /// The table of a group.
@@ -72,7 +73,8 @@ pub(crate) enum GroupReport {
 }
 
 /// The prediction of a left-out speed by the acceptance rule.
-#[derive(Debug, Serialize, JsonSchema)]
+#[derive(Debug, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Accepted {
     /// Name of the case.
     pub case: String,

@@ -323,20 +323,6 @@ fn flags_first(mut arguments: Vec<OsString>) -> Vec<OsString> {
     arguments
 }
 
-/// The JSON schemas of the files and documents, by their names in `schemas/`.
-pub fn schemas() -> [(&'static str, schemars::Schema); 8] {
-    [
-        ("study.schema.json", schemars::schema_for!(crate::study::Manifest)),
-        ("scenario.schema.json", schemars::schema_for!(crate::scenario::Scenario)),
-        ("plan.schema.json", schemars::schema_for!(crate::plan::PlanFile)),
-        ("predicted_curve.schema.json", schemars::schema_for!(crate::surrogate::PredictedCurve)),
-        ("validation.schema.json", schemars::schema_for!(crate::assess::Report)),
-        ("rating.schema.json", schemars::schema_for!(crate::rating::Rating)),
-        ("acceptance.schema.json", schemars::schema_for!(crate::rating::acceptance::RunAcceptance)),
-        ("error.schema.json", schemars::schema_for!(ErrorDocument)),
-    ]
-}
-
 /// The document of an error; without standard output its message.
 fn print_document(document: &ErrorDocument) {
     if output::print_json(document).is_err() {
@@ -403,5 +389,33 @@ fn print_error(error: &(dyn Error + 'static)) {
     output::eprint_excerpt(failure::place(error));
     for cause in failure::causes(error) {
         output::eprint_line(&format!("  because: {cause}"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use schemars::schema_for;
+
+    /// To write them again: CRUMPLE_WRITE_SCHEMAS=1 cargo test --lib schemas
+    #[test]
+    fn schemas_are_those_of_the_types() {
+        for (name, schema) in [
+            ("study", schema_for!(crate::study::Manifest)),
+            ("scenario", schema_for!(crate::scenario::Scenario)),
+            ("plan", schema_for!(crate::plan::PlanFile)),
+            ("predicted_curve", schema_for!(crate::surrogate::PredictedCurve)),
+            ("validation", schema_for!(crate::assess::Report)),
+            ("rating", schema_for!(crate::rating::Rating)),
+            ("acceptance", schema_for!(crate::rating::acceptance::RunAcceptance)),
+            ("error", schema_for!(super::ErrorDocument)),
+        ] {
+            let path = format!("{}/schemas/{name}.schema.json", env!("CARGO_MANIFEST_DIR"));
+            let text = serde_json::to_string_pretty(&schema).unwrap() + "\n";
+            if std::env::var_os("CRUMPLE_WRITE_SCHEMAS").is_some() {
+                std::fs::write(&path, &text).unwrap();
+            }
+            let committed = std::fs::read_to_string(&path).unwrap_or_default();
+            assert!(committed == text, "{name} is not what the types say: see above");
+        }
     }
 }

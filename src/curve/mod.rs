@@ -19,7 +19,6 @@ pub(crate) mod stopped_mass;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, error};
@@ -101,9 +100,8 @@ impl Curve {
 }
 
 /// Which force a curve is: the two differ by what is stopped inside the crush zone.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, schemars::JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum ForceKind {
     /// The force on the obstacle: wall, contact side, section.
@@ -205,7 +203,8 @@ pub struct SourceFile {
 
 /// A further case parameter besides speed: a number whose name carries its unit
 /// (`angle_deg`), or a category (`obstacle`).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "expected a number, or a text such as \"yes\"")]
 pub enum Parameter {
     /// A number, in the unit that the parameter's name ends with.

@@ -1,12 +1,12 @@
 //! The recipe of a study: which histories make a curve, and how.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::history::{EntityId, Side};
 
 /// How curves are extracted from the runs of a study.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Recipe {
     /// Where the deflection comes from.
@@ -36,7 +36,8 @@ impl Recipe {
 }
 
 /// Displacement of one node, or the difference of two.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DeflectionSource {
     /// File in the run's folder.
@@ -62,7 +63,8 @@ impl std::fmt::Display for DeflectionSource {
 }
 
 /// Direction of the deflection.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 #[allow(clippy::enum_variant_names, reason = "the names are the components' in the files")]
 pub(crate) enum DisplacementComponent {
@@ -112,9 +114,10 @@ impl DisplacementComponent {
 }
 
 /// Where the force comes from.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(try_from = "ForceTable", into = "ForceTable")]
-#[schemars(with = "ForceTable")]
+#[cfg_attr(test, schemars(with = "ForceTable"))]
 pub enum ForceSource {
     /// A contact force: rigid wall, side of an interface.
     Contact {
@@ -172,7 +175,8 @@ pub enum RecordedMotion {
 }
 
 /// The force as written in a manifest.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 struct ForceTable {
     /// File in the run's folder.
@@ -194,7 +198,8 @@ struct ForceTable {
 }
 
 /// One number, or several.
-#[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "expected the number of a wall or contact, or a list of numbers")]
 enum Ids {
     One(i64),
@@ -287,9 +292,10 @@ impl From<ForceSource> for ForceTable {
 }
 
 /// Filter of the force: `"CFC60"` (default), another class, or `"none"`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(try_from = "String", into = "String")]
-#[schemars(with = "String")]
+#[cfg_attr(test, schemars(with = "String"))]
 pub enum Filter {
     /// No filter.
     None,
@@ -328,9 +334,10 @@ impl From<Filter> for String {
 }
 
 /// The common times of all cases: `states` from contact on, one every `interval_ms`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(try_from = "SamplingTable", into = "SamplingTable")]
-#[schemars(with = "SamplingTable")]
+#[cfg_attr(test, schemars(with = "SamplingTable"))]
 pub struct Sampling {
     /// Number of states, from contact on.
     pub states: usize,
@@ -346,7 +353,8 @@ impl std::fmt::Display for Sampling {
     }
 }
 
-#[derive(Clone, Copy, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 struct SamplingTable {
     /// 2 to 1 000 000.

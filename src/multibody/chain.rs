@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use schemars::JsonSchema;
 use serde::Deserialize;
 
 use super::law::ForceLaw;
@@ -32,7 +31,8 @@ impl Body {
 
 /// Resistance against a body's motion over the track,
 /// `R = m (A + B|v| + C v² + μ g) sgn(v)`, with `sgn` smoothed to `tanh(v / 0.05 m/s)`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields, default)]
 pub struct Resistance {
     /// `A` of the running resistance (Davis' equation per mass), in m/s².

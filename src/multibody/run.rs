@@ -1,6 +1,5 @@
 //! Settings and results of a run: method, times, histories, the ledger of energy and momentum, warnings, errors.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::chain::{Body, Chain, Interface};
@@ -16,7 +15,8 @@ const DEFAULT_STEP_S: f64 = 1e-5;
 const FOURTH_ORDER_STEP_S: f64 = 3.5e-4;
 
 /// How the motion is integrated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// Velocity Verlet, of order 2.

@@ -7,7 +7,6 @@ pub(crate) mod draw;
 
 use std::fmt;
 
-use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::error::{Error, error};
@@ -18,7 +17,8 @@ use draw::Distribution;
 pub(crate) const MAX_ITEMS: u64 = 1_000_000_000_000;
 
 /// A `--plan` file: the `[sweep]` table by itself.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PlanFile {
     /// What is varied.
@@ -30,7 +30,8 @@ pub(crate) struct PlanFile {
 /// Variables with `values` or `steps` form a grid: all combinations, the last one listed
 /// changing fastest. Variables with a `distribution` are drawn `samples` times at each point
 /// of the grid.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Plan {
     /// Of the random draws; 0 if absent.
@@ -48,7 +49,8 @@ pub(crate) struct Plan {
 }
 
 /// How distributions are drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Sampling {
     /// Each draw by itself (Monte Carlo).
@@ -60,7 +62,8 @@ pub(crate) enum Sampling {
 }
 
 /// A result of each run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum ResultName {
     /// Of each interface.
@@ -140,7 +143,8 @@ pub(crate) const RESULTS: [ResultName; 14] = [
 ];
 
 /// One thing that is varied.
-#[derive(Clone, Debug, Default, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Vary {
     /// What is varied.
@@ -184,7 +188,8 @@ pub(crate) struct Vary {
 }
 
 /// What is varied.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum What {
     /// Speed of a train.
@@ -216,7 +221,8 @@ impl What {
 }
 
 /// Vehicles by name, or all of them.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(untagged, expecting = "expected a list of vehicles, or \"all\"")]
 pub(crate) enum Vehicles {
     /// By name.
@@ -226,7 +232,8 @@ pub(crate) enum Vehicles {
 }
 
 /// Distribution of a variable.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum DistributionName {
     /// `from`, `to`.
@@ -269,7 +276,8 @@ impl<'de> Deserialize<'de> for Entry {
     }
 }
 
-impl JsonSchema for Entry {
+#[cfg(test)]
+impl schemars::JsonSchema for Entry {
     fn schema_name() -> std::borrow::Cow<'static, str> {
         "Entry".into()
     }

@@ -1,7 +1,6 @@
 //! The acceptance rule for numerical crash models that rail practice quotes from EN 15227: the same sequence, dissipated
 //! energy within 10 % of the initial energy, displacement and mean force of each stage within 10 %.
 
-use schemars::JsonSchema;
 use serde::Serialize;
 
 /// The edition in force; its text is not public, so the rule is stated here as practice quotes it.
@@ -13,7 +12,8 @@ pub(crate) const ACCEPTANCE: &str =
 pub(crate) const LIMIT: f64 = 0.1;
 
 /// A prediction's errors by the rule. Errors are prediction over reference minus 1, but for the energy.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Acceptance {
     /// Difference of the dissipated energies over the initial energy.
     pub energy_error: f64,
@@ -52,7 +52,8 @@ pub(crate) struct StageRecord<'a> {
 }
 
 /// What a stage came to.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct StageResult {
     /// Until the end of the record: what came back is not in it.
     #[serde(rename = "dissipated_J")]
@@ -116,7 +117,8 @@ fn relative(prediction: f64, reference: f64) -> f64 {
 }
 
 /// One stage of both runs.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct StageAcceptance {
     pub stage: String,
     pub reference: StageResult,
@@ -128,7 +130,8 @@ pub(crate) struct StageAcceptance {
 }
 
 /// Two runs by the rule.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct RunAcceptance {
     pub standard: &'static str,
     pub limit: f64,

@@ -8,7 +8,6 @@
 
 use std::f64::consts::{FRAC_PI_4, PI};
 
-use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::iso18571::{MOST_SAMPLES, corridor};
@@ -20,7 +19,8 @@ const SMALL: f64 = 0.05;
 const CANCELS: f64 = 0.05;
 
 /// Mean of `|p − r|/|r|` over the samples where `|r|` is at least 5 % of its maximum.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Pointwise {
     /// The mean; 0 where the signals agree.
     pub mean: f64,
@@ -29,7 +29,8 @@ pub(crate) struct Pointwise {
 }
 
 /// The largest difference.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct MaxAbs {
     /// `|p − r|`, in the unit of the signals.
     pub value: f64,
@@ -103,7 +104,8 @@ pub(crate) fn integral_error(along: &[f64], reference: &[f64], prediction: &[f64
 }
 
 /// Errors of magnitude and of phase, and their combination; 0 where the signals agree.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct MagnitudePhase {
     /// Above 0 if the prediction is larger.
     pub magnitude: f64,
@@ -163,7 +165,8 @@ const D_MAX: f64 = 0.12;
 const WEIGHTS: [f64; 3] = [0.5, 0.25, 0.25];
 
 /// Ratings of CORA, each from 0 to 1.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Cora {
     /// Corridor of 5 % and 50 % of the reference's largest magnitude, exponent 2.
     pub corridor: f64,
@@ -235,7 +238,8 @@ const LEAST_CHANGE: f64 = 0.005;
 const MOVING_MEAN_S: f64 = 0.120;
 
 /// Means of a deceleration, in the unit of the signal.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Deceleration {
     /// Mean of −a from the first instant at which it exceeds 5 % of its largest value until it
     /// next returns to zero or the interval ends; null if it is never above zero. Where only the

@@ -1,7 +1,6 @@
 //! ISO/TS 18571:2014: objective rating metric of two signals that are not ambiguous, with its
 //! corridor and dynamic time warping.
 
-use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::signal::{best, centred};
@@ -24,7 +23,8 @@ pub(crate) const LEAST_SAMPLES: usize = 12;
 pub(crate) const MOST_SAMPLES: usize = 20_000;
 
 /// Scores of ISO/TS 18571, each from 0 to 1, and the rating they give.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Iso18571 {
     /// Corridor score Z.
     pub corridor: f64,
@@ -44,7 +44,8 @@ pub(crate) struct Iso18571 {
 }
 
 /// Grades of ISO/TS 18571, table 3.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Grade {
     /// R above 0.94.

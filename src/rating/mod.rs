@@ -17,7 +17,6 @@ pub(crate) mod differences;
 pub(crate) mod iso18571;
 mod signal;
 
-use schemars::JsonSchema;
 use serde::Serialize;
 
 use crate::error::Error;
@@ -34,7 +33,8 @@ use signal::LEAST_SAMPLES;
 pub(crate) use signal::{INTERVAL_S, Pair, Signal};
 
 /// What two signals are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Quantity {
     /// Means of the deceleration are rated as well.
@@ -72,7 +72,8 @@ pub(crate) struct RatingSettings {
 ///
 /// `r` is the reference, `p` the prediction, at the same times. Errors are 0 and scores 1 where
 /// they agree. What has no meaning, such as a ratio to zeros, is null.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Rating {
     /// The signal that is taken as correct.
     pub(crate) reference: Rated,
@@ -121,7 +122,8 @@ pub(crate) struct Rating {
 }
 
 /// A signal that was rated.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Rated {
     /// Name of its column.
     pub name: String,
@@ -141,7 +143,8 @@ impl Rated {
 }
 
 /// A peak of the reference and the peak of the prediction that is nearest to it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Peak {
     /// Time of the reference's peak, in s.
     pub time_s: f64,
@@ -155,7 +158,8 @@ pub(crate) struct Peak {
 }
 
 /// Decelerations of both signals.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct Decelerations {
     /// Of the reference.
     pub reference: Deceleration,

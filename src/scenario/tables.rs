@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::curve::{ForceKind, Parameter};
@@ -16,7 +15,8 @@ use crate::unit::{
 };
 
 /// A scenario as written.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
     /// Times of the run.
@@ -38,7 +38,8 @@ pub struct Scenario {
 }
 
 /// Limits of a standard, as configuration: they belong to an edition and a category of vehicles.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct LimitsTable {
     /// Such as "EN 15227".
@@ -57,14 +58,15 @@ pub(crate) struct LimitsTable {
 }
 
 /// Where FE's speeds of the vehicles are.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ReferenceTable {
     /// Solver file with the nodes, such as a nodout; a case.json next to it says how long FE
     /// took.
     pub(crate) file: PathBuf,
     /// Units of the file, such as "mm-t-s".
-    #[schemars(with = "String")]
+    #[cfg_attr(test, schemars(with = "String"))]
     pub(crate) units: UnitSystem,
     /// Component of the nodes, `x_velocity` if absent.
     #[serde(default = "x_velocity")]
@@ -82,7 +84,8 @@ fn x_velocity() -> String {
 }
 
 /// Times of the run.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RunTable {
     /// From the first contact; the last output is the last whole output_interval in it.
@@ -106,7 +109,8 @@ fn default_interval() -> TimeText {
 }
 
 /// Which speed an interface's model curve is predicted for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum InterfaceSpeed {
     /// The speed at which the trains meet.
@@ -117,7 +121,8 @@ pub(crate) enum InterfaceSpeed {
 }
 
 /// One curve: exactly one of `model`, `file`, `database` and `stages`.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CurveTable {
     /// Model file; the curve is predicted for the speed of the interface.
@@ -125,7 +130,7 @@ pub(crate) struct CurveTable {
     /// Curve file: predicted curve (JSON), table (CSV), or any other format of `crumple db add --list`.
     pub(crate) file: Option<PathBuf>,
     /// Of a file that does not state its units, such as "mm-t-s".
-    #[schemars(with = "Option<String>")]
+    #[cfg_attr(test, schemars(with = "Option<String>"))]
     pub(crate) units: Option<UnitSystem>,
     /// Of a file of several curves: number or name of the one to use.
     pub(crate) curve: Option<String>,
@@ -171,7 +176,8 @@ pub(crate) struct CurveTable {
 }
 
 /// A stage of a staged curve.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct StageTable {
     /// For people, such as "deformation tube".
@@ -186,7 +192,8 @@ pub(crate) struct StageTable {
 
 /// A damper's coefficient over the magnitude of the closing speed, piecewise linear and held
 /// beyond its ends; one pair of values for a constant one.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct DampingTable {
     /// Closing speeds, increasing; 0 if absent.
@@ -202,7 +209,8 @@ fn zero() -> Vec<f64> {
 }
 
 /// Force law of an interface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum LawName {
     /// Elastic-plastic: unloads on a line of the unloading stiffness, or a steeper one, so that energy once dissipated never comes back.
@@ -216,7 +224,8 @@ pub(crate) enum LawName {
 }
 
 /// A train.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct TrainTable {
     /// Of the train, such as "A".
@@ -237,7 +246,8 @@ pub(crate) struct TrainTable {
 }
 
 /// A vehicle.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct VehicleTable {
     /// Of the vehicle, as in the results.
@@ -308,7 +318,8 @@ impl CrushZone<'_> {
 }
 
 /// A mass split off a vehicle's end: the spring of `curve` lies between it and the body.
-#[derive(Clone, Debug, PartialEq, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct CrushZoneTable {
     /// Part of the vehicle's mass. If absent, the curve is a model, which determines how much
@@ -319,7 +330,8 @@ pub(crate) struct CrushZoneTable {
 }
 
 /// A rigid wall.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct WallTable {
     /// As in the results.
@@ -332,7 +344,8 @@ fn wall_name() -> String {
 }
 
 /// The first contact.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ContactTable {
     /// Name of its curve; not needed where the noses come from models.

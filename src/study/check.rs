@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, HashSet};
 
-use schemars::JsonSchema;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -178,7 +177,8 @@ fn check_name(key: &str, name: &str, slash: bool) -> Result<(), Error> {
 }
 
 /// A study manifest as written (TOML).
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Manifest {
     /// What all runs share.
@@ -190,14 +190,15 @@ pub(crate) struct Manifest {
 }
 
 /// What all runs of a study share.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct StudyHeader {
     /// Name of the study.
     pub name: String,
     /// Units of the solver files: "SI", "mm-t-s", "kg-mm-ms", …; taken from the runs' decks
     /// if absent.
-    #[schemars(with = "Option<String>")]
+    #[cfg_attr(test, schemars(with = "Option<String>"))]
     pub units: Option<UnitSystem>,
     /// Group of the curve database.
     pub group: String,
@@ -214,7 +215,8 @@ pub(crate) struct StudyHeader {
 }
 
 /// Kind of impact.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum StudyKind {
     /// A body against a rigid wall; speeds are wall speeds.
@@ -233,7 +235,8 @@ impl StudyKind {
 }
 
 /// One FE run.
-#[derive(Clone, Debug, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct RunEntry {
     /// Folder with the solver files, relative to the manifest.
@@ -263,7 +266,7 @@ pub(crate) struct RunEntry {
     /// 1 or -1: the factor that makes the file's force positive in compression; found from its
     /// impulse if absent.
     #[serde(default, deserialize_with = "sign")]
-    #[schemars(with = "Option<i64>", extend("enum" = [1, -1]))]
+    #[cfg_attr(test, schemars(with = "Option<i64>", extend("enum" = [1, -1])))]
     pub sign: Option<i64>,
     /// As in the study's head, for this run.
     pub accept_energy: Option<bool>,

@@ -27,7 +27,6 @@
 //! a third of the range, a prediction needs `--extrapolate`. In multi-body runs this is only a warning: inside a train,
 //! interfaces close far more slowly than any run by itself.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::dataset::is_same_speed;
@@ -45,9 +44,8 @@ pub(crate) const POWER_OF_GAP: f64 = 0.5;
 const WIDEST: f64 = 1e6;
 
 /// The left-out speeds that a band rests on.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum LeftOutSpeeds {
     /// Speeds between others: for queries between training speeds.
@@ -83,7 +81,8 @@ impl LeftOutSpeeds {
 /// no level can be guaranteed; the range is the one that a further residual of the same kind
 /// would lie in: their root mean square times Student's t, for as many independent stretches as the
 /// curves have; for a whole curve, and outside the training speeds, for as many curves.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Band {
     /// Level that the range is stated for.
     pub level: f64,
@@ -123,7 +122,8 @@ pub struct Band {
 
 /// Half widths that the scatter between repeated runs gives by itself: Student's t times its root mean
 /// square.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct ScatterWidths {
     /// As for [`Band::pointwise_share`].
     pub pointwise_share: f64,

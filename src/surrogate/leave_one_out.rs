@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::band::{Band, ForceScatter};
@@ -14,7 +13,8 @@ use crate::plural::counted;
 /// Errors of one model at one speed that was left out.
 ///
 /// Ratios are `Σ|p − r|/Σ|r|`; other errors are prediction over FE, minus 1.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct LeftOut {
     /// Name of the model.
     pub model: String,
@@ -60,7 +60,8 @@ pub struct LeftOut {
 }
 
 /// One peak of FE's curve and the predicted one that matches it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct PeakError {
     /// Deflection of FE's peak, in m.
     pub deflection_m: f64,
@@ -76,7 +77,8 @@ pub(crate) struct PeakError {
 /// FE's own curve in the same multi-body model. That of a contact force is the floor for its
 /// predictions; that of the body force is made from FE's own speeds, and checks that curve, force
 /// law and run are consistent.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Floor {
     /// `contact` or `body`.
     pub force: String,
@@ -114,7 +116,8 @@ impl Validation {
 }
 
 /// Means of one model over the inner speeds; of magnitudes where errors have signs.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Means {
     /// Name of the model.
     pub model: String,
@@ -148,7 +151,8 @@ pub struct Means {
 ///
 /// Errors of runs that are part of the mean are multiplied by √(n/(n − 1)): they are those of a
 /// run that is not part of it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Scatter {
     /// Those that have several runs.
     pub speeds: Vec<SpeedScatter>,
@@ -181,7 +185,8 @@ impl Scatter {
 }
 
 /// The scatter of the body force.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct BodyScatter {
     /// Root mean square of its residuals relative to its local level, as for bands.
     pub force_share: f64,
@@ -190,7 +195,8 @@ pub struct BodyScatter {
 }
 
 /// The scatter at one speed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct SpeedScatter {
     /// Mean of the runs' speeds, in m/s.
     pub speed_m_per_s: f64,
@@ -210,7 +216,8 @@ pub struct SpeedScatter {
 }
 
 /// Leave-one-speed-out of a group: what `crumple validate` prints and a model file keeps.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Validation {
     /// Name of the group.
     pub group: String,

@@ -5,7 +5,6 @@
 //! energy too early (W/E in `db ls`). A model uses the motion, unless another rule has answers at more of the speeds that
 //! were left out; never the spline, which need not be monotone, but for `--paper`.
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Model;
@@ -14,9 +13,8 @@ use crate::dataset::{is_within, nearly_same};
 use crate::error::{Error, error};
 
 /// Rule for the maximum crush.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum MaxCrushRule {
     /// Cubic spline through the training cases (reference method).
@@ -48,7 +46,8 @@ impl MaxCrushRule {
 }
 
 /// The maximum crush by all rules, in m; `None` where a rule has no answer.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct MaxCrush {
     /// By a cubic spline over the speeds.
     pub spline_m: Option<f64>,

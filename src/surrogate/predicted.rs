@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::Warning;
@@ -17,7 +16,8 @@ use crate::unit::{SpeedKind, UnitSystem};
 const LEAST_FREE: f64 = 0.9;
 
 /// A predicted curve: the master format of exports (JSON).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct PredictedCurve {
     /// Loading branch to the maximum crush, from 0 on; of a recorded curve the first force need not be 0.
     pub deflection_m: Vec<f64>,
@@ -89,7 +89,8 @@ pub struct PredictedCurve {
 /// The forces beyond the maximum crush, along faster runs: neighbours in a train keep pushing
 /// where a body by itself would have stopped. They are those of the runs: exports and trains multiply them by one factor, so that
 /// they begin with the last force of the curve.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Beyond {
     /// Largest crush of the model's runs, in m: beyond it the forces are an assumption.
     pub data_end_m: f64,
@@ -104,7 +105,8 @@ pub struct Beyond {
 }
 
 /// Quantiles of a regression forest (Meinshausen, JMLR 7, 2006) along the curve.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct ForestQuantiles {
     /// Share of the members' weight between the two.
     pub level: f64,
@@ -117,7 +119,8 @@ pub struct ForestQuantiles {
 }
 
 /// How the bodies separate after the maximum crush.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Rebound {
     /// In m/s; a line over the impact speed, relative to the force before the maximum crush.
     pub speed_m_per_s: f64,
@@ -131,7 +134,8 @@ pub struct Rebound {
 }
 
 /// Where a predicted curve comes from and how it was checked.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Provenance {
     /// Program and version.
     pub written_by: String,

@@ -2,7 +2,6 @@
 
 use std::fmt;
 
-use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::curve::Masses;
@@ -20,7 +19,8 @@ pub(super) fn is_unlike(ratio: f64) -> bool {
 }
 
 /// Something to know before trusting a predicted curve.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct Warning {
     /// Its kind, the same for all curves.
     pub code: WarningCode,
@@ -29,7 +29,8 @@ pub struct Warning {
 }
 
 /// Kinds of warnings; in snake case the codes of the JSON.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum WarningCode {
     /// The speed, another parameter or the maximum crush lies outside the training cases'.

@@ -6,7 +6,6 @@ mod row;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use schemars::JsonSchema;
 use serde::Serialize;
 
 use super::methods::ComparisonSettings;
@@ -20,7 +19,8 @@ use methods::methods;
 use row::row;
 
 /// Every method in one train.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct TrainComparison {
     /// Compared from 0 to here.
     pub until_s: f64,
@@ -38,7 +38,8 @@ pub struct TrainComparison {
 }
 
 /// One method in the train.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub struct TrainRow {
     /// `fe_body`, `fdrm` (FE's curves of the scenario, of the body's motion and of the recipe's
     /// force), `nsdm`, `ddtcm`, `best_train`, `best_local` (curves for the trains' speed and for
@@ -74,7 +75,8 @@ pub struct TrainRow {
 }
 
 /// Errors of one vehicle, as `Σ|p − r|/Σ|r|`.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct VehicleErrors {
     /// Name of the vehicle.
     pub vehicle: String,
@@ -90,7 +92,8 @@ pub(crate) struct VehicleErrors {
 }
 
 /// What is crushed between two vehicles, or a vehicle and the wall, up to the end of the comparison.
-#[derive(Clone, Debug, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 pub(crate) struct InterfaceCrush {
     /// `A1|A2`.
     pub interface: String,

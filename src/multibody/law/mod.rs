@@ -9,7 +9,6 @@
 mod pieces;
 mod unloading;
 
-use schemars::JsonSchema;
 use serde::Deserialize;
 
 use crate::curve::Envelope;
@@ -32,7 +31,8 @@ pub enum Unloading {
 }
 
 /// What the force does beyond the envelope's last point.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(rename_all = "snake_case")]
 pub enum EnvelopeEnd {
     /// The last force is held.
