@@ -145,6 +145,29 @@ fn limits_are_held_against_the_bands() {
     assert!(of(&within).iter().filter(|class| *class == "kept").count() == 0, "{within:?}");
     let open = within.iter().filter(|(_, text)| text.contains("lies within what the curves"));
     assert_eq!(open.count(), 3, "{within:?}");
+    // A run that ends before its lower edge has met the limit, but not before the upper one has.
+    let impact_within = |member: i32, ms: u32| {
+        let text = fs::read_to_string(folder.path().join("s.toml")).unwrap();
+        let banded = format!("lead.model\", band = {member}");
+        let text = text.replace("lead.model\"", &banded).replace("400ms", &format!("{ms}ms"));
+        fs::write(folder.path().join("edge.toml"), text).unwrap();
+        let run = crumple_ok(folder.path(), "simulate edge.toml --json -q");
+        let run: serde_json::Value = serde_json::from_str(&run).unwrap();
+        run["summary"]["bodies"][0]["secondary_impact_m_per_s"].as_f64().map(f64::abs)
+    };
+    let ms = (60..400).find(|ms| impact_within(0, *ms).is_some()).unwrap();
+    let edges = [-1, 0, 1].map(|member| impact_within(member, ms));
+    let [None, Some(own), Some(upper)] = edges else { panic!("{edges:?}") };
+    let limit = format!("{:.4}", 0.5 * (own + upper));
+    let text = fs::read_to_string(folder.path().join("s.toml")).unwrap();
+    let stated = format!("secondary_impact = \"{}m/s\"", middle[1]);
+    let cut = text.replace("400ms", &format!("{ms}ms"));
+    let cut = cut.replace(&stated, &format!("secondary_impact = \"{limit}m/s\""));
+    assert!(cut.contains(&limit), "{cut}");
+    fs::write(folder.path().join("cut.toml"), cut).unwrap();
+    crumple_ok(folder.path(), "report cut.toml -o cut.html");
+    let page = fs::read_to_string(folder.path().join("cut.html")).unwrap();
+    says(&page, &format!("the limit of {} m&#x2f;s lies within", limit.trim_end_matches('0')));
     let beyond = verdicts("71km/h", ["30", "30", "60"]);
     assert_eq!(of(&beyond), ["unknown"; 3], "{beyond:?}");
     assert!(

@@ -142,8 +142,14 @@ impl Numbers {
     fn of(summary: &Summary<'_>) -> Self {
         let vehicles = summary.bodies.iter().filter(|body| !body.is_crush_zone);
         let of_vehicle = vehicles.map(|body| {
+            // Beyond the data of a curve nothing is known, which is said of the curve.
+            let is_unknown = |limits: &Limits<'_>| {
+                limits.beyond_data.is_empty() && limits.unknown.contains(&body.name)
+            };
             let of = [
-                body.largest_mean_g().or(Some(body.mean_deceleration_g)),
+                body.largest_mean_g()
+                    .or(Some(body.mean_deceleration_g))
+                    .filter(|_| !summary.limits.as_ref().is_some_and(is_unknown)),
                 body.peak_deceleration_g,
                 body.moving_mean_deceleration_g,
                 body.secondary_impact_m_per_s,
@@ -287,13 +293,19 @@ fn add_limits(
     let close = |k: usize, limit: f64, unit: &str| {
         let judged = found.vehicles.iter().enumerate();
         let judged = judged.filter(|(_, (name, _))| limits.judged.contains(&&**name));
+        let mut open: Vec<&str> = Vec::new();
         let close = judged.filter_map(|(i, (name, values))| {
-            let of = |n: &Numbers| n.vehicles.get(i)?.1[k].map(f64::abs);
-            let (low, high) = range(&found, edges, of)?;
             if edges.is_empty() {
                 let value = values[k]?;
                 let is_close = (value.abs() / limit - 1.0).abs() < force_error;
                 return is_close.then(|| format!("{name} ({value:.2} {unit})"));
+            }
+            let of = |n: &Numbers| n.vehicles.get(i)?.1[k].map(f64::abs);
+            let known: Vec<f64> = std::iter::once(&found).chain(edges).filter_map(of).collect();
+            let low = known.iter().copied().fold(f64::INFINITY, f64::min);
+            let high = known.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            if high < limit && values[k].is_some() && known.len() <= edges.len() {
+                open.push(name);
             }
             (low..=high).contains(&limit).then(|| format!("{name} ({low:.2} to {high:.2} {unit})"))
         });
@@ -305,7 +317,15 @@ fn add_limits(
             ),
             _ => format!("the limit of {limit} {unit} lies within what the curves' bands give"),
         };
-        (!close.is_empty() && limits.beyond_data.is_empty()).then(|| format!("{than}: {close}"))
+        let close = (!close.is_empty()).then(|| format!("{than}: {close}"));
+        let open = (!open.is_empty()).then(|| {
+            let open = open.join(", ");
+            format!(
+                "not known at an edge of the curves' bands, where the run ends too early: {open}"
+            )
+        });
+        let said: Vec<String> = close.into_iter().chain(open).collect();
+        (!said.is_empty() && limits.beyond_data.is_empty()).then(|| said.join("; "))
     };
     let beyond: BTreeSet<&str> =
         edges.iter().flat_map(|edge| &edge.beyond_data).map(String::as_str).collect();

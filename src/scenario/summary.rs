@@ -286,6 +286,10 @@ impl Prepared {
                 || is_beside(body.name)
                 || self.may_have_larger_contact(run, i)
         };
+        // No path between the two grows any more.
+        let is_with_its_occupant = |body: &BodySummary<'_>| {
+            (body.final_v_m_per_s - body.initial_v_m_per_s).abs() <= LEAST_CLOSING_M_PER_S
+        };
         let beyond_data: Vec<&str> = run.beyond_data().map(|k| &*interfaces[k].name).collect();
         // Beyond its data the force is an assumption, and with it all that follows.
         let is_known = beyond_data.is_empty();
@@ -306,9 +310,10 @@ impl Prepared {
                     .map(|body| body.name)
                     .collect(),
                 unknown: judged()
-                    .map(|(_, body)| body)
-                    .filter(|body| !is_known || met(body).is_none())
-                    .map(|body| body.name)
+                    .filter(|(_, body)| {
+                        !is_known || met(body).is_none() && (goes_on || !is_with_its_occupant(body))
+                    })
+                    .map(|(_, body)| body.name)
                     .collect(),
             };
             asked.map(judged).collect()

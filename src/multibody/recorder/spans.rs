@@ -50,6 +50,8 @@ pub(super) enum Phase {
 pub(super) struct Span {
     begin: Moment,
     end: Moment,
+    /// `None` where no look has seen the force.
+    push: Option<Push>,
     /// The run ended before the force did.
     pub is_cut: bool,
 }
@@ -101,15 +103,17 @@ impl Look {
 impl Phase {
     /// The phase after a look, and the span that has ended by it.
     pub(crate) fn after(self, look: &Look) -> (Self, Option<Span>) {
-        let ended = |begin, end| Some(Span { begin, end, is_cut: false });
+        let ended = |begin, end, push| Some(Span { begin, end, push: Some(push), is_cut: false });
         match (self, look.push()) {
             (Self::Free, None) => (Self::Free, None),
             (Self::Free, Some(push)) => (Self::Pressed { begin: look.grown_from(), push }, None),
             // What was announced has no force that counts.
             (Self::Announced { .. }, None) => (Self::Free, None),
             (Self::Announced { begin }, Some(push)) => (Self::Pressed { begin, push }, None),
-            (Self::Pressed { begin, .. } | Self::Fading { begin, .. }, None) if look.a == 0.0 => {
-                (Self::Free, ended(begin, look.gone_at()))
+            (Self::Pressed { begin, push } | Self::Fading { begin, push, .. }, None)
+                if look.a == 0.0 =>
+            {
+                (Self::Free, ended(begin, look.gone_at(), push))
             }
             (Self::Pressed { begin, push }, None) => {
                 (Self::Fading { begin, push, end: look.gone_at() }, None)
@@ -117,18 +121,18 @@ impl Phase {
             (Self::Fading { end, .. }, None) if look.now.time_s - end.time_s < LOOK_S => {
                 (self, None)
             }
-            (Self::Fading { begin, end, .. }, None) => (Self::Free, ended(begin, end)),
+            (Self::Fading { begin, end, push }, None) => (Self::Free, ended(begin, end, push)),
             (Self::Pressed { begin, push } | Self::Fading { begin, push, .. }, Some(now))
                 if now == push =>
             {
                 (Self::Pressed { begin, push }, None)
             }
-            (Self::Fading { begin, end, .. }, Some(push)) => {
-                (Self::Pressed { begin: end, push }, ended(begin, end))
+            (Self::Fading { begin, end, push }, Some(now)) => {
+                (Self::Pressed { begin: end, push: now }, ended(begin, end, push))
             }
-            (Self::Pressed { begin, .. }, Some(push)) => {
+            (Self::Pressed { begin, push }, Some(now)) => {
                 let crossing = look.crossed_zero_at();
-                (Self::Pressed { begin: crossing, push }, ended(begin, crossing))
+                (Self::Pressed { begin: crossing, push: now }, ended(begin, crossing, push))
             }
         }
     }
@@ -137,9 +141,10 @@ impl Phase {
     pub(crate) fn closed_at(self, end: Moment) -> Option<Span> {
         match self {
             Self::Free => None,
-            Self::Announced { begin }
-            | Self::Pressed { begin, .. }
-            | Self::Fading { begin, .. } => Some(Span { begin, end, is_cut: false }),
+            Self::Announced { begin } => Some(Span { begin, end, push: None, is_cut: false }),
+            Self::Pressed { begin, push } | Self::Fading { begin, push, .. } => {
+                Some(Span { begin, end, push: Some(push), is_cut: false })
+            }
         }
     }
 
@@ -148,7 +153,9 @@ impl Phase {
         match self {
             // A force that was never examined does not count as one that still acts.
             Self::Free | Self::Announced { .. } => self.closed_at(run_end),
-            Self::Pressed { begin, .. } => Some(Span { begin, end: run_end, is_cut: true }),
+            Self::Pressed { begin, push } => {
+                Some(Span { begin, end: run_end, push: Some(push), is_cut: true })
+            }
             Self::Fading { end, .. } => self.closed_at(end),
         }
     }
@@ -173,8 +180,12 @@ impl Span {
 
     fn goes_on_from(&self, before: &Self) -> bool {
         let gained = |span: &Self| span.end.v_m_per_s - span.begin.v_m_per_s;
-        let apart_s = self.begin.time_s - before.end.time_s;
-        apart_s < LOOK_S && gained(self) * gained(before) > 0.0
+        let is_alike = match (self.push, before.push) {
+            // Brakes may slow a body that is pushed forwards.
+            (Some(push), Some(other)) => push == other,
+            _ => gained(self) * gained(before) > 0.0,
+        };
+        self.begin.time_s - before.end.time_s < LOOK_S && is_alike
     }
 
     /// Magnitude of the change of speed.
@@ -203,6 +214,7 @@ impl Spans {
         match &mut self.last {
             Some(last) if span.goes_on_from(last) => {
                 (last.end, last.is_cut) = (span.end, span.is_cut);
+                last.push = last.push.or(span.push);
             }
             last => {
                 if let Some(before) = last.replace(span) {
@@ -330,10 +342,10 @@ mod tests {
         let mut spans = Spans::default();
         for k in 0..500 {
             let (begin, end) = (moment(k, 0.0, v(k)), moment(k, 0.05e-3, v(k + 1)));
-            spans.close(Span { begin, end, is_cut: false });
+            spans.close(Span { begin, end, push: None, is_cut: false });
         }
         let (begin, end) = (moment(502, 0.0, v(500)), moment(600, 0.0, v(100)));
-        let other = Span { begin, end, is_cut: false };
+        let other = Span { begin, end, push: None, is_cut: false };
         spans.close(other);
         let spans = spans.ended();
         let first = spans.first().unwrap();
@@ -345,6 +357,7 @@ mod tests {
     #[test]
     fn spans_of_small_changes_do_not_count() {
         let span = |from: f64, to: f64| Span {
+            push: None,
             begin: Moment { time_s: from, v_m_per_s: 10.0 },
             end: Moment { time_s: from + 0.01, v_m_per_s: to },
             is_cut: false,
