@@ -1926,7 +1926,7 @@ fn a_record_that_may_start_in_contact_is_named() {
     let bounce: String = bounce.collect();
     fs::write(&path, format!("{head}z-force\n{bounce}{}\n", states[2..].join("\n"))).unwrap();
     let said = warned(&here, "init 60kmh -o bounce.toml");
-    says(&said, "run 60kmh: the record starts in contact");
+    says(&said, "run 60kmh: the record may start in contact: the body had moved");
     let said = warned(&here, "build bounce.toml -o bounce.h5");
     says(&said, "contact: the body had moved 148.1 mm before the record's first state");
 }
@@ -1990,4 +1990,11 @@ fn a_wall_that_moves_is_named() {
     says(&said, "run 36kmh: the wall of the deck main.k, line 2, moves: speed and crush");
     let said = warned(&here, "build moving.toml -o moving.h5");
     says(&said, "36kmh: the wall of the deck main.k, line 2, moves: speed, deflection and energy");
+    // Another wall than that of the force.
+    let two = "*KEYWORD\n*RIGIDWALL_PLANAR_ID\n         1wall\n         0\n       0.0       0.0       0.0       1.0\n*RIGIDWALL_PLANAR_MOVING_ID\n         2ram\n         0\n       0.0       0.0       0.0       1.0\n      1.25    3333.3\n*END\n";
+    fs::write(here.join("36kmh/main.k"), two).unwrap();
+    for command in ["init 36kmh -o fixed.toml", "build fixed.toml -o fixed.h5"] {
+        let said = String::from_utf8(crumple_in(&here, command).stderr).unwrap();
+        assert!(!said.contains("moves"), "{said}");
+    }
 }

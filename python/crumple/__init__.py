@@ -334,11 +334,24 @@ def read(path, ids=None, components=None, section=None, format=None):
         several = all_of is not None and len(all_of) > 1
         return [one for one in all_of if is_held(one)] or all_of if several else all_of
 
-    def holds(file, *selected):
+    def read_if_there(file, *selected):
         try:
-            return sections(file, *selected) is not None
+            return sections(file, *selected)
         except Error:
-            return False
+            return None
+
+    def fitting(file):
+        """The sections of a file for what it has of several ids and components; most files have all or none."""
+        of_ids, of_components = ids, components
+        read = read_if_there(file)
+        if read is None:
+            of_components = held(components, lambda one: read_if_there(file, [], [one]) is not None)
+            read = read_if_there(file, ids, of_components) if of_components != components else None
+        if read is None:
+            of_ids = held(ids, lambda one: read_if_there(file, [one], of_components) is not None)
+            read = sections(file, of_ids, of_components)
+        missing.difference_update(of_ids or (), of_components or ())
+        return read
 
     if not os.path.isdir(path):
         return Histories(Path(path), sections(path))
@@ -346,10 +359,7 @@ def read(path, ids=None, components=None, section=None, format=None):
     found, error = [], Error(f"{os.fspath(path)}: there are no solver files in this folder")
     for file in _crumple.files(os.fspath(path)):
         try:
-            of_file = held(components, lambda one: holds(file, [], [one]))
-            ids_of_file = ids if holds(file, ids, of_file) else held(ids, lambda one: holds(file, [one], of_file))
-            found += [(file, of) for of in sections(file, ids_of_file, of_file)]
-            missing -= {*(ids_of_file or ()), *(of_file or ())}
+            found += [(file, of) for of in fitting(file)]
         except Error as unread:
             if ids is components is section is None:
                 raise
@@ -360,7 +370,7 @@ def read(path, ids=None, components=None, section=None, format=None):
     if not found:
         raise error
     if missing:
-        raise Error(f"{os.fspath(path)}: no file of this folder has {', '.join(sorted(missing))}")
+        raise Error(f"{os.fspath(path)}: no file of this folder has {', '.join(sorted(missing))} with what else is selected")
     names = [of.name for _, of in found]
     for file, of in found:
         if names.count(of.name) > 1:

@@ -164,8 +164,12 @@ impl ExportCurve {
         let own = || self.deflection_m()[..=self.end].iter().zip(self.force_n());
         let off_n = own().map(|(&d, f)| (loading.force_at(d) - f).abs()).fold(0.0, f64::max);
         let share = 100.0 * off_n / own().map(|(_, f)| *f).fold(0.0, f64::max);
+        let by = match share < 0.05 {
+            true => "less than 0.1".into(),
+            false => format!("up to {share:.1}"),
+        };
         let changed = format!(
-            "{left} of {points} points are kept{takes}, with the same energy up to the maximum crush, where forces change by up to {share:.1} % of the peak force"
+            "{left} of {points} points are kept{takes}, with the same energy up to the maximum crush, where forces change by {by} % of the peak force"
         );
         notes.push(format!("{}: {changed}", self.headline()));
         let end = loading.deflection_m().partition_point(|&d| d < self.max_crush_m());
@@ -256,9 +260,13 @@ impl ExportCurve {
     }
 
     /// What states that stiffness, for files that hold it, where it is not the curve's own.
-    pub(crate) fn line_fact(&self) -> Option<(&'static str, String)> {
+    pub(crate) fn line_facts(&self) -> Vec<(&'static str, String)> {
         let line = nine_digits(self.line_stiffness_n_per_m());
-        (line != nine_digits(self.stiffness_n_per_m())).then_some((LINE_STIFFNESS, line))
+        if line == nine_digits(self.stiffness_n_per_m()) {
+            return Vec::new();
+        }
+        let used = "the file unloads along line_stiffness_N_per_m, whatever the curve's slopes are: it returns as much energy as the curve's own stiffness does where unloading is no softer than the steepest rise";
+        vec![(LINE_STIFFNESS, line), ("line", used.into())]
     }
 
     /// The curve as it drives an interface, tail included.

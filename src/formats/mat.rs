@@ -64,7 +64,7 @@ fn matrix(bytes: &mut Vec<u8>, name: &str, columns: &[Vec<f64>]) {
 
 /// One line per fact, as rows of characters; each character is a double.
 fn text(bytes: &mut Vec<u8>, name: &str, curve: &ExportCurve) {
-    let facts = curve.facts().into_iter().chain(curve.line_fact());
+    let facts = curve.facts().into_iter().chain(curve.line_facts());
     let lines: Vec<Vec<char>> =
         facts.map(|(key, value)| format!("{key}: {value}").chars().collect()).collect();
     let width = lines.iter().map(Vec::len).max().unwrap_or(0);

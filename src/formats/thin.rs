@@ -152,7 +152,7 @@ pub(crate) fn for_splines(curve: &Envelope) -> Result<Envelope, Error> {
         deflection_m.push(d[i + 1]);
     }
     deflection_m.sort_by(f64::total_cmp);
-    deflection_m.dedup();
+    deflection_m.dedup_by(|next, d| *next <= *d * (1.0 + DISTINCT));
     let force_n = deflection_m.iter().map(|&d| curve.force_at(d)).collect();
     Envelope::new(deflection_m, force_n)
 }
@@ -251,7 +251,7 @@ pub(crate) fn from_origin(
     let ramp_m = ((f0 - along * d0) / (slope - along)).clamp(d0, d1);
     let mut deflection_m = vec![0.0, ramp_m];
     let mut force_n = vec![0.0, curve.force_at(ramp_m)];
-    let rest = if ramp_m < d1 { meets } else { meets + 1 };
+    let rest = if ramp_m * (1.0 + DISTINCT) < d1 { meets } else { meets + 1 };
     deflection_m.extend_from_slice(&d[rest..]);
     force_n.extend_from_slice(&f[rest..]);
     let end = end + 2 - rest;

@@ -552,10 +552,15 @@ fn doubts_of_speed(record: &Record, impact: &Impact) -> Vec<String> {
             "the record starts in contact, so the speed of its first state is not that of the impact: write the impact's speed, or provide the earlier states"
                 .into(),
         );
+    } else if record.may_start_in_contact() && !is_as_named {
+        notes.push(
+            "the record may start in contact: the body had moved before its first state, and the force begins at once after it; if so, write the impact's speed, or provide the earlier states"
+                .into(),
+        );
     }
     if record.velocities.len() == 1
         && let Some((path, deck)) = &run.sources.deck
-        && let Some(wall) = deck.moving_wall()
+        && let Some(wall) = deck.moving_wall(&record.wall_ids)
     {
         notes.push(format!(
             "the wall of the deck {}, {}, moves: speed and crush of the record are the body's own",

@@ -26,6 +26,8 @@ pub(super) struct Run {
 const NO_FORCE: f64 = 0.01;
 /// A force that begins within this share of its contact after the first state may have acted before that.
 const AT_ONCE: f64 = 0.02;
+/// A body that had moved by so much more than at its speed since time 0 has been slowed down.
+const SLOWED: f64 = 0.005;
 /// A constant force beside the contact's is seen where it leaves less than this share of the squares.
 const EXPLAINED: f64 = 0.01;
 /// A body that has moved by this share of what follows is slower than at the impact.
@@ -53,6 +55,8 @@ pub(super) struct Record {
     pub force: Vec<f64>,
     /// Why its forces are means over their intervals, if they are.
     pub force_means: Option<String>,
+    /// Ids of the walls whose force it is, if it is that of walls.
+    pub wall_ids: Vec<i64>,
     /// At the motion's times.
     impulse: Vec<f64>,
     /// The force's file, if it ends before the motion.
@@ -151,6 +155,11 @@ impl Record {
             force_time,
             force,
             force_means,
+            wall_ids: recipe
+                .force
+                .as_ref()
+                .filter(|of| of.file == "rwforc")
+                .map_or(Vec::new(), |of| of.ids.clone()),
             impulse: impulses,
             force_ends,
             damage,
@@ -206,14 +215,31 @@ impl Record {
         Some((self.force_time[first], self.force_time[last]))
     }
 
-    /// Whether the body had moved and the force acted before the motion's first state, or just after it, so that its speed there may
-    /// not be that of the impact.
+    /// Whether the body had moved and the force acted before the motion's first state, so that its speed there is not that of
+    /// the impact.
     pub(super) fn starts_in_contact(&self) -> bool {
+        self.had_moved() && self.contact_since_first().is_some_and(|(since, _)| since <= 0.0)
+    }
+
+    /// Whether it may be so: the force begins at once after the first state, and the body had moved by more than it moves at
+    /// its speed there from time 0 on.
+    pub(super) fn may_start_in_contact(&self) -> bool {
+        let at_speed = (self.closing(0) * self.time[0]).abs();
+        let begins = |(since, lasts): (f64, f64)| (0.0..=AT_ONCE * lasts).contains(&since);
+        self.had_moved()
+            && self.travel[0].abs() > (1.0 + SLOWED) * at_speed
+            && self.contact_since_first().is_some_and(begins)
+    }
+
+    fn had_moved(&self) -> bool {
         let moved = self.travel.iter().map(|d| (d - self.travel[0]).abs()).fold(0.0, f64::max);
-        let acts = self.contact().is_some_and(|(first, last)| {
-            first - self.time[0] <= AT_ONCE * (last - first) && self.time[0] < last
-        });
-        acts && self.travel[0].abs() > MOVED * moved
+        self.travel[0].abs() > MOVED * moved
+    }
+
+    /// When the force first acts after the first state, and for how long it does; `None` if that is over.
+    fn contact_since_first(&self) -> Option<(f64, f64)> {
+        let (first, last) = self.contact()?;
+        (self.time[0] < last).then_some((first - self.time[0], last - first))
     }
 
     pub(super) fn damage(&self) -> String {

@@ -172,6 +172,16 @@ impl LocatedRun<'_> {
         })
     }
 
+    /// Ids of the walls whose force the recipe takes.
+    fn wall_ids(&self) -> Vec<i64> {
+        match &self.study.manifest.recipe.force {
+            ForceSource::Contact { file, id, also, .. } if file == "rwforc" => {
+                also.iter().chain([id]).copied().collect()
+            }
+            _ => Vec::new(),
+        }
+    }
+
     /// Notes on the files: the side that was chosen, binary files beside texts, and damage.
     fn remark_on_files(&self, files: &RunFiles<'_>, remarks: &mut Notes) -> Result<(), Error> {
         if let ForceSource::Contact { id, side: None, .. } = self.study.manifest.recipe.force
@@ -184,7 +194,7 @@ impl LocatedRun<'_> {
         }
         if self.study.speed_kind() == SpeedKind::Wall
             && let Some(RunDeck { file, deck }) = &self.deck
-            && let Some(wall) = deck.moving_wall()
+            && let Some(wall) = deck.moving_wall(&self.wall_ids())
         {
             remarks.warn(format!(
                 "the wall of the deck {}, {}, moves: speed, deflection and energy are the body's own, and not those of the impact",

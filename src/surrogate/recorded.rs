@@ -17,7 +17,7 @@ pub(crate) const RECORDED: &str = "recorded";
 impl PredictedCurve {
     /// The curve of one recorded run: its declared force, and beside a contact force the one that
     /// moved the body, both at the points of either. Exact between the points, as both are
-    /// piecewise linear, but for the last 1/2000 of a record's crush.
+    /// piecewise linear, but for the last 1/2000 of a record's crush, of which a peak is kept.
     ///
     /// # Errors
     /// If the case's states contain no loading branch.
@@ -36,10 +36,14 @@ impl PredictedCurve {
             _ => None,
         };
         let mut deflection_m = union(&declared.loading, body.as_ref().map(|b| &b.loading));
-        // Where the body turns, a step of the force between two states is not a stiffness.
+        // Where the body turns, a step of the force between two states is not a stiffness; a peak there is one.
         let end_m = deflection_m.last().copied().unwrap_or_default();
         if !case.moves_by_its_force() {
-            deflection_m.retain(|d| *d == end_m || *d < (1.0 - LEAST_STEP) * end_m);
+            let is_kept = |d: f64| d == end_m || d < (1.0 - LEAST_STEP) * end_m;
+            let force = |d: f64| declared.loading.force_at(d);
+            let kept = deflection_m.iter().filter(|d| is_kept(**d));
+            let peak_n = kept.map(|d| force(*d)).fold(0.0, f64::max);
+            deflection_m.retain(|d| is_kept(*d) || force(*d) > peak_n);
         }
         let at = |e: &Envelope| -> Vec<f64> {
             deflection_m.iter().map(|&d| e.force_at(d).max(0.0)).collect()

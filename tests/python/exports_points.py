@@ -125,8 +125,7 @@ found = {}
 for file in sys.argv[2:]:
     for name, table in points(pathlib.Path(file)).items():
         x, y = in_compression(numpy.array(table, dtype=float)).T
-        keep = numpy.append(True, numpy.diff(x) > 0)
-        x, y = x[keep], y[keep]
+        assert (numpy.diff(x) > 0).all(), f"{name}: equal abscissas"
         fine = numpy.unique(numpy.concatenate([numpy.linspace(0, end, 200_001), x[(x > 0) & (x < end)]]))
         ahead = numpy.linspace(min(x[0], 0), 0, 100_001)
         of = lambda values: numpy.trapezoid(values, fine) / energy - 1

@@ -100,7 +100,11 @@ impl Start {
             _ if of_body => StartBy::Body,
             Some(interval_s) => {
                 let is_near = onset.time_s - record.time_s[0] < contact::PAUSE_S;
-                let moved_m = if is_near { record.deflection_m[0].abs() } else { 0.0 };
+                let moved_m = record.deflection_m[0].abs();
+                // What it moved at the speed of its first state from time 0 on, nothing has slowed down.
+                let at_speed_m = (record.rate_m_per_s[0] * record.time_s[0]).abs();
+                let is_free = moved_m <= (1.0 + MISSING_SHARE) * at_speed_m;
+                let moved_m = if is_near && !is_free { moved_m } else { 0.0 };
                 StartBy::Crossing { interval_s, at_most_s: onset.at_most_s, moved_m }
             }
             None => {
@@ -120,9 +124,11 @@ impl Start {
         let crush_m = curve.deflection_m()[loading::loading_end(curve)];
         let step_m = |interval_s: f64| contact.closing_m_per_s[0].abs() * interval_s;
         match self.by {
-            StartBy::Crossing { moved_m, .. } if moved_m > MISSING_SHARE * crush_m => {
+            StartBy::Crossing { moved_m, .. }
+                if moved_m > MISSING_SHARE * crush_m && setup.stated.offset_m == 0.0 =>
+            {
                 remarks.warn(format!(
-                    "contact: the body had moved {:.1} mm before the record's first state, and the force begins less than 10 ms after it: if contact began before, that crush is missing and the speed is that of a body which has been slowed down; provide the earlier states",
+                    "contact: the body had moved {:.1} mm before the record's first state, and the force begins less than 10 ms after it: if contact began before, that crush is missing and the speed is that of a body which has been slowed down; provide the earlier states, or set contact_time if it begins there",
                     moved_m * 1e3
                 ));
             }

@@ -98,11 +98,12 @@ fn note(curve: &ExportCurve, material: Material) -> Vec<String> {
 /// Loss by resampling an unevenly spaced curve in LS-DYNA.
 fn resampling_note(curve: &ExportCurve) -> Option<String> {
     let points = points(curve);
-    (resampling(&points) == MOST_RESAMPLED).then(|| {
+    let step_m = curve.loading.end_m() / (MOST_RESAMPLED - 1) as f64;
+    (resampling(&points) == MOST_RESAMPLED && smallest_interval(&points) < step_m).then(|| {
         format!(
             "{}: its points are unevenly spaced, so LCINT is {MOST_RESAMPLED}, the largest used: LS-DYNA resamples the curve every {:.3} mm and smooths what is finer",
             curve.headline(),
-            curve.loading.end_m() / (MOST_RESAMPLED - 1) as f64 * 1e3
+            step_m * 1e3
         )
     })
 }
@@ -111,9 +112,9 @@ fn describe(lines: &mut String, curve: &ExportCurve, units: InUnits, material: M
     line!(lines, "$ {}", units.stated());
     // These unload along a line whatever the curve's slopes are.
     let (stiffness_n_per_m, facts, line) = match material {
-        Material::S08 => (curve.stiffness_n_per_m(), curve.facts(), None),
+        Material::S08 => (curve.stiffness_n_per_m(), curve.facts(), Vec::new()),
         Material::Mat121 | Material::S06 => {
-            (curve.line_stiffness_n_per_m(), curve.facts_by_elongation(), curve.line_fact())
+            (curve.line_stiffness_n_per_m(), curve.facts_by_elongation(), curve.line_facts())
         }
     };
     line!(

@@ -168,6 +168,13 @@ pub struct DeckEntity {
     pub at: DeckPlace,
 }
 
+impl DeckEntity {
+    /// Whether it is a wall that moves, by its keyword.
+    fn moves(&self) -> bool {
+        self.keyword.split('_').any(|option| option == "MOVING" || option == "MOTION")
+    }
+}
+
 /// One included file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct DeckInclude {
@@ -210,10 +217,15 @@ impl Deck {
         most.next().is_none().then_some((units, said))
     }
 
-    /// The first wall that moves, by its keyword.
-    pub(crate) fn moving_wall(&self) -> Option<&DeckEntity> {
-        let moves = |w: &&DeckEntity| w.keyword.split('_').any(|o| o == "MOVING" || o == "MOTION");
-        self.rigid_walls.iter().find(moves)
+    /// A wall of these ids that moves, by its keyword; where the deck numbers none of them, the first if all walls move.
+    pub(crate) fn moving_wall(&self, ids: &[i64]) -> Option<&DeckEntity> {
+        let is_meant = |w: &&DeckEntity| w.id.is_some_and(|id| ids.contains(&id));
+        match self.rigid_walls.iter().any(|w| is_meant(&w)) {
+            true => self.rigid_walls.iter().filter(is_meant).find(|w| w.moves()),
+            false => {
+                self.rigid_walls.first().filter(|_| self.rigid_walls.iter().all(DeckEntity::moves))
+            }
+        }
     }
 
     /// The speed at which the model starts to move, in the deck's units, and where the first velocity
@@ -221,7 +233,7 @@ impl Deck {
     /// direction (to 1e-6, since decks write seven digits). `None` when there is none, when they differ, when one turns or is
     /// not known, or when a wall moves. An include that is missing may hide more.
     pub fn impact_speed(&self) -> Option<(f64, DeckPlace)> {
-        if self.moving_wall().is_some() {
+        if self.rigid_walls.iter().any(DeckEntity::moves) {
             return None;
         }
         let mut first: Option<([f64; 3], f64, DeckPlace)> = None;
