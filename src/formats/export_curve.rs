@@ -265,7 +265,7 @@ impl ExportCurve {
         if line == nine_digits(self.stiffness_n_per_m()) {
             return Vec::new();
         }
-        let used = "the file unloads along line_stiffness_N_per_m, whatever the curve's slopes are: it returns as much energy as the curve's own stiffness does where unloading is no softer than the steepest rise";
+        let used = "the file unloads on a straight line of line_stiffness_N_per_m, which returns as much energy as runs of crumple do";
         vec![(LINE_STIFFNESS, line), ("line", used.into())]
     }
 

@@ -113,6 +113,9 @@ pub(super) struct MassEstimates {
     pub is_late: bool,
 }
 
+/// The share of a mass that momentum gives at least where a record starts in contact: crush zones are lighter than the rest.
+const LEAST_LEFT: f64 = 0.85;
+
 /// Above it other forces are warned of; the waves in a body that has left the contact look like less.
 const UNEXPLAINED: f64 = 0.05;
 
@@ -249,20 +252,22 @@ pub(super) fn agree(
             found[k] = Proposed::found(rounded(median), Computed, from);
         }
     }
-    for (k, (_, mass)) in runs.iter().enumerate().filter(|(_, (_, mass))| is_late(mass)) {
-        let off = |kg: &f64| mass.kg().map_or(0.0, |(own, _)| libm::log(kg / own).abs());
-        let others: Vec<f64> = found.iter().filter_map(|mass| mass.value().copied()).collect();
-        if let (None, Some((own, _)), Some(kg)) = (
-            found[k].value(),
-            mass.kg(),
-            others.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))),
-        ) {
-            let from = format!(
-                "that of other runs; this record starts in contact, and momentum gives {}",
-                shown_mass(own)
-            );
-            found[k] = Proposed::found(kg, Computed, from);
-        }
+    // Such a mass is too low, by what is stopped already: one that is further off is that of another vehicle.
+    let agreed: Vec<f64> = found.iter().filter_map(|mass| mass.value().copied()).collect();
+    for (k, (_, mass)) in runs.iter().enumerate() {
+        let Some((own, _)) = mass.kg().filter(|_| !are_all_late && is_late(mass)) else { continue };
+        let lacks = |kg: &&f64| (LEAST_LEFT..=1.0 + SAME_MASS).contains(&(own / **kg));
+        let nearest = |a: &&f64, b: &&f64| (own / **b).total_cmp(&(own / **a));
+        found[k] = match agreed.iter().filter(lacks).min_by(nearest) {
+            Some(kg) => {
+                let own = shown_mass(own);
+                let from = format!(
+                    "that of other runs; this record starts in contact, and momentum gives {own}"
+                );
+                Proposed::found(*kg, Computed, from)
+            }
+            None => Proposed::found(rounded(own), Computed, mass.from()),
+        };
     }
     found
 }
@@ -402,6 +407,9 @@ mod tests {
         let found = agree(&runs.map(|(name, mass)| (name.into(), mass)), "", &mut warnings);
         assert_eq!(found[1].value(), Some(&24e3));
         assert!(found[1].to_string().ends_with("starts in contact, and momentum gives 22.1 t"));
+        let runs = [("a", by_momentum(24e3)), ("b", late(30e3)), ("c", late(15e3))];
+        let found = agree(&runs.map(|(name, mass)| (name.into(), mass)), "", &mut warnings);
+        assert_eq!((found[1].value(), found[2].value()), (Some(&30e3), Some(&15e3)));
         let found = agree(&[("b".into(), late(22_100.0))], "", &mut warnings);
         assert_eq!(found[0].value(), Some(&22.1e3));
         // A state every 2 ms of a crash of 60 ms leaves a few per cent open.

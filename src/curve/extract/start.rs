@@ -101,7 +101,7 @@ impl Start {
             Some(interval_s) => {
                 let is_near = onset.time_s - record.time_s[0] < contact::PAUSE_S;
                 let moved_m = record.deflection_m[0].abs();
-                // What it moved at the speed of its first state from time 0 on, nothing has slowed down.
+                // A body that moved no further than at the speed of its first state since time 0 has not been slowed down.
                 let at_speed_m = (record.rate_m_per_s[0] * record.time_s[0]).abs();
                 let is_free = moved_m <= (1.0 + MISSING_SHARE) * at_speed_m;
                 let moved_m = if is_near && !is_free { moved_m } else { 0.0 };
@@ -193,7 +193,7 @@ impl Start {
                         ),
                     ),
                 };
-                // What the force did over so much of the crush no speed and no offset can tell.
+                // No speed and no offset replaces the work done over so much of the crush.
                 let is_much = least_m > SLOWING_SHARE * crush_m;
                 let remedy = match at_full_speed && most_m > SLOWING_SHARE * crush_m {
                     true if is_much => ", and the run's speed is that of its first state, by when it has been slowed down: provide the earlier states, or leave the run out".into(),
