@@ -101,6 +101,8 @@ pub(super) struct MassEstimates {
     pub in_free_flight: bool,
     /// Share by which other forces than the contact's may have changed it.
     pub unexplained: f64,
+    /// Whether it allows for a constant force, such as a weight.
+    pub has_constant_force: bool,
     pub by_energy: Option<f64>,
     /// Whether that is the energy of all that moves: sums over parts lack lumped masses.
     pub energy_is_whole: bool,
@@ -155,6 +157,10 @@ impl MassEstimates {
             Some((_, true)) => (
                 "kinetic energy of the model at the start over ½v²".into(),
                 (self.by_momentum, "momentum"),
+            ),
+            _ if self.has_constant_force => (
+                format!("{IMPULSE}, less that of the force that accelerates the body before the contact (gravity, brakes, friction)"),
+                by_energy,
             ),
             _ if self.in_free_flight => (format!("{IMPULSE}, after the contact"), by_energy),
             _ => (format!("{IMPULSE}, while loading (accurate to a few per cent)"), by_energy),

@@ -41,6 +41,10 @@ const FREE: (usize, f64) = (5, 0.03);
 const MOMENT: f64 = 0.05;
 /// A velocity has a trend if it changes by more than so many times its scatter.
 const CHANCE: f64 = 3.0;
+/// A force that changes a mass by less than this share is left out.
+const LEAST_BESIDE: f64 = 0.01;
+/// Accelerations before and after the contact that differ by less are that of one force, which acts all along.
+const ALIKE: f64 = 0.2;
 
 /// What the recipe names of a run, up to the last time that motion and force share.
 pub(super) struct Record {
@@ -267,10 +271,13 @@ impl Record {
         let (by_momentum, in_free_flight) = self.masses_by_momentum().unzip();
         let by_energy = self.masses_by_energy();
         let kg = |masses: &Option<Vec<f64>>, k: usize| masses.as_ref().map(|of| of[k] * unit_kg);
-        let estimates = |k| MassEstimates {
+        let estimates = |k: usize| MassEstimates {
             by_momentum: kg(&by_momentum, k),
             in_free_flight: in_free_flight.unwrap_or_default(),
             unexplained: self.unexplained(k),
+            has_constant_force: self
+                .in_flight(&self.velocities[k])
+                .is_some_and(|of| of.all_along().is_some()),
             by_energy: kg(&by_energy, k),
             energy_is_whole: self
                 .run
@@ -308,9 +315,10 @@ impl Record {
         let end = self.loading_end().ok()?;
         let free = self.free_flight(end);
         let body = |velocity: &Vec<f64>| {
+            let beside = self.in_flight(velocity).and_then(|of| of.all_along()).unwrap_or(0.0);
             let (mut of, mut by) = (0.0, 0.0);
             for i in free.map_or(0..end + 1, |from| from..self.time.len()) {
-                let change = velocity[i] - velocity[0];
+                let change = velocity[i] - velocity[0] - beside * (self.time[i] - self.time[0]);
                 let weight = if free.is_some() { 1.0 } else { change };
                 of += self.impulse[i] * weight;
                 by += change * weight;
@@ -330,30 +338,43 @@ impl Record {
         (states >= FREE.0 && share >= FREE.1).then_some(from)
     }
 
-    /// What other forces than the contact's may change a mass by momentum, as a share: the acceleration of body `k` before or
-    /// after the contact, over the time and the change of velocity that the mass is taken from.
-    fn unexplained(&self, k: usize) -> f64 {
-        let (Some((first, _)), Ok(end)) = (self.contact(), self.loading_end()) else { return 0.0 };
+    /// The acceleration of a body before and after the contact.
+    fn in_flight(&self, velocity: &[f64]) -> Option<Flights> {
+        let (first, end) = (self.contact()?.0, self.loading_end().ok()?);
         let free = self.free_flight(end);
         let before = self.time.partition_point(|&t| t < first);
-        let velocity = &self.velocities[k];
         let all = self.time.len();
         let at = free.map_or(end, |from| (from + all - 1) / 2);
         let span = self.time[at] - self.time[0];
         // What vibrates for a moment is not extended over the whole impact.
-        let acceleration = |from: usize, to: usize| match to.saturating_sub(from) {
-            states if states < FREE.0 => 0.0,
-            _ if self.time[to - 1] - self.time[from] < MOMENT * span => 0.0,
-            _ => trend(&self.time[from..to], &velocity[from..to]),
+        let trend = |from: usize, to: usize| {
+            let lasts = to.saturating_sub(from) >= FREE.0
+                && self.time[to - 1] - self.time[from] >= MOMENT * span;
+            lasts.then(|| Trend::of(&self.time[from..to], &velocity[from..to]))
         };
-        let most = acceleration(0, before).max(acceleration(free.unwrap_or(all), all));
-        let change = (velocity[at] - velocity[0]).abs();
+        Some(Flights {
+            before: trend(0, before),
+            after: trend(free.unwrap_or(all), all),
+            share_of: span / (velocity[at] - velocity[0]).abs(),
+        })
+    }
+
+    /// What other forces than the contact's may change a mass by momentum, as a share, if it does not allow for them: the
+    /// acceleration of body `k` before or after the contact, over the time and the change of velocity that the mass is taken from.
+    fn unexplained(&self, k: usize) -> f64 {
+        let Ok(end) = self.loading_end() else { return 0.0 };
+        let velocity = &self.velocities[k];
+        let Some(flights) = self.in_flight(velocity) else { return 0.0 };
+        if flights.all_along().is_some() {
+            return 0.0;
+        }
+        let free = self.free_flight(end);
         let while_loading = if free.is_none() {
             constant_force(&self.impulse[..=end], &velocity[..=end], &self.time[..=end])
         } else {
             0.0
         };
-        let share = most * span / change;
+        let share = flights.most() * flights.share_of;
         if share.is_finite() { share.max(while_loading) } else { while_loading }
     }
 
@@ -417,23 +438,60 @@ fn constant_force(impulse: &[f64], velocity: &[f64], time: &[f64]) -> f64 {
     if is_explained && share.is_finite() { share } else { 0.0 }
 }
 
-/// Slope of the line of least squares through values over time, less what values that scatter about it so widely may show
-/// by chance: the standard deviation of the slope of n independent values is √12 s / (T √n), and independent ones cross
-/// their line n/2 times; of vibrations that cross it as often less is left.
-fn trend(time: &[f64], values: &[f64]) -> f64 {
-    let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
-    let (t0, v0) = (mean(time), mean(values));
-    let (of, by) = time
-        .iter()
-        .zip(values)
-        .fold((0.0, 0.0), |(of, by), (t, v)| (of + (t - t0) * (v - v0), by + (t - t0).powi(2)));
-    let slope = of / by;
-    let left = time.iter().zip(values).map(|(t, v)| v - v0 - slope * (t - t0));
-    let left: Vec<f64> = left.collect();
-    let scatter = (left.iter().map(|r| r * r).sum::<f64>() / time.len() as f64).sqrt();
-    let crossings = left.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
-    let by_chance = CHANCE * scatter * (6.0 / crossings as f64).sqrt().min(1.0);
-    (slope.abs() - by_chance / (time[time.len() - 1] - time[0])).max(0.0)
+/// Slope of a velocity while no contact acts, and by how much it may be off by chance.
+#[derive(Clone, Copy)]
+struct Trend {
+    slope: f64,
+    by_chance: f64,
+}
+
+/// The accelerations of a body before and after the contact, where it flies for long enough.
+struct Flights {
+    before: Option<Trend>,
+    after: Option<Trend>,
+    /// By what share an acceleration all along changes the mass.
+    share_of: f64,
+}
+
+impl Flights {
+    /// What surely is not chance, at most.
+    fn most(&self) -> f64 {
+        [self.before, self.after].into_iter().flatten().map(|of| of.sure()).fold(0.0, f64::max)
+    }
+
+    /// The acceleration by a force that changes the mass and acts all along: a weight has the same after the contact, a brake turns
+    /// with the motion, so that one seen after it alone may be either.
+    fn all_along(&self) -> Option<f64> {
+        let before = self.before.filter(|of| of.sure() * self.share_of > LEAST_BESIDE)?;
+        let open = ALIKE * before.slope.abs() + before.by_chance;
+        let is_same = |of: Trend| (before.slope - of.slope).abs() < open + of.by_chance;
+        self.after.is_none_or(is_same).then_some(before.slope)
+    }
+}
+
+impl Trend {
+    /// The slope of least squares. By chance, that of n independent values that scatter by s has a standard deviation of
+    /// √12 s / (T √n), and they cross their line n/2 times; vibrations cross it less often.
+    fn of(time: &[f64], values: &[f64]) -> Self {
+        let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
+        let (t0, v0) = (mean(time), mean(values));
+        let (of, by) = time
+            .iter()
+            .zip(values)
+            .fold((0.0, 0.0), |(of, by), (t, v)| (of + (t - t0) * (v - v0), by + (t - t0).powi(2)));
+        let slope = of / by;
+        let left = time.iter().zip(values).map(|(t, v)| v - v0 - slope * (t - t0));
+        let left: Vec<f64> = left.collect();
+        let scatter = (left.iter().map(|r| r * r).sum::<f64>() / time.len() as f64).sqrt();
+        let crossings = left.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
+        let by_chance = CHANCE * scatter * (6.0 / crossings as f64).sqrt().min(1.0);
+        Self { slope, by_chance: by_chance / (time[time.len() - 1] - time[0]) }
+    }
+
+    /// What surely is not chance.
+    fn sure(&self) -> f64 {
+        (self.slope.abs() - self.by_chance).max(0.0)
+    }
 }
 
 /// The first damage of a source, found when it was listed or when it was read.
@@ -452,7 +510,7 @@ mod tests {
         let time: Vec<f64> = (0..120).map(|i| f64::from(i) * 0.75e-3).collect();
         let of = |value: &dyn Fn(f64) -> f64| {
             let values: Vec<f64> = time.iter().map(|&t| value(t)).collect();
-            trend(&time, &values)
+            Trend::of(&time, &values).sure()
         };
         let span = 119.0 * 0.75e-3;
         for periods in [2.3, 5.0, 11.7, 30.0] {
