@@ -2011,3 +2011,25 @@ fn a_wall_that_moves_is_named() {
         assert!(!said.contains("moves"), "{said}");
     }
 }
+
+/// A plate that is driven through a tube at a constant speed: no impact, and no run that died either.
+#[test]
+fn a_prescribed_motion_is_named() {
+    let mut history = History { bodies: vec![Default::default()], ..History::default() };
+    for k in 0..400 {
+        let time_s = 1e-4 * f64::from(k);
+        history.time_s.push(time_s);
+        history.contact_n.push(60e3 * (time_s / 2e-3).min(1.0));
+        history.bodies[0].displacement_m[4].push(5.0 * time_s);
+        history.bodies[0].velocity_m_per_s[4].push(5.0);
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    one_body(&here.join("tube/a"), &history);
+    let error = crumple_fails(here, 1, "init tube");
+    says(&error, "a: the bodies keep their speed although a force acts: their motion is prescribed");
+    history.contact_n.fill(0.0);
+    one_body(&here.join("tube/a"), &history);
+    let error = crumple_fails(here, 1, "init tube");
+    says(&error, "it terminated early: the record ends at 0.0399");
+}

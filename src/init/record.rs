@@ -32,6 +32,8 @@ const SLOWED: f64 = 0.005;
 const EXPLAINED: f64 = 0.01;
 /// A body that has moved by this share of what follows is slower than at the impact.
 const MOVED: f64 = 0.1;
+/// A body whose speed changes by less than this share although a force acts is driven.
+const DRIVEN: f64 = 1e-4;
 /// A motion that goes on for more states than this goes on without its force.
 const FURTHER: usize = 3;
 /// A flight after the contact that is shorter than this, in states and as a share of the record,
@@ -200,6 +202,13 @@ impl Record {
             None if self.closing(last) < STOPPED * self.closing(0) => Ok(last),
             None => Err(self.closing(last) / self.closing(0)),
         }
+    }
+
+    /// Whether the bodies keep their speed although forces act.
+    pub(super) fn is_driven(&self) -> bool {
+        let keeps = |i: usize| (self.closing(i) / self.closing(0) - 1.0).abs() < DRIVEN;
+        self.run.survey.forces.iter().any(|force| force.size() > 0.0)
+            && (0..self.time.len()).all(keeps)
     }
 
     /// What the body has moved at the times of the force, up to the end of the loading; in the file's unit.
