@@ -2027,7 +2027,10 @@ fn a_prescribed_motion_is_named() {
     let here = folder.path();
     one_body(&here.join("tube/a"), &history);
     let error = crumple_fails(here, 1, "init tube");
-    says(&error, "a: the bodies keep their speed although a force acts: their motion is prescribed");
+    says(
+        &error,
+        "a: the bodies keep their speed although a force acts: their motion is prescribed",
+    );
     history.contact_n.fill(0.0);
     one_body(&here.join("tube/a"), &history);
     let error = crumple_fails(here, 1, "init tube");

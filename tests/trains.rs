@@ -1,6 +1,7 @@
 //! Trains as users write them: shipped scenarios, split vehicles, couplers, dampers, forces that
 //! may drive an interface, speeds of the interfaces, the comparison with FE's run of a train.
 
+use crate::common::crash::{History, Layout, MM_T_S, Motions, Node};
 use crate::common::{
     crumple_fails, crumple_in, crumple_ok, demo_folder, json as parsed, read_json, root, says,
 };
@@ -318,6 +319,105 @@ fn the_train_set_is_compared_with_fe() {
     assert!((result["fe"]["A1"][0].as_f64().unwrap() - 5.0).abs() < 1e-9);
     let error = crumple_fails(demo, 1, "compare --train scenario.toml");
     says(&error, "the scenario has no [reference]");
+}
+
+/// FE's trains may go either way, reach the contact between two states, and have a gap before it or crush zones of their own: what is
+/// written of a run of crumple is that run.
+#[test]
+fn a_run_is_its_own_reference() {
+    let demo = demo_folder();
+    let demo = demo.path();
+    let text = |contact: &str, front: &str, reference: &str| {
+        format!(
+            "[run]\nduration = \"200ms\"\noutput_interval = \"0.75ms\"\n[curves]\n\
+             nose = {{ database = \"curves.h5\", case = \"lead-car-pair/36kmh\" }}\n\
+             inner = {{ database = \"curves.h5\", case = \"vehicle-pair/25kmh\", gap = \"32mm\" }}\n\
+             [[train]]\nname = \"A\"\nspeed = \"5m/s\"\ninner = \"inner\"\n\
+             vehicles = [ {{ name = \"A1\", mass = \"24t\"{front} }}, {{ name = \"A2\", mass = \"40t\" }} ]\n\
+             [[train]]\nname = \"B\"\nspeed = \"-10m/s\"\ninner = \"inner\"\n\
+             vehicles = [ {{ name = \"B1\", mass = \"24t\" }}, {{ name = \"B2\", mass = \"33t\" }} ]\n\
+             [contact]\ncurve = \"nose\"\n{contact}\n\
+             [reference]\nfile = \"fe/nodout\"\nunits = \"mm-t-s\"\n{reference}\n"
+        )
+    };
+    const NODES: &str = "nodes = { A1 = 1, A2 = 2, B1 = 3, B2 = 4 }";
+    std::fs::write(demo.join("own.toml"), text("", "", NODES)).unwrap();
+    let own = parsed(&crumple_ok(demo, "simulate own.toml --json -q"));
+    let interfaces = own["summary"]["interfaces"].as_array().unwrap();
+    let nose = interfaces.iter().find(|of| of["name"] == "A1|B1").unwrap();
+    let crush_m = nose["max_deflection_m"].as_f64().unwrap();
+    let vehicles = ["A1", "A2", "B1", "B2"];
+    // Every state, or every fourth one, the first of them 1.5 ms before the contact and the next 1.5 ms after it.
+    let write = |sign: f64, coarse: bool| {
+        let mut history = History::default();
+        let of = |name: &str, before: fn(&[f64]) -> f64| -> Vec<f64> {
+            let all = column(&own, name);
+            match coarse {
+                true => std::iter::once(before(&all))
+                    .chain(all.into_iter().skip(2).step_by(4))
+                    .collect(),
+                false => all,
+            }
+        };
+        history.time_s = of("time_s", |_| -1.5e-3);
+        let first_s = history.time_s[0];
+        history.time_s.iter_mut().for_each(|t| *t -= first_s);
+        for name in vehicles {
+            let mut body = Motions::default();
+            body.velocity_m_per_s[4] = of(&format!("v_m_per_s[{name}]"), |v| v[0]);
+            body.displacement_m[4] = vec![0.0; history.time_s.len()];
+            history.bodies.push(body);
+        }
+        let nodes: Vec<Node> = (0..4)
+            .map(|k| Node { id: k as i64 + 1, title: "", on: Some((k, 4)), shakes: 0.0 })
+            .collect();
+        Layout { units: MM_T_S, axis: 0, sign }.nodout(&demo.join("fe"), &history, &nodes);
+    };
+    let compared = |text: &str| {
+        std::fs::write(demo.join("own.toml"), text).unwrap();
+        parsed(&crumple_ok(demo, "compare --train own.toml --nsdm-seeds 0 --json -q"))
+    };
+    let check = |result: &Value, most: f64| {
+        let row = &result["rows"][0];
+        let error = row["mean_velocity_l1"].as_f64().unwrap();
+        assert!(error < most, "{error}");
+        let all = row["interfaces"].as_array().unwrap();
+        let of = all.iter().find(|of| of["interface"] == "A1|B1").unwrap();
+        let fe_m = of["fe_crush_m"].as_f64().unwrap();
+        assert!((fe_m / crush_m - 1.0).abs() < 2e-3, "{fe_m} for {crush_m}");
+    };
+    // The gap before the first contact is closed where the comparison begins.
+    for (sign, gap) in [(1.0, "gap = \"50mm\""), (-1.0, "")] {
+        write(sign, false);
+        check(&compared(&text(gap, "", NODES)), 1e-3);
+    }
+    let late = compared(&text("", "", &format!("{NODES}\nuntil = \"900ms\"")));
+    says(&late["warnings"].to_string(), "FE's record ends at 199.5 ms, before until");
+    // Work does not depend on the scenario's outputs.
+    let work = |result: &Value| result["rows"][0]["interfaces"][0]["work_J"].as_f64().unwrap();
+    let coarse = compared(&text("", "", NODES).replace("0.75ms", "6ms"));
+    check(&coarse, 1e-3);
+    assert!((work(&coarse) / work(&late) - 1.0).abs() < 1e-3);
+    // A crush zone of the scenario's own is kept, and takes the place of an end.
+    let front = ", front = { mass = \"0.8t\", curve = \"nose\" }";
+    std::fs::write(demo.join("own.toml"), text("", front, NODES)).unwrap();
+    let printed = crumple_ok(demo, "compare --train own.toml --nsdm-seeds 0");
+    assert!(printed.contains("A1 front|A1") && !printed.contains("split_ends"), "{printed}");
+    write(1.0, true);
+    let result = compared(&text("", "", &format!("{NODES}\ncontact = \"1.5ms\"")));
+    check(&result, 2e-3);
+    says(&result["warnings"].to_string(), "too coarse for CFC 60");
+    // A file that is cut says so here, too.
+    let file = demo.join("fe/nodout");
+    let whole = std::fs::read(&file).unwrap();
+    std::fs::write(&file, &whole[..whole.len() - 100]).unwrap();
+    let result = compared(&text("", "", &format!("{NODES}\ncontact = \"1.5ms\"")));
+    says(&result["warnings"].to_string(), "the file ends within this line");
+    std::fs::write(demo.join("own.toml"), text("", "", &NODES.replace("A2 = 2", "A2 = 1")))
+        .unwrap();
+    let error = crumple_fails(demo, 1, "compare --train own.toml");
+    says(&error, "own.toml:23:24");
+    says(&error, "node 1 is named for A1 already");
 }
 
 /// A gap in another unit, a coupler that leaves the crush out, a contact that repeats, and a reference

@@ -311,9 +311,17 @@ fn trains(
     for (path, train) in &trains {
         let of_train =
             if trains.len() == 1 { String::new() } else { format!("{}: ", path.display()) };
-        let of_rows = train.rows.iter().flat_map(|row| {
-            row.warnings.iter().map(move |warning| format!("{}: {warning}", row.method))
-        });
+        // What several methods say is said once.
+        let mut said: Vec<(&str, Vec<&str>)> = Vec::new();
+        for row in &train.rows {
+            for warning in &row.warnings {
+                match said.iter_mut().find(|(text, _)| text == warning) {
+                    Some((_, methods)) => methods.push(&row.method),
+                    None => said.push((warning, vec![&row.method])),
+                }
+            }
+        }
+        let of_rows = said.iter().map(|(text, methods)| format!("{}: {text}", methods.join(", ")));
         let warnings = train.warnings.iter().cloned().chain(of_rows);
         outcome = outcome.max(options.warn_all(warnings.map(|w| format!("{of_train}{w}"))));
     }
@@ -368,12 +376,14 @@ fn print_crush(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
     // FE's row comes first.
     let rows = std::iter::once(None).chain(comparison.rows.iter().map(Some));
     let methods = Table::of(rows).column("method", |row| row.map_or("fe", |row| &row.method));
-    let table = first.interfaces.iter().enumerate().fold(methods, |table, (k, interface)| {
+    let table = first.interfaces.iter().fold(methods, |table, interface| {
         table.column(&interface.interface, |row| match row {
             None => interface.fe_crush_m.map_or("-".into(), |m| format!("{m:.4} m")),
             Some(row) => {
-                let (crush_m, work_j) = (row.interfaces[k].crush_m, row.interfaces[k].work_j);
-                format!("{crush_m:.4} m ({:.3} MJ)", work_j / 1e6)
+                let own = row.interfaces.iter().find(|own| own.interface == interface.interface);
+                own.map_or("-".into(), |own| {
+                    format!("{:.4} m ({:.3} MJ)", own.crush_m, own.work_j / 1e6)
+                })
             }
         })
     });
@@ -388,8 +398,9 @@ fn print_train(out: &mut dyn Write, comparison: &TrainComparison) -> io::Result<
     let fe_time = comparison.fe_time_s.map_or(String::new(), |t| format!("; FE took {t:.0} s"));
     writeln!(
         out,
-        "velocity errors up to {:.1} ms, accelerations (CFC 60) in brackets{fe_time}",
-        comparison.until_s * 1e3
+        "velocity errors up to {:.1} ms, accelerations ({}) in brackets{fe_time}",
+        comparison.until_s * 1e3,
+        comparison.filter()
     )?;
     let cell = |v: f64, a: f64| format!("{:.1} % ({:.0})", v * 100.0, a * 100.0);
     let mut table = Table::of(&comparison.rows)

@@ -244,6 +244,11 @@ fn advancing_states(deflection_m: &[f64], end: usize) -> Vec<usize> {
     states
 }
 
+/// Whether [`filtered`] filters values at `time_s`.
+pub(crate) fn can_filter(time_s: &[f64]) -> bool {
+    cfc::filter(CLASS, time_s, &vec![0.0; time_s.len()]).is_ok()
+}
+
 /// CFC 60 of values at `time_s`, as they are if their interval is too coarse for it.
 pub(crate) fn filtered(time_s: &[f64], values: Vec<f64>) -> Vec<f64> {
     match cfc::filter(CLASS, time_s, &values) {

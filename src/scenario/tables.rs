@@ -171,7 +171,7 @@ pub(crate) struct CurveTable {
     /// Of a model or predicted curve: member of the band of the force that is taken, from −1
     /// (lower edge) through 0 (the curve) to 1 (upper edge).
     pub(crate) band: Option<f64>,
-    /// Factor on the force.
+    /// Factor on the force, and on the curve's own unloading stiffness.
     pub(crate) scale: Option<f64>,
 }
 

@@ -121,6 +121,12 @@ fn crush_methods(
     let mut without = models.clone();
     groups.keys().for_each(|name| without.without_stopped_mass(name));
     let rates = with_rates(scenario, groups);
+    // Crush zones of the scenario's own stay as they are.
+    let has_ends = scenario
+        .train
+        .iter()
+        .flat_map(|t| &t.vehicles)
+        .any(|v| v.front.is_some() || v.rear.is_some());
     let of = [
         ("rate_only", rates.clone(), without),
         ("rate_live", rates, models.clone()),
@@ -133,7 +139,8 @@ fn crush_methods(
         sources,
         fit_time_s,
     };
-    of.map(method).into()
+    let of = of.into_iter().filter(|(name, ..)| *name != "split_ends" || !has_ends);
+    of.map(method).collect()
 }
 
 /// The scenario with forces that follow the speeds of its run.

@@ -9,6 +9,8 @@ use std::path::Path;
 use serde::Serialize;
 
 use super::methods::ComparisonSettings;
+use crate::curve::body::can_filter;
+use crate::curve::contact::milliseconds;
 use crate::error::{Error, KeyPath, error};
 use crate::file;
 use crate::history::EntityId;
@@ -37,6 +39,13 @@ pub struct TrainComparison {
     pub rows: Vec<TrainRow>,
 }
 
+impl TrainComparison {
+    /// The filter of the accelerations.
+    pub(crate) fn filter(&self) -> &'static str {
+        if can_filter(&self.time_s) { "CFC 60" } else { "unfiltered" }
+    }
+}
+
 /// One method in the train.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[cfg_attr(test, derive(schemars::JsonSchema))]
@@ -44,8 +53,8 @@ pub struct TrainRow {
     /// `fe_body`, `fdrm` (FE's curves of the scenario, of the body's motion and of the recipe's
     /// force), `nsdm`, `ddtcm`, `best_train`, `best_local` (curves for the trains' speed and for
     /// each interface's own), `rate_live` (the force follows the run's closing speeds), `split_ends`
-    /// (each vehicle with two ends of the models). The last two only if every group has a
-    /// crush law.
+    /// (each vehicle with two ends of the models; not in a scenario with crush zones of its own). The last two
+    /// only if every group has a crush law.
     pub method: String,
     /// What drives its interfaces: `body force`, `recipe's force`, `spring and damper`, `crush
     /// force`.
@@ -56,7 +65,7 @@ pub struct TrainRow {
     pub mean_velocity_difference_m_per_s: f64,
     /// The same as a share of the fastest vehicle's first speed.
     pub mean_velocity_share_of_initial: f64,
-    /// Of the acceleration, filtered with CFC 60.
+    /// Of the acceleration, filtered with CFC 60 where FE's output allows it.
     pub mean_acceleration_l1: f64,
     /// Errors of each vehicle.
     pub(crate) vehicles: Vec<VehicleErrors>,
@@ -87,7 +96,7 @@ pub(crate) struct VehicleErrors {
     pub velocity_difference_m_per_s: f64,
     /// The same as a share of the fastest vehicle's first speed.
     pub velocity_share_of_initial: f64,
-    /// CFC 60 on both sides.
+    /// CFC 60 on both sides, where FE's output allows it.
     pub acceleration_l1: f64,
 }
 
@@ -142,15 +151,16 @@ fn compared(
         )
         .at_key("reference.nodes"));
     }
-    let fe = &FeTrain::read(path, reference)?;
-    for (name, speeds) in &fe.velocities {
+    let speed = |name: &str| {
         let train = scenario.train.iter().find(|t| t.vehicles.iter().any(|v| v.name == *name));
-        if let (Some(train), Some(&fe_m_per_s)) = (train, speeds.first()) {
-            let m_per_s = train.speed.0;
-            if (fe_m_per_s - m_per_s).abs() > SAME_SPEED * m_per_s.abs().max(1.0) {
-                let vehicle = name.clone();
-                return Err(error!(Comparison, "in FE's record {vehicle} starts at {fe_m_per_s:.3} m/s, in the scenario at {m_per_s:.3} m/s: check units, nodes and speeds").at(KeyPath::of("reference.nodes").key(name)));
-            }
+        train.map(|train| train.speed.0)
+    };
+    let fe = &FeTrain::read(path, reference, speed)?;
+    for (name, speeds) in &fe.velocities {
+        if let (Some(m_per_s), Some(&fe_m_per_s)) = (speed(name), speeds.first())
+            && (fe_m_per_s - m_per_s).abs() > SAME_SPEED * m_per_s.abs().max(1.0)
+        {
+            return Err(error!(Comparison, "in FE's record {name} starts at {fe_m_per_s:.3} m/s, in the scenario at {m_per_s:.3} m/s: check units, nodes and speeds").at(KeyPath::of("reference.nodes").key(name)));
         }
     }
     let until_s = reference.until.map_or(f64::MAX, |t| t.0);
@@ -169,17 +179,29 @@ fn compared(
         });
     }
     let time_s = &fe.time_s[..states];
+    let mut warnings = fe.warnings.clone();
+    let interval_s = time_s[states - 1] - time_s[states - 2];
+    if until_s < f64::MAX && until_s > time_s[states - 1] + interval_s {
+        warnings.push(format!(
+            "reference: FE's record ends at {}, before until",
+            milliseconds(time_s[states - 1])
+        ));
+    }
+    if !can_filter(time_s) {
+        warnings.push("reference: FE's output is too coarse for CFC 60: accelerations are compared as they are, unfiltered".into());
+    }
     let sources = Sources::read(path, scenario)?;
     let mut rows = Vec::new();
     for method in methods(path, scenario, &sources, settings)? {
         rows.push(row(path, method, fe, time_s)?);
     }
+    warnings.extend(rows.first().into_iter().flat_map(|row| misfits(fe, time_s, row)));
     Ok(TrainComparison {
         until_s: time_s[states - 1],
         time_s: time_s.to_vec(),
         fe: fe.velocities.iter().map(|(n, v)| (n.clone(), v[..states].to_vec())).collect(),
         fe_time_s: fe.wall_time_s,
-        warnings: rows.first().map_or(Vec::new(), |row| misfits(fe, time_s, row)),
+        warnings,
         rows,
     })
 }
@@ -237,8 +259,7 @@ fn misfits(fe: &FeTrain, time_s: &[f64], row: &TrainRow) -> Vec<String> {
     warnings
 }
 
-/// FE's motion of a train: time from the first contact on, speeds positive in the direction
-/// in which the first train moves.
+/// FE's motion of a train: time from the first contact on, speeds with the signs of the scenario's.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct FeTrain {
     pub time_s: Vec<f64>,
@@ -246,6 +267,8 @@ pub(crate) struct FeTrain {
     pub velocities: Vec<(String, Vec<f64>)>,
     /// Wall-clock time of FE, in s.
     pub wall_time_s: Option<f64>,
+    /// Damage of its file.
+    pub warnings: Vec<String>,
 }
 
 impl FeTrain {
@@ -255,8 +278,22 @@ impl FeTrain {
         firsts.fold(0.0, |most: f64, v| most.max(v.abs()))
     }
 
-    /// Reads what a scenario's reference names; `path` is the scenario's.
-    pub(crate) fn read(path: &Path, reference: &ReferenceTable) -> Result<Self, Error> {
+    /// Reads what a scenario's reference names; `path` is the scenario's, and `speed` that of each vehicle in it, in m/s.
+    fn read(
+        path: &Path,
+        reference: &ReferenceTable,
+        speed: impl Fn(&str) -> Option<f64>,
+    ) -> Result<Self, Error> {
+        let mut named: BTreeMap<i64, &str> = BTreeMap::new();
+        for (name, &node) in &reference.nodes {
+            if let Some(other) = named.insert(node, name) {
+                return Err(error!(
+                    Comparison,
+                    "node {node} is named for {other} already: each vehicle has its own"
+                )
+                .at(KeyPath::of("reference.nodes").key(name)));
+            }
+        }
         let folder = path.parent().unwrap_or(Path::new(""));
         let file = folder.join(&reference.file);
         let selection = Selection {
@@ -291,18 +328,20 @@ impl FeTrain {
             }
             velocities.push((name.clone(), values.iter().map(|v| v * units.speed()).collect()));
         }
-        // The first train moves forwards, whichever way it went in FE.
-        let fastest = velocities
-            .iter()
-            .filter_map(|(_, v): &(String, Vec<f64>)| v.first().copied())
-            .fold(0.0, |a: f64, b| if b.abs() > a.abs() { b } else { a });
-        if fastest < 0.0 {
+        // Trains may go either way in FE.
+        let off = |sign: f64| -> f64 {
+            let off =
+                |(name, v): &(String, Vec<f64>)| Some((sign * v.first()? - speed(name)?).abs());
+            velocities.iter().filter_map(off).sum()
+        };
+        if off(-1.0) < off(1.0) {
             velocities.iter_mut().for_each(|(_, v)| v.iter_mut().for_each(|v| *v = -*v));
         }
         let case = file::read_text(&file.with_file_name("case.json"), 1 << 20).ok();
         let wall_time_s = case
             .and_then(|text| serde_json::from_str::<serde_json::Value>(&text).ok())
             .and_then(|case| case.get("engine_wall_time_s")?.as_f64());
-        Ok(Self { time_s, velocities, wall_time_s })
+        let warnings = read.problems.iter().map(|p| format!("{}: {p}", file.display())).collect();
+        Ok(Self { time_s, velocities, wall_time_s, warnings })
     }
 }

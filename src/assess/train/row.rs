@@ -8,8 +8,8 @@ use super::methods::Method;
 use super::{FeTrain, InterfaceCrush, TrainRow, VehicleErrors};
 use crate::curve::body::filtered;
 use crate::error::{Error, KeyPath, error};
-use crate::multibody::{Chain, Run, simulate};
-use crate::scenario;
+use crate::multibody::{Chain, Run, RunSettings, simulate};
+use crate::scenario::{self, Prepared};
 use crate::signal::{derivative, integral, interpolate, l1_ratio};
 
 /// Runs a method's scenario and compares the vehicles with FE's at `time_s`, the first times of
@@ -23,7 +23,9 @@ pub(super) fn row(
     let start = Instant::now();
     let scenario = scenario::check(path, &method.scenario)?;
     let prepared = scenario::assemble(path, &scenario, &method.sources)?;
-    let run = simulate(&prepared.chain, &prepared.settings)?;
+    let settings =
+        RunSettings { output_interval_s: interval_s(&prepared, time_s), ..prepared.settings };
+    let run = simulate(&prepared.chain, &settings)?;
     let simulation_time_s = start.elapsed().as_secs_f64();
     let bodies = prepared.chain.bodies();
     let (mut vehicles, mut velocities) = (Vec::new(), BTreeMap::new());
@@ -73,6 +75,15 @@ pub(super) fn row(
     })
 }
 
+/// FE's interval may be coarse for the work of a force, and the scenario's for FE's speeds: each state of FE has several outputs of its
+/// own, down to 0.1 ms.
+fn interval_s(prepared: &Prepared, time_s: &[f64]) -> f64 {
+    const OUTPUTS_PER_STATE: f64 = 8.0;
+    const FINEST_S: f64 = 1e-4;
+    let own_s = (time_s[time_s.len() - 1] - time_s[0]) / (time_s.len() - 1) as f64;
+    prepared.settings.output_interval_s.min(own_s.min(FINEST_S.max(own_s / OUTPUTS_PER_STATE)))
+}
+
 fn vehicle_errors(
     name: &str,
     time_s: &[f64],
@@ -98,7 +109,10 @@ fn vehicle_errors(
 /// zones that follow the same two vehicles, belong together.
 fn between_vehicles(chain: &Chain, run: &Run, fe: &FeTrain, time_s: &[f64]) -> Vec<InterfaceCrush> {
     let until_s = time_s[time_s.len() - 1];
-    let rows = run.time_s.iter().take_while(|&&t| t <= until_s * (1.0 + 1e-9)).count();
+    // The comparison may end between two outputs.
+    let before = run.time_s.iter().copied().take_while(|&t| t < until_s);
+    let at: Vec<f64> = before.chain([until_s]).collect();
+    let until = |values: &[f64]| interpolate(&run.time_s, values, &at).unwrap_or_default();
     let interfaces = chain.interfaces();
     let mut crushes = Vec::new();
     for (k, interface) in interfaces.iter().enumerate() {
@@ -112,22 +126,32 @@ fn between_vehicles(chain: &Chain, run: &Run, fe: &FeTrain, time_s: &[f64]) -> V
         let ahead = (k + 1 < chain.bodies().len()).then_some(k + 1);
         let (behind, ahead) = rate.map_or((k, ahead), |rate| (rate.behind, rate.ahead));
         let parts: Vec<usize> = [before, Some(k), after].into_iter().flatten().collect();
-        let approach = |row: usize| {
-            let x = |i: usize| run.bodies[i].x_m[row];
-            x(behind) - ahead.map_or(0.0, x) - interface.gap_m
-        };
+        let moved = |i: usize| until(&run.bodies[i].x_m);
+        let mut approach_m: Vec<f64> =
+            moved(behind).into_iter().map(|x| x - interface.gap_m).collect();
+        if let Some(ahead) = ahead {
+            approach_m.iter_mut().zip(moved(ahead)).for_each(|(a, x)| *a -= x);
+        }
+        // The run begins at the first contact, whose gap is closed.
+        let still_open_m = approach_m.first().map_or(interface.gap_m, |a| -a);
         let name = |i: usize| chain.bodies()[i].name.as_str();
         crushes.push(InterfaceCrush {
             interface: interface.name.clone(),
-            crush_m: (0..rows).map(approach).fold(0.0, f64::max),
-            fe_crush_m: fe_crush_m(fe, time_s, name(behind), ahead.map(name), interface.gap_m),
-            work_j: parts.iter().map(|&j| work_j(run, j, rows)).sum(),
+            crush_m: approach_m.iter().copied().fold(0.0, f64::max),
+            fe_crush_m: fe_crush_m(fe, time_s, name(behind), ahead.map(name), still_open_m),
+            work_j: parts
+                .iter()
+                .map(|&j| {
+                    let of = &run.interfaces[j];
+                    work_j(&until(&of.deflection_m), &until(&of.force_n))
+                })
+                .sum(),
         });
     }
     crushes
 }
 
-/// FE's maximum approach of two vehicles, or a vehicle and the wall, minus the gap.
+/// FE's maximum approach of two vehicles, or a vehicle and the wall, from contact on, minus the gap that is open there.
 fn fe_crush_m(
     fe: &FeTrain,
     time_s: &[f64],
@@ -137,7 +161,9 @@ fn fe_crush_m(
 ) -> Option<f64> {
     let moved = |name: &str| {
         let (_, v) = fe.velocities.iter().find(|(vehicle, _)| vehicle == name)?;
-        Some(integral(time_s, &v[..time_s.len()]))
+        let moved = integral(time_s, &v[..time_s.len()]);
+        // The contact may lie between two states.
+        Some(moved.into_iter().map(|m| m + v[0] * time_s[0]).collect::<Vec<f64>>())
     };
     let behind = moved(behind)?;
     let ahead = match ahead {
@@ -148,8 +174,7 @@ fn fe_crush_m(
     Some(crush.fold(0.0, f64::max))
 }
 
-/// Work of an interface's force up to an output, by its histories.
-fn work_j(run: &Run, k: usize, rows: usize) -> f64 {
-    let (d, f) = (&run.interfaces[k].deflection_m, &run.interfaces[k].force_n);
-    (1..rows).map(|i| 0.5 * (f[i - 1] + f[i]) * (d[i] - d[i - 1])).sum()
+/// Work of a force over its deflection.
+fn work_j(d: &[f64], f: &[f64]) -> f64 {
+    (1..d.len()).map(|i| 0.5 * (f[i - 1] + f[i]) * (d[i] - d[i - 1])).sum()
 }
