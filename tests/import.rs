@@ -710,6 +710,70 @@ fn a_record_over_time_is_extracted_as_one_of_a_run() {
     says(&error, "the times are in another unit");
 }
 
+/// A load cell shows a force long before the impact, as an offset or as noise: that is not contact. Two bases of time are not none.
+#[test]
+fn a_sensor_before_the_impact_is_not_in_contact() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let (m, v, k): (f64, f64, f64) = (24e3, 10.0, 10e6);
+    let omega = (k / m).sqrt();
+    let table = |header: &str, from: i32, sensor: &dyn Fn(i32) -> f64, digits: usize| {
+        let mut text = format!("{header}\n");
+        for i in from..=1_200 {
+            let t = f64::from(i) * 1e-4;
+            let d = if t < 0.0 { v * t } else { v / omega * (omega * t).sin() };
+            let f = if t < 0.0 { 0.0 } else { (k * d).max(0.0) } + sensor(i);
+            text += &format!("{t:.digits$},{d},{f}\n");
+        }
+        fs::write(here.join("nose.csv"), text).unwrap();
+        let _ = fs::remove_file(here.join("c.h5"));
+        let how = ["--speed", "10m/s", "--kind", "wall", "--mass", "24t"];
+        String::from_utf8(crumple_in(here, &adding(&how)).stderr).unwrap()
+    };
+    let crush_m = || cases(here, "tests")[0]["max_deflection_m"].as_f64().unwrap();
+    const HEADER: &str = "t_s,d_m,force_N";
+    let exact_m = v / omega;
+    let offset = |_: i32| 40e3;
+    let noise = |i: i32| 60e3 * (f64::from(i) * 12.9898).sin() * (f64::from(i) * 78.233).cos();
+    let sensors: [(&str, &dyn Fn(i32) -> f64); 2] = [("offset", &offset), ("noise", &noise)];
+    for (name, sensor) in sensors {
+        let said = table(HEADER, -1_000, sensor, 4);
+        says(&said, "contact: there is a force before time 0, the offset or noise of a sensor");
+        says(&said, "or set \"# contact_time_s: …\" above the header");
+        assert!((crush_m() / exact_m - 1.0).abs() < 0.03, "{name}: {} for {exact_m}", crush_m());
+    }
+    let said = table("# contact_time_s: 0\nt_s,d_m,force_N", -1_000, &offset, 4);
+    assert!(!said.contains("before time 0") && (crush_m() / exact_m - 1.0).abs() < 0.005, "{said}");
+    let said = table(HEADER, -1_000, &|_| 0.0, 4);
+    assert!(!said.contains("warning: nose: contact: there"), "{said}");
+    // A record that was triggered late, and one whose times have lost their digits.
+    let said = table(HEADER, 150, &|_| 0.0, 4);
+    says(&said, "the record begins with ");
+    says(&said, "% of its peak force: the crush before it is missing");
+    let said = table(HEADER, -1_000, &|_| 0.0, 3);
+    says(&said, "states left out because time did not increase: do its times have too few digits?");
+    for header in [
+        "t_d [s],d_m,t_F [s],force_N",
+        "Time Disp [s],d_m,Time Force [s],force_N",
+        "Time [s],d_m,Time2 [s],force_N",
+    ] {
+        fs::write(
+            here.join("nose.csv"),
+            format!("{header}\n0,0,0,0\n0.1,0.1,0.2,2e6\n0.2,0.15,0.3,3e6\n"),
+        )
+        .unwrap();
+        let how = ["--speed", "10m/s", "--kind", "wall", "--mass", "24t"];
+        let error = crumple_fails(here, 1, &adding(&how));
+        says(
+            &error,
+            "nose.csv: line 1: expected one column of times, such as t_s or t_ms, found \"",
+        );
+        says(&error, "choose it with --time-column, or none");
+        let error = crumple_fails(here, 1, &adding(&[&how[..], &["--time-column", "1"]].concat()));
+        says(&error, "the curve has 3 points");
+    }
+}
+
 /// Exports of a case over time say when contact begins: a body force, which rises late, and an offset come back as they are.
 #[test]
 fn the_contact_of_an_exported_case_comes_back() {

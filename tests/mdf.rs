@@ -296,3 +296,68 @@ fn damage_is_an_error() {
         }
     }
 }
+
+/// Times that follow from the number of the record are read; a file that was not closed is refused, records beyond the counted ones are
+/// named, and times that cannot be read are not left out silently.
+#[test]
+fn times_and_records_are_not_lost() {
+    let folder = demo_folder();
+    let here = folder.path();
+    crumple_ok(here, &[&["export"], &CASE[..], &["-q", "-o", "case.mf4"]].concat());
+    let whole = fs::read(here.join("case.mf4")).unwrap();
+    let places = |kind: &[u8]| -> Vec<usize> {
+        let at = whole.windows(4).enumerate().filter(|(_, bytes)| bytes == &kind);
+        at.map(|(at, _)| at).collect()
+    };
+    let number = |at: usize| u64::from_le_bytes(whole[at..at + 8].try_into().unwrap());
+    let data = |block: usize| block + 24 + 8 * number(block + 16) as usize;
+    let channel = places(b"##CN").into_iter().find(|&block| whole[data(block)] == 2).unwrap();
+    let write = |name: &str, change: &dyn Fn(&mut Vec<u8>)| {
+        let mut bytes = whole.clone();
+        change(&mut bytes);
+        fs::write(here.join(name), bytes).unwrap();
+    };
+    let add = |name: &str| crumple_in(here, &["db", "add", "x.h5", name, "--group", "x", "-v"]);
+    let said = |name: &str| {
+        let out = add(name);
+        String::from_utf8([out.stdout, out.stderr].concat()).unwrap()
+    };
+    let own = read(&here.join("case.mf4"), &ReadOptions::default()).unwrap().0;
+    // A virtual master: no bits, time = 0.75 ms × number.
+    write("virtual.mf4", &|bytes| {
+        let at = data(channel);
+        bytes[at] = 3;
+        bytes[at + 2] = 0;
+        bytes[at + 8..at + 12].fill(0);
+        bytes.resize(bytes.len().next_multiple_of(8), 0);
+        let conversion = bytes.len() as u64;
+        let link = channel + 24 + 8 * 4;
+        bytes[link..link + 8].copy_from_slice(&conversion.to_le_bytes());
+        bytes.extend(b"##CC\0\0\0\0");
+        [24 + 32 + 40_u64, 4, 0, 0, 0, 0].iter().for_each(|n| bytes.extend(n.to_le_bytes()));
+        bytes.extend([1, 0, 0, 0, 0, 0, 2, 0]);
+        [0.0, 0.0, 0.0, 0.75e-3_f64].iter().for_each(|n| bytes.extend(n.to_le_bytes()));
+    });
+    let virtual_times = read(&here.join("virtual.mf4"), &ReadOptions::default()).unwrap().0;
+    assert_eq!(virtual_times.force_n, own.force_n);
+    let times = [virtual_times.time_s.unwrap(), own.time_s.unwrap()];
+    assert!(times[0].iter().zip(&times[1]).all(|(a, b)| (a - b).abs() < 1e-9));
+    // Bits that are no whole bytes.
+    write("odd.mf4", &|bytes| bytes[data(channel) + 8] = 63);
+    says(
+        &said("odd.mf4"),
+        "its times are in channel \"time\": it does not hold numbers in whole bytes; or leave them out with --time-column none",
+    );
+    write("open.mf4", &|bytes| bytes[..8].copy_from_slice(b"UnFinMF "));
+    says(
+        &said("open.mf4"),
+        "open.mf4: the file was never finalised, so that records may be missing",
+    );
+    let error = crumple_fails(here, 1, "rate open.mf4 open.mf4");
+    says(&error, "the file was never finalised");
+    let group = data(places(b"##CG")[0]);
+    write("counted.mf4", &|bytes| {
+        bytes[group + 8..group + 16].copy_from_slice(&300_u64.to_le_bytes())
+    });
+    says(&said("counted.mf4"), "left out: what follows the 300 records that the group counts");
+}

@@ -281,7 +281,8 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             true => format!(
                 "write the factor after the file's name: {},scale={}",
                 b.path().display(),
-                size_b / size_a
+                // Quotients of sizes have digits that say nothing.
+                format!("{:.12e}", size_b / size_a).parse::<f64>().unwrap_or(size_b / size_a)
             ),
             false => "they are different quantities".into(),
         };

@@ -27,6 +27,9 @@ const SMALL_SHARE: f64 = 1e-3;
 /// Pulses before the contact that are listed individually.
 const NAMED: usize = 3;
 
+/// What states the contact of a run, in messages.
+pub(super) const STATED_BY: &str = "contact_time or gap in the run";
+
 /// The force above which a record is in contact: a share of its largest.
 pub(crate) fn threshold_n(force_n: &[f64], share: f64) -> f64 {
     share * force_n.iter().copied().fold(0.0, f64::max)
@@ -78,7 +81,9 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
         i => {
             let share = (threshold_n - force_n[i - 1]) / (force_n[i] - force_n[i - 1]);
             let crossing_s = time_s[i - 1] + share.clamp(0.0, 1.0) * (time_s[i] - time_s[i - 1]);
-            let mut gone = (0..i).rev().find(|&k| force_n[k] <= GONE * threshold_n).unwrap_or(0);
+            // A sensor with an offset never comes near 0.
+            let is_gone = |k: &usize| force_n[*k] <= GONE * threshold_n;
+            let mut gone = (0..i).rev().find(is_gone).unwrap_or(i - 1);
             // A force that rises gently begins further down.
             while gone > 0 && force_n[gone] > 0.0 && force_n[gone - 1] < force_n[gone] {
                 gone -= 1;
@@ -91,7 +96,7 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
         .take(NAMED)
         .map(|spell| {
             format!(
-                "contact: ignored the {} at {}, with {} of the impulse; contact starts at {} (contact_time = \"…ms\" in the run overrides this)",
+                "contact: ignored the {} at {}, with {} of the impulse; contact starts at {} ({STATED_BY} overrides this)",
                 spell.shown(),
                 milliseconds(time_s[spell.first]),
                 percent(spell.impulse_ns / total_ns),
@@ -108,7 +113,7 @@ pub(crate) fn onset(time_s: &[f64], force_n: &[f64], threshold_n: f64) -> Option
         && first.impulse_ns < SMALL_SHARE * contact.impulse_ns
     {
         warnings.push(format!(
-            "contact: starts at {} with the {}, {} of the impulse, and resumes at {}: if that is noise, set contact_time = \"…ms\" in the run",
+            "contact: starts at {} with the {}, {} of the impulse, and resumes at {}: if that is noise, set {STATED_BY}",
             milliseconds(crossing_s),
             first.shown(),
             percent(first.impulse_ns / contact.impulse_ns),
@@ -246,7 +251,7 @@ mod tests {
         assert_eq!(
             found.warnings,
             [
-                "contact: ignored the force of up to 20.000 kN over 1 state at 15 ms, with 0.02 % of the impulse; contact starts at 49.005 ms (contact_time = \"…ms\" in the run overrides this)"
+                "contact: ignored the force of up to 20.000 kN over 1 state at 15 ms, with 0.02 % of the impulse; contact starts at 49.005 ms (contact_time or gap in the run overrides this)"
             ]
         );
     }

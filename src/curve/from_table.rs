@@ -161,8 +161,12 @@ fn recorded(
     impact: &Impact,
 ) -> Result<(RecordedCurves, Quality), Error> {
     let mut notes = vec!["motion: from the file's times, not filtered".to_string()];
+    let before = impact.contact_time_s.is_none().then(|| before_zero(time_s, table.force_n));
+    let before = before.flatten();
+    let share = before.unwrap_or(contact::THRESHOLD);
+    let guessed = begins_in_contact(time_s, table.force_n, share);
     let contact = impact.contact_time_s.or_else(|| {
-        begins_in_contact(time_s, table.force_n).then(|| {
+        guessed.then(|| {
             notes.push("contact: the record starts at contact".into());
             time_s[0]
         })
@@ -195,7 +199,7 @@ fn recorded(
         masses: impact.masses,
         manifest_speed_m_per_s: Some(impact.speed.m_per_s),
         deck_speed: None,
-        contact_threshold: contact::THRESHOLD,
+        contact_threshold: share,
         of_impulse: false,
         stated: Stated {
             contact: contact.map(|s| StatedContact::Time { s }),
@@ -217,11 +221,15 @@ fn recorded(
         impossible_for(found, OTHER_SPEED)
     };
     let extracted = |setup: &Setup<'_>| {
-        extract::curve_of(record.clone(), remarks.clone(), setup).map_err(|error| match error {
-            ExtractError::ImpossibleRun(_) if !SPEEDS.contains(&(fastest / stated)) => {
-                other_speed()
+        extract::curve_of(record.clone(), remarks.clone(), setup).map_err(|error| {
+            match error {
+                ExtractError::ImpossibleRun(_) if !SPEEDS.contains(&(fastest / stated)) => {
+                    other_speed()
+                }
+                error => of_table(error),
             }
-            error => of_table(error),
+            // Times that repeat make other things impossible.
+            .followed_by(&remarks.warnings.iter().map(|w| format!("; {w}")).collect::<String>())
         })
     };
     let mut found = extracted(&setup)?;
@@ -239,7 +247,17 @@ fn recorded(
     let Extracted { curves, quality, .. } = found;
     let curves = RecordedCurves { force_kind: impact.force_kind, ..curves };
     let (of_unloading, mut warnings) = remarks_on(&curves, impact)?;
-    warnings.splice(0..0, quality.warnings);
+    // A table has no run: its own line states the contact.
+    let found = quality.warnings.into_iter().map(|w| w.replace(contact::STATED_BY, STATED_BY));
+    warnings.splice(0..0, found);
+    if let Some(share) = before {
+        warnings.push(format!(
+            "contact: there is a force before time 0, the offset or noise of a sensor: contact is taken where it exceeds {:.1} % of its peak; take both off the record, or set {STATED_BY}",
+            100.0 * share
+        ));
+    } else if impact.contact_time_s.is_none() && guessed {
+        warnings.extend(starts_late(&curves).map(|found| format!("contact: {found}")));
+    }
     notes.extend(of_unloading);
     notes.extend(quality.notes);
     Ok((curves, Quality { audit: quality.audit, notes, warnings }))
@@ -311,15 +329,59 @@ fn unloading_of_record(found: Option<f64>, stated: f64) -> Result<String, String
     }
 }
 
-/// Whether the force of a record rises above its threshold within the first interval: what lies
+/// What states the contact of a table, in messages.
+const STATED_BY: &str = "\"# contact_time_s: …\" above the header";
+
+/// Whether the force of a record rises above a share of its largest within the first interval: what lies
 /// before contact is then not in it, and its deflection counts from contact already.
-fn begins_in_contact(time_s: &[f64], force_n: &[f64]) -> bool {
+fn begins_in_contact(time_s: &[f64], force_n: &[f64], share: f64) -> bool {
+    let positive = positive(time_s, force_n);
+    let threshold_n = contact::threshold_n(&positive, share);
+    positive.iter().take(2).any(|f| *f > threshold_n)
+}
+
+/// A force whose impulse is positive.
+fn positive(time_s: &[f64], force_n: &[f64]) -> Vec<f64> {
     let impulse: f64 = (1..time_s.len())
         .map(|i| (force_n[i] + force_n[i - 1]) * (time_s[i] - time_s[i - 1]))
         .sum();
-    let positive: Vec<f64> = force_n.iter().map(|f| f * impulse.signum()).collect();
-    let threshold_n = contact::threshold_n(&positive, contact::THRESHOLD);
-    positive.iter().take(2).any(|f| *f > threshold_n)
+    force_n.iter().map(|f| f * impulse.signum()).collect()
+}
+
+/// States before time 0 that show what a sensor does without a contact.
+const LEAST_BEFORE: usize = 5;
+/// Of a larger share of the peak it may be a contact, whose recording was triggered late.
+const MOST_BEFORE: f64 = 0.1;
+/// Noise of so few states may be larger later.
+const NOISE: f64 = 1.5;
+
+/// The share of its peak above which the force of a test's record is in contact, if it has an offset or noise: tests begin before the
+/// impact, at time 0 (ISO/TS 13499, SAE J211). The first half of that is taken, since a trigger may be late.
+fn before_zero(time_s: &[f64], force_n: &[f64]) -> Option<f64> {
+    let states = time_s.partition_point(|&t| t < 0.0) / 2;
+    let positive = positive(time_s, force_n);
+    let peak_n = contact::threshold_n(&positive, 1.0);
+    let most_n = positive[..states].iter().fold(0.0, |most: f64, f| most.max(f.abs()));
+    let share = NOISE * most_n / peak_n;
+    (states >= LEAST_BEFORE && share > contact::THRESHOLD && share < MOST_BEFORE).then_some(share)
+}
+
+/// A record that begins with a larger share of its peak lacks what was before.
+const MOST_FIRST: f64 = 0.1;
+
+/// What of a record that seems to begin in contact may be missing, or not be contact.
+fn starts_late(curves: &RecordedCurves) -> Option<String> {
+    let force_n = curves.original.force_n();
+    let peak_n = contact::threshold_n(force_n, 1.0);
+    let first = force_n[0] / peak_n;
+    if first > MOST_FIRST {
+        return Some(format!(
+            "the record begins with {:.0} % of its peak force: the crush before it is missing, unless the force begins so at once",
+            100.0 * first
+        ));
+    }
+    extract::light_beginning(&curves.original)
+        .map(|found| format!("{found}: if contact starts later, set {STATED_BY}"))
 }
 
 #[cfg(test)]

@@ -23,6 +23,7 @@ use consistency::Motion;
 pub(crate) use error::ExtractError;
 pub(crate) use record::Record;
 use record::sample;
+pub(super) use start::light_beginning;
 use start::{FromContact, ImpactSpeed, SpeedBy, Start};
 
 /// The curve of a run and what was found on the way.

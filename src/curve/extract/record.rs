@@ -222,6 +222,9 @@ fn sign_of_impulse(time_s: &[f64], force_n: &[f64]) -> f64 {
     if impulse(time_s, force_n) < 0.0 { -1.0 } else { 1.0 }
 }
 
+/// A share of states with a time that repeats or goes back of more than this is no accident.
+const REPEATED: f64 = 0.02;
+
 /// A history in SI with strictly increasing times.
 #[derive(Clone)]
 pub(crate) struct Signal {
@@ -262,7 +265,11 @@ impl Signal {
             }
         }
         let skipped = all - time_s.len();
-        if skipped > 0 {
+        if skipped as f64 > REPEATED * all as f64 {
+            remarks.warn(format!(
+                "{what}: {skipped} of {all} states left out because time did not increase: do its times have too few digits?"
+            ));
+        } else if skipped > 0 {
             let skipped = counted(skipped, "state");
             remarks.note(format!("{what}: {skipped} left out because time did not increase"));
         }

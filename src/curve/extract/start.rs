@@ -3,7 +3,7 @@
 use super::error::ExtractError;
 use super::record::{Record, impulse};
 use super::{Notes, Setup, StatedContact};
-use crate::curve::contact::{self, milliseconds};
+use crate::curve::contact::{self, STATED_BY, milliseconds};
 use crate::curve::{Curve, ForceKind, loading};
 use crate::unit::{Shown, Speed, km_per_h};
 
@@ -134,14 +134,9 @@ impl Start {
             }
             StartBy::Crossing { .. } | StartBy::FirstState { .. } | StartBy::Body
                 if setup.stated.offset_m <= 0.0
-                    && impulse_share_to(curve, BEGINNING.0 * crush_m) < BEGINNING.1 =>
+                    && let Some(found) = light_beginning(curve) =>
             {
-                remarks.warn(format!(
-                    "contact: the first {:.0} % of the crush ({:.0} mm) contribute less than {} % of the impulse: if contact starts later, set contact_time or gap in the run",
-                    BEGINNING.0 * 100.0,
-                    BEGINNING.0 * crush_m * 1e3,
-                    BEGINNING.1 * 100.0
-                ));
+                remarks.warn(format!("contact: {found}: if contact starts later, set {STATED_BY}"));
             }
             StartBy::Crossing { interval_s, at_most_s, .. }
                 if step_m(interval_s) > CERTAIN_SHARE * crush_m =>
@@ -153,7 +148,7 @@ impl Start {
                     )
                 });
                 remarks.warn(format!(
-                    "contact: its place between two states is uncertain by about {:.2} mm{}, {:.1} % of the crush: set contact_time or gap in the run, or contact_threshold in the recipe",
+                    "contact: its place between two states is uncertain by about {:.2} mm{}, {:.1} % of the crush: set {STATED_BY}",
                     step_m(interval_s) * 1e3,
                     most_mm.unwrap_or_default(),
                     100.0 * step_m(interval_s) / crush_m
@@ -334,6 +329,19 @@ fn closing_time(record: &Record, gap_m: f64) -> Result<f64, ExtractError> {
         .ok_or(ExtractError::GapStaysOpen { gap_m, most_m })?;
     let share = (gap_m - travel(i - 1)) / (travel(i) - travel(i - 1));
     Ok(t[i - 1] + share.clamp(0.0, 1.0) * (t[i] - t[i - 1]))
+}
+
+/// That a curve begins with hardly any force, if it does.
+pub(in crate::curve) fn light_beginning(curve: &Curve) -> Option<String> {
+    let crush_m = curve.deflection_m()[loading::loading_end(curve)];
+    (impulse_share_to(curve, BEGINNING.0 * crush_m) < BEGINNING.1).then(|| {
+        format!(
+            "the first {:.0} % of the crush ({:.0} mm) contribute less than {} % of the impulse",
+            BEGINNING.0 * 100.0,
+            BEGINNING.0 * crush_m * 1e3,
+            BEGINNING.1 * 100.0
+        )
+    })
 }
 
 /// Share of the loading branch's impulse up to a deflection.

@@ -421,12 +421,17 @@ fn choose(found: Vec<Channel>, asked: Option<&str>) -> Result<(Channel, Channel)
         .into_iter()
         .filter(is_asked)
         .partition(|channel| channel.quantity == Quantity::Deflection);
+    let is_one_alone = deflections.len() + forces.len() == 1;
     let (mut deflections, mut forces) = (deflections.into_iter(), forces.into_iter());
     let first = (deflections.next(), forces.next());
     let has_more = deflections.next().is_some() || forces.next().is_some();
     match (first, asked) {
         ((Some(deflection), Some(force)), _) if !has_more => Ok((deflection, force)),
         ((Some(_), Some(_)), _) => Err(several_curves(&known)),
+        (_, Some(asked)) if is_one_alone => Err(error!(
+            CurveFile,
+            "{asked} is one channel, and a curve needs two: the file has {known}"
+        )),
         (_, Some(asked)) => Err(no_curve(asked, &known)),
         (_, None) => Err(error!(
             CurveFile,

@@ -159,6 +159,24 @@ pub(super) fn layout(
                 what = quantity.name()
             ));
         }
+        // Columns with times of their own would be paired row by row.
+        let is_other = |(field, (_, name)): &(usize, &(u64, String))| {
+            is_free(*field) && is_of_time(name) && found.iter().all(|column| column.field != *field)
+        };
+        let others_of_time = names.iter().enumerate().filter(is_other);
+        let others_of_time: Vec<String> =
+            others_of_time.map(|(_, (_, name))| format!("\"{}\"", shown(name))).collect();
+        if quantity == Quantity::Time && !others_of_time.is_empty() {
+            let all: Vec<String> = alike.into_iter().chain(others_of_time).take(LISTED).collect();
+            return Err(error!(
+                CurveFile,
+                "{place}: expected one column of times, such as {example}, found {all}: choose it with {option}, or none for force over deflection without times; histories with different times need to be resampled",
+                all = all.join(", "),
+                example = quantity.example(),
+                option = quantity.option(),
+                place = Place::Line(line_left)
+            ));
+        }
         let mut found = found.into_iter();
         match found.next() {
             Some(column) => taken.push(column),
@@ -196,6 +214,15 @@ pub(super) fn layout(
     }
     notes.push(format!("columns: {}", said.join(", ")));
     Ok((columns, are_used))
+}
+
+/// Whether a column is in a unit of time and called after it, as `Time Force [s]` and `t_F [ms]` are.
+fn is_of_time(name: &str) -> bool {
+    let label = Label::of_named(Quantity::Time, name);
+    let name = name.to_lowercase();
+    let first = name.split(|c: char| !c.is_alphanumeric()).find(|word| !word.is_empty());
+    label.unit.is_some_and(|unit| Quantity::Time.size_of(&unit).is_some())
+        && first.is_some_and(|w| w == "t" || w.starts_with("time") || w.starts_with("zeit"))
 }
 
 /// Whether a title names this quantity, as `Force vs displacement` does.

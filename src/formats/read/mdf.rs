@@ -21,6 +21,8 @@ use crate::plural::counted;
 
 /// How every MDF file begins; the version and the program that wrote it follow.
 const BEGINNING: &[u8] = b"MDF     ";
+/// How one begins whose recording was not closed: its numbers of records may be those of an earlier moment.
+const UNFINISHED: &[u8] = b"UnFinMF ";
 const OURS: &[u8] = b"crumple ";
 /// Bytes of a group's records, unpacked, at most.
 const MOST_BYTES: u64 = 1 << 30;
@@ -35,11 +37,20 @@ const LISTED: usize = 5;
 const MOST_NUMBERS: usize = 20_000_000;
 
 pub(super) fn recognise(input: &Input<'_>) -> bool {
-    input.bytes.starts_with(BEGINNING)
+    is_mdf(input.bytes)
+}
+
+fn is_mdf(bytes: &[u8]) -> bool {
+    bytes.starts_with(BEGINNING) || bytes.starts_with(UNFINISHED)
 }
 
 /// The blocks of a file, its first one, and its groups.
 fn opened(bytes: &[u8]) -> Result<(Blocks<'_>, Block<'_>, Vec<Group>), Error> {
+    if bytes.starts_with(UNFINISHED) {
+        return Err(wrong(
+            "the file was never finalised, so that records may be missing: open and save it with the program that recorded it",
+        ));
+    }
     if bytes.get(8) != Some(&b'4') {
         return Err(wrong("expected MDF of version 4, found an earlier version: save it as MDF 4"));
     }
@@ -77,7 +88,7 @@ pub(super) fn history(
     bytes: &[u8],
     wanted: Option<&str>,
 ) -> Result<Option<(String, Option<String>)>, Error> {
-    if !bytes.starts_with(BEGINNING) {
+    if !is_mdf(bytes) {
         return Ok(None);
     }
     let (file, _, mut groups) = opened(bytes)?;
@@ -134,13 +145,21 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     for line in comment.unwrap_or_default().lines() {
         let _ = writeln!(text, "# {line}");
     }
-    let invalid = group.rows(&file, &mut text)?;
+    // Without them it would be a table of deflections and forces alone.
+    if let (Some(why), false, false) =
+        (&group.lost_times, group.has(Quantity::Time), input.options.is_without_times())
+    {
+        return Err(error!(
+            CurveFile,
+            "group {}: its times are in channel {why}; or leave them out with --time-column none",
+            group.name
+        ));
+    }
+    let notes = group.rows(&file, &mut text)?;
     let found = tables::read(&Input { text: &text, ..*input });
     let mut found =
         found.map_err(|error| error.followed_by(&left_out(std::slice::from_ref(&group))))?;
-    if invalid > 0 {
-        found.notes.push(format!("left out: {} marked as invalid", counted(invalid, "record")));
-    }
+    found.notes.extend(notes);
     found.notes.insert(0, format!("curve: group {} of the file, read as a table", group.name));
     found.notes.extend(group.left_out.iter().map(|why| format!("left out: channel {why}")));
     Ok(found)
@@ -237,7 +256,7 @@ fn chain<'a>(file: &Blocks<'a>, first: u64, kind: &[u8; 2]) -> Result<Vec<Block<
 struct Channel {
     name: String,
     unit: String,
-    /// First byte and bytes.
+    /// First byte and bytes; of none the value is the number of the record.
     at: usize,
     size: usize,
     /// `cn_data_type`: unsigned, signed, floating, each little-endian and then big-endian.
@@ -253,6 +272,8 @@ struct Group {
     name: String,
     channels: Vec<Channel>,
     left_out: Vec<String>,
+    /// The channel of the times, if it is left out, and why.
+    lost_times: Option<String>,
     records: u64,
     record_bytes: usize,
     /// Those before the marks of invalid values.
@@ -270,6 +291,7 @@ fn groups(file: &Blocks<'_>, header: &Block<'_>) -> Result<Vec<Group>, Error> {
                 name: (groups.len() + 1).to_string(),
                 channels: Vec::new(),
                 left_out: Vec::new(),
+                lost_times: None,
                 records: integer(block.data, 8, 8),
                 record_bytes: (integer(block.data, 24, 4) + integer(block.data, 28, 4)) as usize,
                 value_bytes: integer(block.data, 24, 4) as usize,
@@ -282,7 +304,13 @@ fn groups(file: &Blocks<'_>, header: &Block<'_>) -> Result<Vec<Group>, Error> {
                     file.text(block.link(2), NAME).unwrap_or_else(|| format!("channel {}", k + 1));
                 match channel(file, block, name.clone(), &group) {
                     Ok(channel) => group.channels.push(channel),
-                    Err(why) => group.left_out.push(format!("\"{name}\": {why}")),
+                    Err(why) => {
+                        let why = format!("\"{name}\": {why}");
+                        if is_master(block) {
+                            group.lost_times = Some(why.clone());
+                        }
+                        group.left_out.push(why);
+                    }
                 }
             }
             if group.channels.len() > 1 {
@@ -293,6 +321,14 @@ fn groups(file: &Blocks<'_>, header: &Block<'_>) -> Result<Vec<Group>, Error> {
     }
     Ok(groups)
 }
+
+/// Whether a channel holds the times of its group, in the records or by their numbers.
+fn is_master(block: &Block<'_>) -> bool {
+    [2, VIRTUAL].contains(&integer(block.data, 0, 1)) && integer(block.data, 1, 1) == 1
+}
+
+/// The kind of a channel that counts the records.
+const VIRTUAL: u64 = 3;
 
 fn channel(
     file: &Blocks<'_>,
@@ -308,10 +344,11 @@ fn channel(
     if file.kind(block.link(1)) == b"##CA" {
         return Err("it is an array: save its elements as channels");
     }
-    let (at, size) = (at as usize, bits as usize / 8);
+    let is_virtual = u64::from(byte(0)) == VIRTUAL;
+    let (at, size) = if is_virtual { (0, 0) } else { (at as usize, bits as usize / 8) };
     let is_whole = byte(3) == 0 && bits % 8 == 0 && (1..=8).contains(&size);
-    if !is_whole || kind > 5 || kind > 3 && ![4, 8].contains(&size) || at + size > group.value_bytes
-    {
+    let is_number = is_whole && kind <= 5 && (kind <= 3 || [4, 8].contains(&size));
+    if !is_virtual && (!is_number || at + size > group.value_bytes) {
         return Err("it does not hold numbers in whole bytes");
     }
     let flags = integer(block.data, 12, 4);
@@ -324,7 +361,9 @@ fn channel(
     let (offset, factor) = (0.0, 1.0);
     let mut found = Channel { name, unit: String::new(), at, size, kind, offset, factor, invalid };
     let mut unit = file.text(block.link(6), NAME);
-    if let Ok(conversion) = file.block(block.link(4), b"CC") {
+    if block.link(4) != 0 {
+        let conversion = file.block(block.link(4), b"CC");
+        let conversion = conversion.map_err(|_| "its conversion is damaged")?;
         unit = unit.or(file.text(conversion.link(1), NAME));
         // After precision (1), flags (2), references (2), parameters (2) and the physical range (16).
         let parameter = |k: usize| f64::from_bits(integer(conversion.data, 24 + 8 * k, 8));
@@ -350,8 +389,11 @@ impl Channel {
         Label::of_column(&self.label()).map(|label| label.quantity)
     }
 
-    /// Its value in a record.
-    fn of(&self, record: &[u8]) -> f64 {
+    /// Its value in a record of this number.
+    fn of(&self, (k, record): (usize, &[u8])) -> f64 {
+        if self.size == 0 {
+            return self.offset + self.factor * k as f64;
+        }
         let mut bytes = [0; 8];
         let raw = &record[self.at..self.at + self.size];
         bytes[..self.size].copy_from_slice(raw);
@@ -402,8 +444,8 @@ impl Group {
         self.has(Quantity::Deflection) && self.has(Quantity::Force)
     }
 
-    /// Its header and rows as the lines of a table; how many rows are left out, since a value in them is marked as invalid.
-    fn rows(&self, file: &Blocks<'_>, text: &mut String) -> Result<usize, Error> {
+    /// Its header and rows as the lines of a table; which rows are left out.
+    fn rows(&self, file: &Blocks<'_>, text: &mut String) -> Result<Vec<String>, Error> {
         if let Some(why) = self.unread {
             return Err(error!(CurveFile, "group {}: {why}", self.name));
         }
@@ -416,7 +458,8 @@ impl Group {
             ));
         }
         let mut data = Vec::new();
-        data_of(file, self.data, wanted as usize, &mut data)?;
+        // One more than is counted, to see whether there are.
+        data_of(file, self.data, wanted as usize + self.record_bytes, &mut data)?;
         let whole = data.len() / self.record_bytes.max(1);
         if whole < records {
             return Err(error!(
@@ -429,7 +472,8 @@ impl Group {
         let labels: Vec<String> = self.channels.iter().map(|c| quoted(c.label())).collect();
         let _ = writeln!(text, "{}", labels.join(","));
         let (mut digits, mut invalid) = (zmij::Buffer::new(), 0);
-        for record in data.chunks_exact(self.record_bytes.max(1)).take(records) {
+        let all = data.chunks_exact(self.record_bytes.max(1)).take(records);
+        for (number, record) in all.enumerate() {
             let marks = self.channels.iter().filter_map(|channel| channel.invalid);
             if marks.into_iter().any(|(at, bit)| record[at] & bit != 0) {
                 invalid += 1;
@@ -437,11 +481,21 @@ impl Group {
             }
             for (k, channel) in self.channels.iter().enumerate() {
                 text.push_str(if k == 0 { "" } else { "," });
-                text.push_str(digits.format(channel.of(record)));
+                text.push_str(digits.format(channel.of((number, record))));
             }
             text.push('\n');
         }
-        Ok(invalid)
+        let mut left_out = Vec::new();
+        if whole > records {
+            left_out.push(format!(
+                "left out: what follows the {} that the group counts: if it was not closed, open and save it with the program that recorded it",
+                counted(records, "record")
+            ));
+        }
+        if invalid > 0 {
+            left_out.push(format!("left out: {} marked as invalid", counted(invalid, "record")));
+        }
+        Ok(left_out)
     }
 }
 

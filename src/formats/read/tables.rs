@@ -102,8 +102,11 @@ fn columns(
     table.each_row(&used, |row| {
         for column in &taken {
             let place = Place::Field { line: row.line, field: column.field + 1 };
-            let value =
-                row.number(column.field).map_err(|found| expected(place, "a number", found))?;
+            let value = row.number(column.field).map_err(|found| {
+                let has_none = found.is_empty() || found.parse::<f64>().is_ok();
+                let remedy = if has_none { ": remove the lines without a value" } else { "" };
+                expected(place, "a number", found).followed_by(remedy)
+            })?;
             values[column.quantity as usize].push(value * column.size);
         }
         lines.push(row.line);
