@@ -16,7 +16,7 @@ use crate::import::Settings;
 use crate::solver::{Selection, WantedId};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::sweep;
-use crate::unit::{LENGTH, MASS, SPEED, STIFFNESS, SpeedKind, UnitSystem};
+use crate::unit::{STIFFNESS, SpeedKind, mass_kg};
 
 /// A file or folder that cannot be standard output.
 pub(super) fn named() -> impl TypedValueParser<Value = PathBuf> {
@@ -24,25 +24,6 @@ pub(super) fn named() -> impl TypedValueParser<Value = PathBuf> {
         true => Err("this cannot be written to standard output: name it (./- for the name -)"),
         false => Ok(path),
     })
-}
-
-/// A speed with its unit, in m/s.
-pub(super) fn speed(text: &str) -> Result<f64, String> {
-    SPEED.parse_positive(text).map_err(|e| e.to_string())
-}
-
-/// A length with its unit, in m.
-pub(super) fn length(text: &str) -> Result<f64, String> {
-    LENGTH.parse_positive(text).map_err(|e| e.to_string())
-}
-
-/// A mass with its unit, in kg.
-pub(super) fn mass(text: &str) -> Result<f64, String> {
-    MASS.parse_positive(text).map_err(|e| e.to_string())
-}
-
-pub(super) fn units(text: &str) -> Result<UnitSystem, String> {
-    UnitSystem::parse(text).map_err(|e| e.to_string())
 }
 
 /// A case parameter: `angle_deg=10` or `obstacle=pole`.
@@ -141,10 +122,10 @@ pub(super) struct CurveFile {
     #[arg(long, value_parser = one_of(KINDS))]
     kind: Option<SpeedKind>,
     /// Mass of the other body of a pair [default: as the file states, else that of the body]
-    #[arg(long, value_parser = mass, allow_hyphen_values = true)]
+    #[arg(long, value_parser = mass_kg, allow_hyphen_values = true)]
     other_mass: Option<f64>,
     /// Unloading stiffness from the maximum deflection, such as 80MN/m [default: the file's]
-    #[arg(long, value_parser = stiffness, allow_hyphen_values = true)]
+    #[arg(long, value_parser = |text: &str| STIFFNESS.parse_positive(text), allow_hyphen_values = true)]
     unloading: Option<f64>,
     #[command(flatten)]
     reading: Reading,
@@ -157,10 +138,6 @@ const KINDS: &[(&str, SpeedKind, &str)] = &[
     ("wall", SpeedKind::Wall, "Of one body against a rigid wall"),
     ("closing", SpeedKind::Closing, "Of two bodies against each other"),
 ];
-
-fn stiffness(text: &str) -> Result<f64, String> {
-    STIFFNESS.parse_positive(text).map_err(|e| e.to_string())
-}
 
 impl Reading {
     /// Whether any of the options is given.

@@ -16,9 +16,9 @@ use crate::rating::Rating;
 use crate::rating::acceptance::{ACCEPTANCE, STANDARD};
 use crate::scenario;
 use crate::table::Table;
-use crate::unit::{Shown, km_per_h};
+use crate::unit::{Shown, km_per_h, speed_m_per_s};
 
-use super::arguments::{self, one_of};
+use super::arguments::one_of;
 use super::output::{self, Bar};
 use super::{CommandResult, GlobalOptions, Outcome, usage};
 
@@ -50,10 +50,10 @@ pub(super) struct Args {
     #[arg(long, conflicts_with = "train")]
     group: Option<String>,
     /// Speed to leave out, with its unit; every inner speed in turn if absent
-    #[arg(long, value_parser = arguments::speed, allow_hyphen_values = true, conflicts_with = "train")]
+    #[arg(long, value_parser = speed_m_per_s, allow_hyphen_values = true, conflicts_with = "train")]
     speed: Option<f64>,
     /// Speed of the one FE run for FDRM and NSDM; the nearest other one if absent, in speed and parameters
-    #[arg(long, value_parser = arguments::speed, conflicts_with = "train")]
+    #[arg(long, value_parser = speed_m_per_s, conflicts_with = "train")]
     fixed_speed: Option<f64>,
     /// Scenario of a train with FE's run as reference; may be repeated
     #[arg(long)]
@@ -142,7 +142,7 @@ fn print(out: &mut dyn Write, comparison: &Comparison, is_alone: bool) -> io::Re
         comparison.group,
         km_per_h(comparison.speed_m_per_s),
         comparison.speed_kind.name(),
-        Shown::force(comparison.reference_peak_force_n).text(comparison.reference_peak_force_n),
+        Shown::one_force(comparison.reference_peak_force_n),
         comparison.reference_max_crush_m
     )?;
     let milliseconds = |time_s: f64| format!("{:.2} ms", time_s * 1e3);
@@ -168,7 +168,7 @@ fn print(out: &mut dyn Write, comparison: &Comparison, is_alone: bool) -> io::Re
             format!("{}/{}", score(&row.velocity), score(&row.acceleration))
         })
         .column("force", |row| row.force_l1.map_or("-".into(), percent))
-        .column("peak force", |row| Shown::force(row.peak_force_n).text(row.peak_force_n))
+        .column("peak force", |row| Shown::one_force(row.peak_force_n))
         .column("max crush", |row| format!("{:.4} m", row.max_crush_m))
         .column("within 10 %", |row| match row.acceptance.passes {
             true => "yes".into(),

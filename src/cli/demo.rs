@@ -128,7 +128,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
             "{GROUP} at {} by the model {}: peak force {}, max crush {:.4} m, energy {:.1} %; crush in the multi-body run {crush_m:.4} m\n",
             km_per_h(curve.speed_m_per_s),
             curve.model,
-            Shown::force(peak_n).text(peak_n),
+            Shown::one_force(peak_n),
             curve.max_deflection_m,
             curve.provenance.energy_over_kinetic * 100.0,
         )?;

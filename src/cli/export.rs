@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::arguments::{self, CurveFile, FORCES, FileKind, MAX_CRUSH_RULES, one_of, units};
+use super::arguments::{self, CurveFile, FORCES, FileKind, MAX_CRUSH_RULES, one_of};
 use super::export_input::Input;
 use super::{CommandResult, Failure, GlobalOptions, keep_input, output, usage, usage_error};
 use crate::curve::{ForceKind, Parameter, Tail};
@@ -13,7 +13,7 @@ use crate::formats::{self, Exported, FORMATS, Format, IDS, Material, Options};
 use crate::plural::counted;
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{PredictedCurve, Query, WarningCode};
-use crate::unit::UnitSystem;
+use crate::unit::{UnitSystem, mass_kg, speed_m_per_s};
 
 /// Write curves, recorded cases or a model for another tool
 #[derive(clap::Args)]
@@ -51,7 +51,7 @@ pub(super) struct Args {
     #[command(flatten)]
     target: Target,
     /// Units of a measured or legacy curve's file if it does not state them
-    #[arg(long, value_parser = units)]
+    #[arg(long, value_parser = UnitSystem::parse)]
     pub input_units: Option<UnitSystem>,
     #[command(flatten, next_help_heading = "Measured and legacy curves")]
     pub file: CurveFile,
@@ -61,10 +61,10 @@ pub(super) struct Args {
 #[derive(clap::Args)]
 pub(super) struct Which {
     /// Speeds of a model's curves, of a database's cases, or of a measured curve, with units; repeated or separated by commas
-    #[arg(long, value_parser = arguments::speed, value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(long, value_parser = speed_m_per_s, value_delimiter = ',', allow_hyphen_values = true)]
     pub speed: Vec<f64>,
     /// Mass of a model's body, or of each body of a pair, with its unit (default: the training runs')
-    #[arg(long, value_parser = arguments::mass, allow_hyphen_values = true)]
+    #[arg(long, value_parser = mass_kg, allow_hyphen_values = true)]
     pub mass: Option<f64>,
     /// Rule for a model's maximum crush [default: the model's own]
     #[arg(long, value_parser = one_of(MAX_CRUSH_RULES))]
@@ -90,7 +90,7 @@ pub(super) struct Target {
     #[arg(long)]
     to: Option<String>,
     /// Units of the file, such as mm-t-s (default: lsdyna and radioss the study's, adams mm and N, others SI)
-    #[arg(long, value_parser = units)]
+    #[arg(long, value_parser = UnitSystem::parse)]
     units: Option<UnitSystem>,
     /// Which force [default: body; JSON of a model's or a database's curve holds both]
     #[arg(long, value_parser = one_of(FORCES))]

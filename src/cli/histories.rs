@@ -11,7 +11,7 @@ use crate::history_hdf5::{Storage, Trouble, can_stream, convert, encode_in};
 use crate::solver::{self, Access, Blocks, Selection, SolverFile, WantedId, decks};
 use crate::unit::UnitSystem;
 
-use super::arguments::{FileKind, selection, units};
+use super::arguments::{FileKind, selection};
 use super::output::{self, Bar};
 use super::{CommandResult, Failure, GlobalOptions, is_stdout, keep_input, usage};
 
@@ -45,7 +45,7 @@ pub(super) struct Args {
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Units of the file, such as mm-t-s, to be named in HDF5 [default: those of the deck next to it]
-    #[arg(long, value_parser = units)]
+    #[arg(long, value_parser = UnitSystem::parse)]
     units: Option<UnitSystem>,
     /// Write the values in HDF5 in single precision: half the size, and all six digits that solvers print (above 3.4e38 infinite)
     #[arg(long)]

@@ -9,7 +9,7 @@ use crate::init::{self, GivenForce, Proposal, Proposed, UserHints};
 use crate::plural::counted;
 use crate::study::StudyKind;
 use crate::table::Table;
-use crate::unit::{Shown, UnitSystem, km_per_h};
+use crate::unit::{Shown, UnitSystem, km_per_h, mass_kg};
 
 use super::output::{self, Bar};
 use super::{CommandResult, Failure, GlobalOptions, Outcome, arguments, is_stdout, usage};
@@ -48,7 +48,7 @@ pub(super) struct Args {
 #[group(id = "known", multiple = true, conflicts_with = "scenario")]
 struct GivenArgs {
     /// Units of the solver files, such as mm-t-s
-    #[arg(long, value_parser = arguments::units)]
+    #[arg(long, value_parser = UnitSystem::parse)]
     units: Option<UnitSystem>,
     /// Kind of impact
     #[arg(long, value_parser = arguments::one_of(KINDS))]
@@ -66,10 +66,10 @@ struct GivenArgs {
     #[arg(long)]
     force: Option<GivenForce>,
     /// Mass of the body, or of each body of a pair, such as 24t
-    #[arg(long, value_parser = arguments::mass)]
+    #[arg(long, value_parser = mass_kg)]
     mass: Option<f64>,
     /// Mass of the other body of a pair
-    #[arg(long, value_parser = arguments::mass, requires = "mass")]
+    #[arg(long, value_parser = mass_kg, requires = "mass")]
     other_mass: Option<f64>,
     /// Group of the database; all runs then belong to it, whatever their folders
     #[arg(long)]

@@ -18,9 +18,9 @@ use crate::scenario::{self, CurveOrigin};
 use crate::solver::{self, WantedId};
 use crate::surrogate::{Model, ModelCase, PredictedCurve, Query, predict};
 use crate::sweep::SweepColumns;
-use crate::unit::{UnitSystem, km_per_h};
+use crate::unit::{UnitSystem, km_per_h, speed_m_per_s};
 
-use super::arguments::{self, FileKind, Reading, one_of, selection, units};
+use super::arguments::{self, FileKind, Reading, one_of, selection};
 use super::output::{self, Bar};
 use super::{
     CommandResult, Failure, GlobalOptions, Outcome, failed_at, is_stdout, keep_input, usage,
@@ -55,13 +55,13 @@ pub(super) struct Args {
     #[arg(long, value_parser = one_of(FORCES))]
     force: Option<ForceKind>,
     /// Of a database: leave this speed out, predict it from the others, and compare
-    #[arg(long, value_parser = arguments::speed, value_name = "SPEED", conflicts_with = "force")]
+    #[arg(long, value_parser = speed_m_per_s, value_name = "SPEED", conflicts_with = "force")]
     left_out: Option<f64>,
     /// Of a database: which case is left out, where several have the speed
     #[arg(long, requires = "left_out")]
     case: Option<String>,
     /// Of a model: speed of the curve
-    #[arg(long, value_parser = arguments::speed)]
+    #[arg(long, value_parser = speed_m_per_s)]
     speed: Option<f64>,
     /// Of a model: value of a further parameter, as NAME=VALUE; may be repeated
     #[arg(long, value_parser = arguments::parameter, value_name = "NAME=VALUE")]
@@ -99,7 +99,7 @@ pub(super) struct Args {
     format: Option<String>,
     /// Of a solver file: its units, such as mm-t-s; without them axes are in the file's units. Of a
     /// curve's file: its units if it does not state them
-    #[arg(long, value_parser = units)]
+    #[arg(long, value_parser = UnitSystem::parse)]
     units: Option<UnitSystem>,
     /// Channel frequency class: of a solver file, also draw filtered lines; of a scenario or result, the class of
     /// accelerations (default: 60)

@@ -9,7 +9,7 @@ use crate::file::write_all_whole;
 use crate::surrogate::band::{Band, LeftOutSpeeds};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{Model, PredictedCurve, Query, SpeedOfCrush, predict, speed_of_crush};
-use crate::unit::{Shown, km_per_h};
+use crate::unit::{Shown, km_per_h, length_m, mass_kg, speed_m_per_s};
 
 use super::arguments::{self, FileKind, MAX_CRUSH_RULES, one_of};
 use super::{CommandResult, GlobalOptions, is_stdout, keep_input, output, usage};
@@ -25,13 +25,13 @@ pub(super) struct Args {
     /// Model file made by crumple train
     model: PathBuf,
     /// Impact speed with its unit, of the kind the model was trained on
-    #[arg(long, value_parser = arguments::speed, allow_hyphen_values = true, required_unless_present = "crush")]
+    #[arg(long, value_parser = speed_m_per_s, allow_hyphen_values = true, required_unless_present = "crush")]
     speed: Option<f64>,
     /// Maximum crush with its unit, in place of the speed: the speed between the runs that gives it is found
-    #[arg(long, value_parser = arguments::length, allow_hyphen_values = true, conflicts_with_all = ["speed", "extrapolate"])]
+    #[arg(long, value_parser = length_m, allow_hyphen_values = true, conflicts_with_all = ["speed", "extrapolate"])]
     crush: Option<f64>,
     /// Mass of the body, or of each body of a pair, with its unit (default: the training runs')
-    #[arg(long, value_parser = arguments::mass, allow_hyphen_values = true)]
+    #[arg(long, value_parser = mass_kg, allow_hyphen_values = true)]
     mass: Option<f64>,
     /// Rule for the maximum crush [default: the model's own, mostly motion]
     #[arg(long, value_parser = one_of(MAX_CRUSH_RULES))]
@@ -160,7 +160,7 @@ fn lines(curve: &PredictedCurve) -> Vec<(&'static str, String)> {
     let peak = curve.peak_force_n();
     let kind = provenance.force_kind.name();
     let mut lines = vec![
-        ("peak force", format!("{} ({kind})", Shown::force(peak).text(peak))),
+        ("peak force", format!("{} ({kind})", Shown::one_force(peak))),
         (
             "max crush",
             format!(
@@ -190,7 +190,7 @@ fn lines(curve: &PredictedCurve) -> Vec<(&'static str, String)> {
         (ForceKind::Body, curve.body_unloading_stiffness_n_per_m),
     ] {
         let Some(stiffness) = stiffness else { continue };
-        let (shown, name) = (Shown::stiffness(stiffness).text(stiffness), kind.name());
+        let (shown, name) = (Shown::one_stiffness(stiffness), kind.name());
         let drives = kind.drives();
         lines.push(("unloading", format!("{shown} of the {name} force, which drives {drives}")));
     }

@@ -6,8 +6,9 @@ use crate::clock::now_utc;
 use crate::database::Database;
 use crate::file::{is_same, write_whole};
 use crate::report::{MethodSpeeds, ReportSettings, report};
+use crate::unit::speed_m_per_s;
 
-use super::arguments::{self, FileKind, one_of};
+use super::arguments::{FileKind, one_of};
 use super::output::{self, Bar};
 use super::{
     CommandResult, Failure, GIVEN, GlobalOptions, Outcome, keep_input, keep_inputs, usage,
@@ -33,7 +34,7 @@ pub(super) struct Args {
     #[arg(long)]
     group: Vec<String>,
     /// Speed of the predicted curves (default: the middle of each group's widest speed interval)
-    #[arg(long, value_parser = arguments::speed)]
+    #[arg(long, value_parser = speed_m_per_s)]
     speed: Option<f64>,
     /// Title of the page (default: the first file's name)
     #[arg(long)]

@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use crate::plan::OVER_LIMITS;
 use crate::sweep::{
-    self, Precision, Report, Sensitivity, Shard, Sweep, WriteOptions, share_interval,
+    self, Precision, Report, Sensitivity, Shard, Sweep, WriteOptions, is_hdf5, share_interval,
 };
 use crate::table::Table;
 
@@ -156,10 +156,6 @@ pub(super) fn run(args: &Args, global: GlobalOptions) -> CommandResult {
     say(&report, design, reached.as_ref(), begun, output, global)
 }
 
-fn is_hdf5(output: &Path) -> bool {
-    output.extension().is_some_and(|e| e == "h5" || e == "hdf5")
-}
-
 /// Both kinds of results, by the name of the file; a device takes CSV.
 fn check_output(output: &Path) -> Result<(), Failure> {
     let is_device = output.metadata().is_ok_and(|meta| !meta.is_file());
@@ -178,14 +174,9 @@ fn write(
 ) -> Result<Report, Failure> {
     let items = options.shard.items(sweep.items());
     let bar = Bar::over(global, items.end - items.start);
-    let mut is_first = true;
     let is_device = output.metadata().is_ok_and(|meta| !meta.is_file() && !meta.is_dir());
-    let mut step = |done: u64| bar.set(done, std::mem::take(&mut is_first));
     if is_stdout(output) || is_device {
-        let mut progress = |done| {
-            step(done);
-            ControlFlow::Continue(())
-        };
+        let mut progress = progress(&bar, None);
         let mut write =
             |out: &mut dyn Write| sweep::write_rows(sweep, out, output, options, &mut progress);
         if is_stdout(output) {
@@ -196,16 +187,19 @@ fn write(
             Ok(write(&mut device.map_err(failed)?)?)
         }
     } else {
-        let stop = stop_flag();
-        sweep::write(sweep, output, options, |done| {
-            step(done);
-            if stop.load(Ordering::Relaxed) {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        })
-        .map_err(Failure::from)
+        Ok(sweep::write(sweep, output, options, progress(&bar, Some(stop_flag())))?)
+    }
+}
+
+/// Moves a bar, and breaks once a flag is set.
+fn progress(bar: &Bar, stop: Option<Arc<AtomicBool>>) -> impl FnMut(u64) -> ControlFlow<()> {
+    let mut is_first = true;
+    move |done| {
+        bar.set(done, std::mem::take(&mut is_first));
+        match stop.as_ref().is_some_and(|stop| stop.load(Ordering::Relaxed)) {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
     }
 }
 
@@ -347,15 +341,8 @@ fn until(
         return usage("--until writes one .csv file, which it makes longer: name it with -o");
     }
     let bar = Bar::over(global, sweep.items());
-    let mut is_first = true;
-    let stop = stop_flag();
-    let (report, half_width) = sweep::write_until(sweep, output, precision, options, |done| {
-        bar.set(done, std::mem::take(&mut is_first));
-        match stop.load(Ordering::Relaxed) {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
-        }
-    })?;
+    let step = progress(&bar, Some(stop_flag()));
+    let (report, half_width) = sweep::write_until(sweep, output, precision, options, step)?;
     let Precision { column, half_width: wanted } = precision;
     let of = report.columns.iter().find(|of| of.column == *column);
     let reached = Reached {

@@ -209,7 +209,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
         writeln!(out, "{} on {on}", model.name())?;
         if let Some(oob) = out_of_bag {
             let r2 = oob.r2.map_or("-".into(), |r2| format!("{r2:.5}"));
-            writeln!(out, "out-of-bag: rmse {}, r² {r2}", Shown::force(oob.rmse).text(oob.rmse))?;
+            writeln!(out, "out-of-bag: rmse {}, r² {r2}", Shown::one_force(oob.rmse))?;
         }
         let stopped = model.crush_law.as_ref().map(|law| &law.stopped);
         if let Some(stopped) = stopped.filter(|stopped| stopped.is_known()) {

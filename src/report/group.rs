@@ -4,8 +4,7 @@ use std::collections::BTreeSet;
 
 use super::figure::Figure;
 use super::{
-    Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, ToDo, Verdict, energy, force,
-    mass, metres, percent,
+    Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, ToDo, Verdict, metres, percent,
 };
 use crate::assess::choose::{Purpose, Selection, next_run};
 use crate::assess::compare::{Comparison, case_named, compare, has_all, inner_cases, mean};
@@ -21,7 +20,7 @@ use crate::rating::acceptance::{ACCEPTANCE, Acceptance, STANDARD};
 use crate::surrogate::leave_one_out::{LeftOut, Means, Validation};
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
 use crate::table::{Cell, Table};
-use crate::unit::km_per_h;
+use crate::unit::{Shown, km_per_h};
 
 /// Adds the section of a group under a title; gives the curve predicted for it.
 pub(super) fn add(
@@ -149,12 +148,12 @@ fn runs(cases: &[Case]) -> impl Into<Table> {
         })
     });
     table
-        .column("peak force", |case| force(case.peak_force_n()))
+        .column("peak force", |case| Shown::one_force(case.peak_force_n()))
         .column("maximum crush", |case| {
             let truncated = if case.is_truncated() { " (truncated)" } else { "" };
             metres(case.max_deflection_m()) + truncated
         })
-        .column("work", |case| energy(case.quality.audit.work_j))
+        .column("work", |case| Shown::one_energy(case.quality.audit.work_j))
         .column("work / energy", |case| format!("{:.3}", case.quality.audit.ratio()))
         .column("warnings", |case| {
             let warnings = &case.quality.warnings;
@@ -167,9 +166,9 @@ fn runs(cases: &[Case]) -> impl Into<Table> {
 }
 
 fn masses(case: &Case) -> String {
-    let body = mass(case.conditions.masses.body_kg);
+    let body = Shown::one_mass(case.conditions.masses.body_kg);
     match case.conditions.masses.other_kg {
-        Some(other) => format!("{body} on {}", mass(other)),
+        Some(other) => format!("{body} on {}", Shown::one_mass(other)),
         None => body,
     }
 }
@@ -341,9 +340,9 @@ impl Validated<'_> {
         parts.push(Part::Figure(Figure::new(self.id("prediction"), chart)));
         let mut rows = vec![
             ("model".to_string(), curve.model.clone()),
-            ("peak force".into(), force(curve.peak_force_n())),
+            ("peak force".into(), Shown::one_force(curve.peak_force_n())),
             ("maximum crush".into(), metres(curve.max_deflection_m)),
-            ("energy of the curve".into(), energy(curve.energy_j)),
+            ("energy of the curve".into(), Shown::one_energy(curve.energy_j)),
             ("energy over kinetic energy".into(), percent(curve.provenance.energy_over_kinetic)),
             ("nearest FE run".into(), km_per_h(curve.provenance.nearest_training_speed_m_per_s)),
         ];

@@ -22,7 +22,6 @@ use crate::error::Error;
 use crate::plot::looks_for_pages;
 use crate::surrogate::Model;
 use crate::table::Table;
-use crate::unit::Shown;
 use figure::Figure;
 
 /// What a report is about.
@@ -349,24 +348,9 @@ fn percent(share: f64) -> String {
     if share.is_finite() { format!("{:.1} %", 100.0 * share) } else { "–".into() }
 }
 
-/// `3.214 MN`.
-fn force(force_n: f64) -> String {
-    Shown::force(force_n).text(force_n)
-}
-
-/// `2.31 MJ`, `25.1 kJ`.
-fn energy(energy_j: f64) -> String {
-    Shown::energy(energy_j).text(energy_j)
-}
-
 /// `1.087 m`.
 fn metres(length_m: f64) -> String {
     format!("{length_m:.3} m")
-}
-
-/// `24.00 t`.
-fn mass(mass_kg: f64) -> String {
-    Shown::mass(mass_kg).text(mass_kg)
 }
 
 #[cfg(test)]

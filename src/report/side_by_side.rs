@@ -5,7 +5,7 @@ use std::iter;
 use super::figure::Figure;
 use super::group::Design;
 use super::train::Ran;
-use super::{Content, Part, Section, energy, force, mass, metres, percent};
+use super::{Content, Part, Section, metres, percent};
 use crate::charts::{self, Motion, Quantity};
 use crate::dataset::SAME_MASS;
 use crate::error::Error;
@@ -33,12 +33,12 @@ pub(super) fn add_designs(content: &mut Content, designs: &[Design]) {
         })
         .column("mass", |of| {
             let masses = iter::once(of.curve.mass_kg).chain(of.curve.other_mass_kg());
-            masses.map(mass).collect::<Vec<_>>().join(" against ")
+            masses.map(Shown::one_mass).collect::<Vec<_>>().join(" against ")
         })
         .column("force", |of| of.curve.provenance.force_kind.name())
-        .column("peak force", |of| force(of.curve.peak_force_n()))
+        .column("peak force", |of| Shown::one_force(of.curve.peak_force_n()))
         .column("maximum crush", |of| metres(of.curve.max_deflection_m))
-        .column("energy", |of| energy(of.curve.energy_j));
+        .column("energy", |of| Shown::one_energy(of.curve.energy_j));
     let differ = differences(&designs.iter().map(|of| &of.curve).collect::<Vec<_>>());
     let curves = designs.iter().map(|of| (&*of.title, &of.curve));
     let chart = charts::predictions("Predicted curves of all designs", curves);

@@ -5,8 +5,7 @@ use std::path::Path;
 
 use super::figure::Figure;
 use super::{
-    Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, ToDo, Verdict, energy, mass,
-    metres, percent,
+    Content, KeyFigure, MethodSpeeds, Part, ReportSettings, Section, ToDo, Verdict, metres, percent,
 };
 use crate::assess::ComparisonSettings;
 use crate::assess::train::{TrainComparison, compare_train};
@@ -254,7 +253,7 @@ fn add_verdicts(
         let text = format!(
             "most energy is absorbed at {}: {}, {} of what all interfaces absorb",
             of.name,
-            energy(energy_j),
+            Shown::one_energy(energy_j),
             percent(share)
         );
         content.verdict(Verdict::known(name, text));
@@ -378,7 +377,7 @@ fn impact(prepared: &Prepared) -> String {
     let of = |bodies: &[Body]| {
         let total_kg = bodies.iter().map(|body| body.mass_kg).sum();
         let speed = bodies.first().map_or(0.0, |body| body.speed_m_per_s);
-        format!("{} at {}", mass(total_kg), km_per_h(speed))
+        format!("{} at {}", Shown::one_mass(total_kg), km_per_h(speed))
     };
     let against = if second.is_empty() { "a wall".into() } else { of(second) };
     format!("{} against {against}", of(first))
@@ -447,7 +446,7 @@ fn vehicles(summary: &Summary<'_>) -> impl Into<Table> {
     let missing = || "–".to_string();
     Table::of(summary.bodies.iter().filter(|body| !body.is_crush_zone))
         .column("vehicle", |body| body.name)
-        .column("mass", |body| mass(body.mass_kg))
+        .column("mass", |body| Shown::one_mass(body.mass_kg))
         .column("speed", |body| {
             format!("{:.2} to {:.2} m/s", body.initial_v_m_per_s, body.final_v_m_per_s)
         })

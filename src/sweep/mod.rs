@@ -42,7 +42,7 @@ pub(crate) use results::ResultColumn;
 pub(crate) use results::SweepColumns;
 pub use run::Chunk;
 pub(crate) use statistics::{ColumnStatistics, Sensitivity, share_interval};
-pub(crate) use to_hdf5::is_table;
+pub(crate) use to_hdf5::{is_hdf5, is_table};
 pub(crate) use until::Precision;
 pub(crate) use until::write_until;
 use variables::Variable;

@@ -12,7 +12,8 @@ use crate::error::{Error, ErrorCode};
 use crate::file::not_written;
 use crate::hdf5::table::{self, Attribute, Column, Put, Table, Values, write_table};
 
-pub(super) fn is_hdf5(path: &Path) -> bool {
+/// Whether a result is written as HDF5, by its name.
+pub(crate) fn is_hdf5(path: &Path) -> bool {
     path.extension().is_some_and(|e| e == "h5" || e == "hdf5")
 }
 

@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use crate::curve::{Case, ForceKind, Parameter};
 use crate::formats::read::{READERS, ReadOptions};
 use crate::import::{self, Item, Settings};
-use crate::unit::UnitSystem;
+use crate::unit::{UnitSystem, mass_kg, speed_m_per_s};
 
 use super::super::arguments::CurveFile;
-use super::arguments::{FORCES, mass, one_of, parameter, parameters, speed, units};
+use super::arguments::{FORCES, one_of, parameter, parameters};
 use super::list::{case_row, print_group};
 use super::{CommandResult, Failure, GlobalOptions, output, usage};
 
@@ -30,16 +30,16 @@ pub(super) struct Args {
     group: Option<String>,
     /// Impact speed, one for each file in the same order; repeated or separated by commas [default: as the
     /// file states]
-    #[arg(long, value_parser = speed, value_delimiter = ',', allow_hyphen_values = true)]
+    #[arg(long, value_parser = speed_m_per_s, value_delimiter = ',', allow_hyphen_values = true)]
     speed: Vec<f64>,
     /// Mass of the body [default: as the file states]
-    #[arg(long, value_parser = mass, allow_hyphen_values = true)]
+    #[arg(long, value_parser = mass_kg, allow_hyphen_values = true)]
     mass: Option<f64>,
     /// Which force the curves hold [default: as the file states, else contact]
     #[arg(long, value_parser = one_of(FORCES))]
     force: Option<ForceKind>,
     /// Units of values that state none, such as mm-t-s or SI
-    #[arg(long, value_parser = units)]
+    #[arg(long, value_parser = UnitSystem::parse)]
     units: Option<UnitSystem>,
     /// Name of the case, once for each file in the same order [default: the file's name]
     #[arg(long)]

@@ -151,19 +151,14 @@ const QUANTITIES: [Quantity; 7] = [
         let speed = format!("{} ({})", km_per_h(c.speed_m_per_s), c.speed_kind.name());
         with_difference(speed, c.speed_difference, first)
     }),
-    ("mass", |c, first| {
-        with_difference(Shown::mass(c.mass_kg).text(c.mass_kg), c.mass_difference, first)
-    }),
+    ("mass", |c, first| with_difference(Shown::one_mass(c.mass_kg), c.mass_difference, first)),
     ("max crush", |c, first| {
         let crush = format!("{:.4} m", c.max_deflection_m);
         with_difference(crush, c.max_deflection_difference, first)
     }),
-    ("energy", |c, first| {
-        with_difference(Shown::energy(c.work_j).text(c.work_j), c.work_difference, first)
-    }),
+    ("energy", |c, first| with_difference(Shown::one_energy(c.work_j), c.work_difference, first)),
     ("peak force", |c, first| {
-        let force = Shown::force(c.peak_force_n).text(c.peak_force_n);
-        with_difference(force, c.peak_force_difference, first)
+        with_difference(Shown::one_force(c.peak_force_n), c.peak_force_difference, first)
     }),
     ("force L1", |c, first| match c.force_l1.filter(|_| !first) {
         Some(l1) => format!("{:.1} %", l1 * 100.0),
