@@ -1,6 +1,5 @@
 //! Force over deflection: the runs of a group, predictions, and a left-out speed.
 
-use super::speed;
 use crate::assess::left_out::query_of;
 use crate::assess::reference::Reference;
 use crate::assess::validate::{Choice, train};
@@ -51,7 +50,7 @@ fn both_ways(case: &Case, force: ForceKind) -> Option<(Vec<f64>, Vec<f64>)> {
 /// How runs of a group are called: by speed, and by name where speeds repeat.
 fn names(cases: &[Case]) -> Vec<String> {
     let speeds: Vec<String> =
-        cases.iter().map(|case| speed(case.conditions.speed.m_per_s)).collect();
+        cases.iter().map(|case| km_per_h(case.conditions.speed.m_per_s)).collect();
     let is_alone = |k: usize| speeds.iter().filter(|s| **s == speeds[k]).count() == 1;
     let name = |k: usize| {
         let of = cases[k].origin();
@@ -134,7 +133,7 @@ pub fn prediction(curve: &PredictedCurve, neighbours: &[ModelCase]) -> Chart {
         let is_body =
             curve.provenance.force_kind == ForceKind::Body && !case.body_force_n.is_empty();
         let force_n = if is_body { &case.body_force_n } else { &case.force_n };
-        let name = format!("FE at {}", speed(case.speed_m_per_s));
+        let name = format!("FE at {}", km_per_h(case.speed_m_per_s));
         let look = [0, 2][k];
         panel.series.push(Series::line(&name, look, case.deflection_m.clone(), force_n.clone()));
     }
@@ -143,7 +142,7 @@ pub fn prediction(curve: &PredictedCurve, neighbours: &[ModelCase]) -> Chart {
     let title = format!(
         "{} at {}: {} force by the model {}",
         curve.provenance.group,
-        speed(v),
+        km_per_h(v),
         curve.provenance.force_kind.name(),
         curve.model
     );
@@ -161,7 +160,7 @@ pub(crate) fn predictions<'a>(
     let top = curves.iter().map(|(_, curve)| largest(&curve.force_n)).fold(0.0, f64::max);
     let mut panel = axes(top);
     for (k, (name, curve)) in curves.into_iter().enumerate() {
-        let name = format!("{name}, {}", speed(curve.speed_m_per_s));
+        let name = format!("{name}, {}", km_per_h(curve.speed_m_per_s));
         let (d, f) = (curve.deflection_m.clone(), curve.force_n.clone());
         panel.series.push(Series::line(&name, k, d, f));
     }
@@ -203,7 +202,7 @@ fn add_prediction(panel: &mut Panel, curve: &PredictedCurve) {
             is_stacked: false,
         });
     }
-    let name = format!("{} at {}", curve.model, speed(curve.speed_m_per_s));
+    let name = format!("{} at {}", curve.model, km_per_h(curve.speed_m_per_s));
     let mut add = |name: &str, look, force_n: &[f64], shown| {
         let line = Series::line(name, look, to_end(d), to_end(force_n));
         panel.series.push(line.shown(shown));
@@ -256,7 +255,7 @@ pub(crate) fn left_out(of: LeftOutPrediction) -> Chart {
     let kind = curve.provenance.force_kind;
     let mut forces = axes(largest(&curve.force_n).max(case.peak_force_n()));
     forces.title = format!("{} force", kind.name());
-    let fe = format!("{} at {}{which}", case.origin(), speed(case.conditions.speed.m_per_s));
+    let fe = format!("{} at {}{which}", case.origin(), km_per_h(case.conditions.speed.m_per_s));
     if let Some((d, f)) = both_ways(case, kind) {
         forces.series.push(Series::line(&fe, 0, d, f));
     }
@@ -278,7 +277,7 @@ pub(crate) fn left_out(of: LeftOutPrediction) -> Chart {
             fe_time,
             case.curves.closing_speed_m_per_s[..states].to_vec(),
         ));
-        let name = format!("{} at {}", curve.model, speed(curve.speed_m_per_s));
+        let name = format!("{} at {}", curve.model, km_per_h(curve.speed_m_per_s));
         let ours = Series::line(&name, PREDICTED, time_s.to_vec(), v_m_per_s.to_vec());
         speeds.series.push(ours.shown(Shown::Emphasis));
         panels.push(speeds);
@@ -286,7 +285,7 @@ pub(crate) fn left_out(of: LeftOutPrediction) -> Chart {
     let title = format!(
         "{}: {}{which} left out and predicted by {}",
         case.id.group,
-        speed(case.conditions.speed.m_per_s),
+        km_per_h(case.conditions.speed.m_per_s),
         curve.model
     );
     Chart::row(&title, panels)

@@ -23,7 +23,6 @@ mod histories;
 mod motion;
 mod sweep;
 
-use crate::unit::km_per_h;
 pub use curves::prediction;
 pub(crate) use curves::{file_curve, predictions};
 pub use curves::{group_curves, left_out_at};
@@ -32,8 +31,3 @@ pub use motion::Motion;
 pub(crate) use motion::USUAL_CLASS;
 pub use motion::{Quantity, motion, train_speeds};
 pub(crate) use sweep::sweep;
-
-/// A speed in km/h with at most one digit after the point.
-fn speed(m_per_s: f64) -> String {
-    km_per_h(m_per_s)
-}

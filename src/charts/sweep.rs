@@ -4,7 +4,7 @@ use super::motion::SMALL;
 use crate::error::{Error, error};
 use crate::guess::hint;
 use crate::multibody::STANDARD_GRAVITY_M_PER_S2;
-use crate::plan::{OVER_LIMITS, ResultName};
+use crate::plan::{OVER_LIMITS, RESULTS, ResultName};
 use crate::plot::{Axis, Band, Cell, Chart, Panel, Series, Shown};
 use crate::plural::counted;
 use crate::sweep::{ResultColumn, SweepColumns, share_interval};
@@ -115,11 +115,11 @@ fn results<'a>(
     let named = |name: &str| {
         // As a plan names it.
         let planned: Option<ResultName> = serde_json::from_value(name.into()).ok();
-        let planned = planned.map(ResultName::quantity);
+        let planned = RESULTS.iter().find(|(result, _)| planned == Some(*result));
         let is = |column: &&ResultColumn| {
             column.name == name
                 || kind(&column.name) == name
-                || planned.is_some_and(|quantity| quantity == bare(&column.name))
+                || planned.is_some_and(|(_, quantity)| *quantity == bare(&column.name))
         };
         columns.results.iter().filter(is).collect::<Vec<_>>()
     };

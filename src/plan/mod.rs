@@ -96,50 +96,28 @@ pub(crate) enum ResultName {
     OverLimits,
 }
 
-impl ResultName {
-    /// What its columns begin with: the quantity of a single run.
-    pub(crate) fn quantity(self) -> &'static str {
-        match self {
-            Self::PeakForce => "peak_force_N",
-            Self::MaxDeflection => "max_deflection_m",
-            Self::MaxDeflectionTime => "max_deflection_time_s",
-            Self::Restitution => "restitution",
-            Self::FinalSpeed => "final_v_m_per_s",
-            Self::MeanDeceleration => "mean_deceleration_m_per_s2",
-            Self::EnergyError => "energy_error",
-            Self::MomentumError => "momentum_error",
-            Self::MovingMeanDeceleration => "moving_mean_deceleration_m_per_s2",
-            Self::MainMeanDeceleration => "main_mean_deceleration_m_per_s2",
-            Self::SecondaryImpact => "secondary_impact_m_per_s",
-            Self::OccupantLoad => "occupant_load_m_per_s2",
-            Self::Energy => "energy_J",
-            Self::OverLimits => OVER_LIMITS,
-        }
-    }
-}
-
 /// The column of [`ResultName::OverLimits`].
 pub(crate) const OVER_LIMITS: &str = "over_limits";
 
 /// Results that are written if none are named, the first of [`RESULTS`].
 pub(crate) const USUAL_RESULTS: usize = 8;
 
-/// All results, in the order of their columns.
-pub(crate) const RESULTS: [ResultName; 14] = [
-    ResultName::PeakForce,
-    ResultName::MaxDeflection,
-    ResultName::MaxDeflectionTime,
-    ResultName::Restitution,
-    ResultName::FinalSpeed,
-    ResultName::MeanDeceleration,
-    ResultName::EnergyError,
-    ResultName::MomentumError,
-    ResultName::MovingMeanDeceleration,
-    ResultName::MainMeanDeceleration,
-    ResultName::SecondaryImpact,
-    ResultName::OccupantLoad,
-    ResultName::Energy,
-    ResultName::OverLimits,
+/// All results in the order of their columns, each with what these begin with: the quantity of a single run.
+pub(crate) const RESULTS: [(ResultName, &str); 14] = [
+    (ResultName::PeakForce, "peak_force_N"),
+    (ResultName::MaxDeflection, "max_deflection_m"),
+    (ResultName::MaxDeflectionTime, "max_deflection_time_s"),
+    (ResultName::Restitution, "restitution"),
+    (ResultName::FinalSpeed, "final_v_m_per_s"),
+    (ResultName::MeanDeceleration, "mean_deceleration_m_per_s2"),
+    (ResultName::EnergyError, "energy_error"),
+    (ResultName::MomentumError, "momentum_error"),
+    (ResultName::MovingMeanDeceleration, "moving_mean_deceleration_m_per_s2"),
+    (ResultName::MainMeanDeceleration, "main_mean_deceleration_m_per_s2"),
+    (ResultName::SecondaryImpact, "secondary_impact_m_per_s"),
+    (ResultName::OccupantLoad, "occupant_load_m_per_s2"),
+    (ResultName::Energy, "energy_J"),
+    (ResultName::OverLimits, OVER_LIMITS),
 ];
 
 /// One thing that is varied.

@@ -41,6 +41,7 @@ pub use journal::{WriteOptions, merge, write, write_rows};
 pub(crate) use results::ResultColumn;
 pub(crate) use results::SweepColumns;
 pub use run::Chunk;
+use run::Measure;
 pub(crate) use statistics::{ColumnStatistics, Sensitivity, share_interval};
 pub(crate) use to_hdf5::{is_hdf5, is_table};
 pub(crate) use until::Precision;
@@ -143,7 +144,7 @@ pub struct Sweep {
     sources: Sources,
     design: Design,
     variables: Vec<Variable>,
-    results: Vec<ResultName>,
+    results: Vec<Kept>,
     /// The scenario as it stands, put together.
     base: Prepared,
     hash: String,
@@ -310,7 +311,10 @@ impl Sweep {
     }
 }
 
-fn results(plan: &Plan, has_limits: bool) -> Result<Vec<ResultName>, Error> {
+/// A result that is kept, and what its columns begin with.
+type Kept = (ResultName, &'static str);
+
+fn results(plan: &Plan, has_limits: bool) -> Result<Vec<Kept>, Error> {
     let Some(asked) = &plan.results else { return Ok(RESULTS[..USUAL_RESULTS].to_vec()) };
     if asked.contains(&ResultName::OverLimits) && !has_limits {
         return Err(error!(
@@ -318,7 +322,7 @@ fn results(plan: &Plan, has_limits: bool) -> Result<Vec<ResultName>, Error> {
             "sweep.results: over_limits needs limits: give the scenario [limits]"
         ));
     }
-    let kept: Vec<ResultName> = RESULTS.into_iter().filter(|r| asked.contains(r)).collect();
+    let kept: Vec<Kept> = RESULTS.into_iter().filter(|(r, _)| asked.contains(r)).collect();
     if kept.len() == asked.len() && !kept.is_empty() {
         Ok(kept)
     } else {
@@ -330,30 +334,18 @@ fn results(plan: &Plan, has_limits: bool) -> Result<Vec<ResultName>, Error> {
 }
 
 /// Columns of the results, which begin with the quantities' names.
-fn result_columns(results: &[ResultName], base: &Prepared) -> Vec<String> {
-    let Prepared { chain, order, .. } = base;
-    let columns = results.iter().flat_map(|result| {
-        let quantity = result.quantity();
+fn result_columns(results: &[Kept], base: &Prepared) -> Vec<String> {
+    let Prepared { chain, order, vehicles, .. } = base;
+    let columns = results.iter().flat_map(|(result, quantity)| {
         let of = |name: &str| format!("{quantity}[{name}]");
-        match result {
-            ResultName::PeakForce
-            | ResultName::MaxDeflection
-            | ResultName::MaxDeflectionTime
-            | ResultName::Restitution
-            | ResultName::Energy => chain.interfaces().iter().map(|i| of(&i.name)).collect(),
-            ResultName::FinalSpeed
-            | ResultName::MeanDeceleration
-            | ResultName::MovingMeanDeceleration
-            | ResultName::MainMeanDeceleration => {
-                order.iter().map(|&i| of(&chain.bodies()[i].name)).collect()
+        let body = |&i: &usize| of(&chain.bodies()[i].name);
+        match Measure::of(*result) {
+            Measure::Interface(_) => chain.interfaces().iter().map(|i| of(&i.name)).collect(),
+            Measure::Body(_) => order.iter().map(body).collect(),
+            Measure::Vehicle(_) => {
+                order.iter().filter(|i| vehicles.contains(i)).map(body).collect()
             }
-            ResultName::SecondaryImpact | ResultName::OccupantLoad => {
-                let vehicles = order.iter().filter(|i| base.vehicles.contains(i));
-                vehicles.map(|&i| of(&chain.bodies()[i].name)).collect()
-            }
-            ResultName::EnergyError | ResultName::MomentumError | ResultName::OverLimits => {
-                vec![quantity.to_string()]
-            }
+            Measure::Run(_) => vec![quantity.to_string()],
         }
     });
     columns.collect()

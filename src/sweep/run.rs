@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use rayon::prelude::*;
 
-use super::Sweep;
 use super::row::{BETWEEN, Row, Status};
+use super::{Kept, Sweep};
 use crate::error::{Error, ErrorCode};
-use crate::multibody::{BodyHistory, Record, Run, RunSettings, simulate};
+use crate::multibody::{BodyHistory, InterfaceHistory, Record, Run, RunSettings, simulate};
 use crate::plan::ResultName;
 use crate::scenario::{self, Prepared, Scenario};
 
@@ -182,51 +182,56 @@ impl<'a> Worker<'a> {
     }
 }
 
-fn push_results(results: &[ResultName], prepared: &Prepared, run: &Run, values: &mut Vec<f64>) {
-    let bodies = || prepared.order.iter().map(|&i| &run.bodies[i]);
-    let vehicles = || {
-        let of = prepared.order.iter().filter(|i| prepared.vehicles.contains(i));
-        of.map(|&i| &run.bodies[i])
-    };
-    let known = |value: Option<f64>| value.unwrap_or(f64::NAN);
-    for result in results {
-        let interfaces = run.interfaces.iter();
+/// What a result is a number of: each interface, body or vehicle, or the run; NaN where there is none.
+pub(super) enum Measure {
+    Interface(fn(&InterfaceHistory) -> f64),
+    Body(fn(&BodyHistory) -> f64),
+    Vehicle(fn(&BodyHistory) -> f64),
+    Run(fn(&Prepared, &Run) -> f64),
+}
+
+impl Measure {
+    pub(super) fn of(result: ResultName) -> Self {
+        fn known(value: Option<f64>) -> f64 {
+            value.unwrap_or(f64::NAN)
+        }
         match result {
-            ResultName::PeakForce => values.extend(interfaces.map(|i| i.peak_force_n)),
-            ResultName::MaxDeflection => values.extend(interfaces.map(|i| i.max_deflection_m)),
-            ResultName::MaxDeflectionTime => {
-                values.extend(interfaces.map(|i| i.max_deflection_time_s));
-            }
-            ResultName::Restitution => {
-                values.extend(interfaces.map(|i| known(i.restitution)));
-            }
-            ResultName::FinalSpeed => {
-                values.extend(bodies().map(|b| b.final_v_m_per_s));
-            }
-            ResultName::MeanDeceleration => {
-                values.extend(bodies().map(|b| b.mean_deceleration_m_per_s2));
-            }
-            ResultName::EnergyError => values.push(run.ledger.max_energy_error),
-            ResultName::MomentumError => values.push(run.ledger.max_momentum_error),
+            ResultName::PeakForce => Self::Interface(|i| i.peak_force_n),
+            ResultName::MaxDeflection => Self::Interface(|i| i.max_deflection_m),
+            ResultName::MaxDeflectionTime => Self::Interface(|i| i.max_deflection_time_s),
+            ResultName::Restitution => Self::Interface(|i| known(i.restitution)),
+            ResultName::Energy => Self::Interface(|i| known(i.energy_at_end_j())),
+            ResultName::FinalSpeed => Self::Body(|b| b.final_v_m_per_s),
+            ResultName::MeanDeceleration => Self::Body(|b| b.mean_deceleration_m_per_s2),
             ResultName::MovingMeanDeceleration => {
-                values.extend(bodies().map(|b| known(b.moving_mean_deceleration_m_per_s2)));
+                Self::Body(|b| known(b.moving_mean_deceleration_m_per_s2))
             }
-            ResultName::MainMeanDeceleration => {
-                let first = |b: &BodyHistory| b.mean_deceleration_m_per_s2;
-                values.extend(bodies().map(|b| b.main_contact.map_or(first(b), |main| main.0)));
+            ResultName::MainMeanDeceleration => Self::Body(|b| {
+                b.main_contact.map_or(b.mean_deceleration_m_per_s2, |(mean, ..)| mean)
+            }),
+            ResultName::SecondaryImpact => Self::Vehicle(|b| known(b.secondary_impact_m_per_s)),
+            ResultName::OccupantLoad => Self::Vehicle(|b| known(b.occupant_load_m_per_s2)),
+            ResultName::EnergyError => Self::Run(|_, run| run.ledger.max_energy_error),
+            ResultName::MomentumError => Self::Run(|_, run| run.ledger.max_momentum_error),
+            ResultName::OverLimits => Self::Run(|prepared, run| {
+                let limits = prepared.summary(run).limits;
+                known(limits.and_then(|limits| limits.are_broken()).map(f64::from))
+            }),
+        }
+    }
+}
+
+fn push_results(results: &[Kept], prepared: &Prepared, run: &Run, values: &mut Vec<f64>) {
+    let Prepared { order, vehicles, .. } = prepared;
+    for (result, _) in results {
+        match Measure::of(*result) {
+            Measure::Interface(of) => values.extend(run.interfaces.iter().map(of)),
+            Measure::Body(of) => values.extend(order.iter().map(|&i| of(&run.bodies[i]))),
+            Measure::Vehicle(of) => {
+                let of_vehicles = order.iter().filter(|i| vehicles.contains(i));
+                values.extend(of_vehicles.map(|&i| of(&run.bodies[i])));
             }
-            ResultName::SecondaryImpact => {
-                values.extend(vehicles().map(|b| known(b.secondary_impact_m_per_s)));
-            }
-            ResultName::OccupantLoad => {
-                values.extend(vehicles().map(|b| known(b.occupant_load_m_per_s2)));
-            }
-            ResultName::OverLimits => {
-                let summary = prepared.summary(run);
-                let broken = summary.limits.and_then(|limits| limits.are_broken());
-                values.push(known(broken.map(|broken| f64::from(u8::from(broken)))));
-            }
-            ResultName::Energy => values.extend(interfaces.map(|i| known(i.energy_at_end_j()))),
+            Measure::Run(of) => values.push(of(prepared, run)),
         }
     }
 }

@@ -100,7 +100,7 @@ const NO_MEASURES: [ResultName; 2] = [ResultName::EnergyError, ResultName::Momen
 /// The result that a column holds, by its name; `None` for what is varied.
 pub(super) fn result_of(name: &str) -> Option<ResultName> {
     let quantity = name.split('[').next();
-    RESULTS.into_iter().find(|result| Some(result.quantity()) == quantity)
+    RESULTS.into_iter().find(|(_, own)| Some(*own) == quantity).map(|(result, _)| result)
 }
 
 /// Of `rows` items about [`SAMPLE`] have a hash that is not above this, of fewer all.
