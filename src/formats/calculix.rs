@@ -43,12 +43,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
             step(&mut lines, curve, units);
         }
     }
-    let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
-    Ok(Exported {
-        files: vec![(format!("{stem}.inp"), lines.into_bytes())],
-        notes,
-        ..Exported::default()
-    })
+    Ok(Exported::of_all(curves, "inp", lines.into_bytes(), notes))
 }
 
 fn ascii(text: &str) -> String {

@@ -40,8 +40,7 @@ pub(crate) fn write(curves: &[ExportCurve]) -> Result<Exported, Error> {
         text(&mut bytes, &named("facts"), curve);
         notes.push(curve.restitution_note("a table without memory", TargetUnloading::Elastic));
     }
-    let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
-    Ok(Exported { files: vec![(format!("{stem}.mat"), bytes)], notes, ..Exported::default() })
+    Ok(Exported::of_all(curves, "mat", bytes, notes))
 }
 
 fn columns(rows: &[(f64, f64)]) -> Vec<Vec<f64>> {

@@ -280,6 +280,12 @@ impl Exported {
     pub(crate) fn file(name: impl Into<String>, bytes: Vec<u8>) -> Self {
         Self { files: vec![(name.into(), bytes)], ..Self::default() }
     }
+
+    /// One file of all curves, named after the first.
+    fn of_all(curves: &[ExportCurve], ending: &str, bytes: Vec<u8>, notes: Vec<String>) -> Self {
+        let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
+        Self { notes, ..Self::file(format!("{stem}.{ending}"), bytes) }
+    }
 }
 
 /// Maximum number of bytes of a file that holds a curve: a predicted one has some ten thousand.

@@ -25,9 +25,8 @@ const KEYWORDS: &str = "algorithm and annotation block break class connect conne
 const PER_LINE: usize = 6;
 
 pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {
-    let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
     if options.extension.as_deref() == Some("txt") {
-        return combi_table(curves, &stem);
+        return combi_table(curves);
     }
     let mut exported = Exported::default();
     for curve in curves {
@@ -47,7 +46,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
 }
 
 /// One table of loading and one of unloading per curve.
-fn combi_table(curves: &[ExportCurve], stem: &str) -> Result<Exported, Error> {
+fn combi_table(curves: &[ExportCurve]) -> Result<Exported, Error> {
     let mut lines = String::new();
     let mut notes = Vec::new();
     line!(lines, "#1");
@@ -76,11 +75,7 @@ fn combi_table(curves: &[ExportCurve], stem: &str) -> Result<Exported, Error> {
         }
         notes.push(curve.restitution_note("a table without memory", TargetUnloading::Elastic));
     }
-    Ok(Exported {
-        files: vec![(format!("{stem}.txt"), lines.into_bytes())],
-        notes,
-        ..Exported::default()
-    })
+    Ok(Exported::of_all(curves, "txt", lines.into_bytes(), notes))
 }
 
 /// A constant array.

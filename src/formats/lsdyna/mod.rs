@@ -78,8 +78,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
         }
     }
     line!(lines, "*END");
-    let name = format!("{}.k", curves.first().map_or("curves".into(), ExportCurve::file_stem));
-    Ok(Exported { files: vec![(name, lines.into_bytes())], notes, ..Exported::default() })
+    Ok(Exported::of_all(curves, "k", lines.into_bytes(), notes))
 }
 
 /// The material's restitution compared with ours.

@@ -80,7 +80,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
     let (deflection, force) = choose(found, input.options.curve.as_deref())?;
     let (motion_s, at_s) = (deflection.times(&times)?, force.times(&times)?);
     for channel in [&deflection, &force] {
-        let (code, what) = (&channel.code, channel.quantity.name());
+        let (code, what) = (&channel.code, channel.quantity.terms().name);
         columns.notes.push(format!("{what}: channel {code} in {}", channel.unit));
         if channel.file.path != input.path.display().to_string() {
             columns.files.push(channel.file.clone());

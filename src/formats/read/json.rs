@@ -66,7 +66,6 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
         _ => None,
     };
     let facts = Metadata {
-        line_stiffness_n_per_m: None,
         force: Some(curve.provenance.force_kind),
         speed_m_per_s: Some(curve.speed_m_per_s),
         speed_kind: Some(curve.speed_kind),
@@ -74,9 +73,7 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
         body_unloading_stiffness_n_per_m: curve.body_unloading_stiffness_n_per_m,
         mass_kg: Some(curve.mass_kg),
         other_mass_kg,
-        max_deflection_m: None,
-        data_end_m: None,
-        contact_time_s: None,
+        ..Metadata::default()
     };
     Ok(ReadCurve {
         title: title(&format!("{}, {}", curve.provenance.group, curve.model), &mut notes),

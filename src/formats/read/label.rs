@@ -15,10 +15,13 @@ pub(super) enum Quantity {
 }
 
 /// Names of a quantity: words separated by blanks, in lower case.
-struct Terms {
-    name: &'static str,
-    example: &'static str,
-    option: &'static str,
+pub(super) struct Terms {
+    /// In messages.
+    pub name: &'static str,
+    /// What its column could be called.
+    pub example: &'static str,
+    /// The option that names its column.
+    pub option: &'static str,
     dimension: &'static Dimension,
     /// Its dimension in labels that state the size of their unit.
     stated: &'static str,
@@ -79,23 +82,8 @@ impl Quantity {
     /// In the order in which they are matched with an axis.
     pub(super) const ALL: [Self; 3] = [Self::Deflection, Self::Force, Self::Time];
 
-    fn terms(self) -> &'static Terms {
+    pub(super) fn terms(self) -> &'static Terms {
         &TERMS[self as usize]
-    }
-
-    /// Its name in messages.
-    pub(super) fn name(self) -> &'static str {
-        self.terms().name
-    }
-
-    /// What its column could be called.
-    pub(super) fn example(self) -> &'static str {
-        self.terms().example
-    }
-
-    /// The option that names its column.
-    pub(super) fn option(self) -> &'static str {
-        self.terms().option
     }
 
     /// SI value of its unit in a system.
@@ -159,7 +147,7 @@ impl Quantity {
     pub(super) fn known_size_of(self, unit: &str, place: Place) -> Result<f64, Error> {
         self.size_of(unit).ok_or_else(|| {
             let (what, known, unit) =
-                (self.name(), self.terms().dimension.known_units(), shown(unit));
+                (self.terms().name, self.terms().dimension.known_units(), shown(unit));
             let hint = guess::hint(&unit, &known);
             error!(
                 CurveFile,
@@ -239,7 +227,8 @@ impl Label {
             (Some(unit), _) => self.quantity.known_size_of(unit, place),
             (None, Some(units)) => Ok(self.quantity.size_in(units)),
             (None, None) => {
-                Err(no_unit(place, self.quantity.name(), text, self.quantity.example()))
+                let Terms { name, example, .. } = self.quantity.terms();
+                Err(no_unit(place, name, text, example))
             }
         }
     }

@@ -105,7 +105,7 @@ pub(super) fn layout(
                 "{place}: expected a {what} in the {which} column, found \"{found}\": choose the columns with --deflection-column and --force-column if the label is right",
                 found = shown(name),
                 place = Place::Line(*line),
-                what = quantity.name()
+                what = quantity.terms().name
             ));
         }
     }
@@ -154,9 +154,9 @@ pub(super) fn layout(
                 CurveFile,
                 "{place}: several columns could be the {what}: {found}; choose one with {option}, by its name or number",
                 found = alike[..alike.len().min(LISTED)].join(", "),
-                option = quantity.option(),
+                option = quantity.terms().option,
                 place = Place::Line(found[0].line),
-                what = quantity.name()
+                what = quantity.terms().name
             ));
         }
         // Columns with times of their own would be paired row by row.
@@ -186,17 +186,18 @@ pub(super) fn layout(
                 return Err(error!(
                     CurveFile,
                     "{place}: expected a column {wanted} with its unit, such as {example}, found {left}; or choose the column with {option}",
-                    example = quantity.example(),
-                    option = quantity.option(),
+                    example = quantity.terms().example,
+                    option = quantity.terms().option,
                     place = Place::Line(line_left),
-                    wanted = quantity.name()
+                    wanted = quantity.terms().name
                 ));
             }
         }
         others.extend(found);
     }
     if !others.is_empty() {
-        let shown = |c: &Named| format!("\"{}\" ({})", shown(&c.name), c.label.quantity.name());
+        let shown =
+            |c: &Named| format!("\"{}\" ({})", shown(&c.name), c.label.quantity.terms().name);
         let others: Vec<String> = others.iter().map(shown).collect();
         notes.push(format!("columns: not used: {}", others.join(", ")));
     }
@@ -204,7 +205,7 @@ pub(super) fn layout(
     for Named { field, name, label, line } in taken {
         let size = label.size(&name, units, Place::Line(line))?;
         columns.push(Column { field, quantity: label.quantity, size });
-        let what = format!("{} of \"{}\" in", label.quantity.name(), shown(&name));
+        let what = format!("{} of \"{}\" in", label.quantity.terms().name, shown(&name));
         said.push(match (&label.unit, units) {
             (Some(unit), _) => format!("{what} {unit}"),
             (None, Some(units)) => format!("{what} units {units} as given"),
@@ -249,7 +250,7 @@ fn named(names: &[(u64, String)], quantity: Quantity, asked: &str) -> Result<Nam
                 "{place}: {option} \"{asked}\" is not a column: expected a number from 1, or one of {known}",
                 asked = shown(asked),
                 known = known.collect::<Vec<_>>().join(", "),
-                option = quantity.option(),
+                option = quantity.terms().option,
                 place = Place::Line(names.first().map_or(1, |(line, _)| *line))
             ))
         }

@@ -185,7 +185,7 @@ impl ReadOptions {
     /// The first option that is given.
     fn column_option(&self) -> Option<&'static str> {
         let is_given = |q: &Quantity| self.column(*q).is_some();
-        Quantity::ALL.into_iter().find(is_given).map(Quantity::option)
+        Quantity::ALL.into_iter().find(is_given).map(|q| q.terms().option)
     }
 
     fn columns(&self) -> Vec<&str> {
