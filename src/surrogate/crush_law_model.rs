@@ -10,7 +10,7 @@ use serde_json::value::RawValue;
 
 use super::crush_law::{CrushLaw, per_crush_force};
 use super::curves::mean_over;
-use super::entry::{ModelEntry, loaded};
+use super::models::{ModelEntry, loaded};
 use super::{CaseCurve, QueryPoint, Surrogate};
 use crate::curve::ForceKind;
 use crate::dataset::{TrainingCase, TrainingSet};

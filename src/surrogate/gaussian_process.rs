@@ -10,7 +10,7 @@ use multiversion::multiversion;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
-use super::entry::{ModelEntry, loaded};
+use super::models::{ModelEntry, loaded};
 use super::{CaseCurve, QueryPoint, Surrogate};
 use crate::error::{Error, error};
 

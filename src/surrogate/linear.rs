@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::curves::{interpolate_held, neighbours};
-use super::entry::ModelEntry;
+use super::models::ModelEntry;
 use super::{CaseCurve, QueryPoint, Surrogate};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {

@@ -12,10 +12,7 @@ mod cases;
 pub(crate) mod crush_law;
 mod crush_law_model;
 pub(crate) mod curves;
-mod entry;
-mod extra;
 pub(crate) mod forest;
-mod forest_options;
 mod gaussian_process;
 pub(crate) mod leave_one_out;
 mod linear;
@@ -50,7 +47,6 @@ mod rate;
 pub(crate) mod recorded;
 mod response;
 mod speed_of_crush;
-mod spikes;
 pub(crate) mod warning;
 
 /// Where a surrogate is used.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::entry::ModelEntry;
+use super::models::ModelEntry;
 use super::{CaseCurve, QueryPoint, Surrogate};
 use crate::dataset::nearest_case;
 

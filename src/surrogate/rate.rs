@@ -20,7 +20,7 @@ use super::alignment::Alignment;
 use super::blend::{Blend, own_share};
 use super::cached::Cached;
 use super::curves::{Twins, answering_at, apart, neighbouring};
-use super::entry::{ModelEntry, loaded};
+use super::models::{ModelEntry, loaded};
 use super::{CaseCurve, QueryPoint, Surrogate};
 
 pub(super) const ENTRY: ModelEntry = ModelEntry {

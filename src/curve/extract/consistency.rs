@@ -1,7 +1,7 @@
 //! Consistency of the histories of one record along time: impulse against momentum, displacement against velocity,
 //! force against motion, the output interval against the curve.
 
-use super::error::ExtractError;
+use super::ExtractError;
 use super::record::Record;
 use super::start::FromContact;
 use super::{Measured, Notes};

@@ -1,6 +1,6 @@
 //! Motion and force of a run in SI, at common times.
 
-use super::error::{ExtractError, Origin};
+use super::{ExtractError, Origin};
 use super::{Measured, MeasuredForce, Notes, Setup};
 use crate::curve::contact::milliseconds;
 use crate::curve::recipe::{MAX_STATES, RecordedMotion};

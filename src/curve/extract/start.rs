@@ -1,6 +1,6 @@
 //! Start of contact in a record, the record from there on (time and deflection count from it), and the impact speed.
 
-use super::error::ExtractError;
+use super::ExtractError;
 use super::record::{Record, impulse};
 use super::{Notes, Setup, StatedContact};
 use crate::curve::contact::{self, STATED_BY, milliseconds};
