@@ -11,7 +11,7 @@
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 
-use super::extract::{self, ExtractError, Extracted, Record, Setup, Stated, StatedContact};
+use super::extract::{self, ExtractError, Extracted, Notes, Record, Setup, Stated, StatedContact};
 use super::recipe::{Filter, Sampling};
 use super::retrace::{Impact, Table, retrace};
 use super::{Curve, EnergyAudit, Quality, RecordedCurves, above_0, contact, energy, loading};
@@ -209,9 +209,9 @@ fn recorded(
         },
         others: &Vec::new,
     };
-    let (record, remarks) =
-        Record::of_columns(time_s, table.deflection_m, table.force_n, impact.units)
-            .map_err(of_table)?;
+    let mut remarks = Notes::default();
+    let (d, f) = (table.deflection_m, table.force_n);
+    let record = Record::of_columns(time_s, d, f, impact.units, &mut remarks).map_err(of_table)?;
     let (fastest, stated) = (fastest(&record), impact.speed.m_per_s);
     // What else is impossible then follows from it.
     let other_speed = || {

@@ -9,7 +9,7 @@ use crate::curve::contact::milliseconds;
 use crate::curve::energy::{IMPOSSIBLE_ALONG_TIME, ImpossibleRun, POSSIBLE};
 use crate::curve::{Curve, Masses, body, loading};
 use crate::history::History;
-use crate::signal::{cfc, derivative, interpolate};
+use crate::signal::{cfc, derivative, integral, interpolate};
 use crate::unit::Shown;
 
 /// Impulse and lost momentum of clean FE runs differ by 1 to 4 % of the impact's momentum at any
@@ -65,17 +65,6 @@ impl Difference {
         }
         difference
     }
-}
-
-/// Integral from the first state on, by the trapezoidal rule.
-fn integral(time_s: &[f64], values: &[f64]) -> Vec<f64> {
-    let mut sum = 0.0;
-    let step = |i: usize| 0.5 * (values[i] + values[i - 1]) * (time_s[i] - time_s[i - 1]);
-    let steps = (1..time_s.len()).map(|i| {
-        sum += step(i);
-        sum
-    });
-    std::iter::once(0.0).chain(steps).collect()
 }
 
 /// The displacement against the integral of the velocity, over the whole record.
@@ -307,13 +296,12 @@ impl<'a> Motion<'a> {
     }
 
     /// What another force than the recipe's does to the body, seen in its flight before contact.
-    pub(super) fn flight(&self, record: &Record) -> Notes {
-        let mut remarks = Notes::default();
+    pub(super) fn flight(&self, record: &Record, remarks: &mut Notes) {
         let states = record.time_s.partition_point(|&t| t < self.contact.time_s);
         let curve = &self.contact.curve;
         let crush_m = curve.deflection_m()[loading::loading_end(curve)];
         if states < FLIGHT || record.missing_velocity.is_some() {
-            return remarks;
+            return;
         }
         let (first, last) = (record.rate_m_per_s[0].abs(), record.rate_m_per_s[states - 1].abs());
         let rate = (last - first) / (record.time_s[states - 1] - record.time_s[0]);
@@ -332,14 +320,12 @@ impl<'a> Motion<'a> {
                 share * 100.0
             ));
         }
-        remarks
     }
 }
 
 /// Whether the output interval is short enough for the curve, by what it would be without every second
 /// state; and what the recipe's common times make of it.
-pub(super) fn sampling(original: &Curve, sampled: &Curve) -> Notes {
-    let mut remarks = Notes::default();
+pub(super) fn sampling(original: &Curve, sampled: &Curve, remarks: &mut Notes) {
     let end = loading::loading_end(original);
     let interval_ms = |t: &[f64], n: usize| 1e3 * (t[n] - t[0]) / n.max(1) as f64;
     let halved: Vec<f64> = original.time_s().iter().copied().step_by(2).collect();
@@ -363,7 +349,6 @@ pub(super) fn sampling(original: &Curve, sampled: &Curve) -> Notes {
             off * 100.0
         ));
     }
-    remarks
 }
 
 /// Whether the motion, whose states are at `own_s` from contact on, is written often enough beside a force with more

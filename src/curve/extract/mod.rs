@@ -67,7 +67,8 @@ pub(crate) fn of_run(
     measured: &Measured<'_>,
     setup: &Setup<'_>,
 ) -> Result<Extracted, ExtractError> {
-    let (record, mut remarks) = Record::of(measured, setup)?;
+    let mut remarks = Notes::default();
+    let record = Record::of(measured, setup, &mut remarks)?;
     remarks.warnings.extend(consistency::masses(measured, setup.masses));
     curve_of(record, remarks, setup)
 }
@@ -79,7 +80,7 @@ pub(crate) fn curve_of(
     setup: &Setup<'_>,
 ) -> Result<Extracted, ExtractError> {
     // Before the filter, which without phase shift begins ahead of the contact.
-    let start = remarks.take(Start::find(setup, &mut record)?);
+    let start = Start::find(setup, &mut record, &mut remarks)?;
     let accepted = |checked: Result<Notes, energy::ImpossibleRun>| match checked {
         Err(impossible) if setup.stated.accept_energy => {
             Ok(Notes::warning(format!("accept_energy: {}", impossible.found())))
@@ -90,23 +91,24 @@ pub(crate) fn curve_of(
     let recorded_n = record.force_n.clone();
     remarks.warnings.extend(consistency::spike(&record.time_s, &recorded_n));
     if let Filter::Cfc(class) = setup.filter {
-        remarks.append(filter(class, &mut record)?);
+        filter(class, &mut record, &mut remarks)?;
     }
-    let contact = remarks.take(FromContact::of(&record, start.time_s, setup.stated.offset_m)?);
-    remarks.append(start.uncertainty(&contact, setup));
+    let offset_m = setup.stated.offset_m;
+    let contact = FromContact::of(&record, start.time_s, offset_m, &mut remarks)?;
+    start.uncertainty(&contact, setup, &mut remarks);
     if let Filter::Cfc(class) = setup.filter {
         remarks.warnings.extend(consistency::filter(class, &contact.curve, &recorded_n));
     }
-    remarks.append(start.force_before(&record.time_s, &recorded_n, &contact));
+    start.force_before(&record.time_s, &recorded_n, &contact, &mut remarks);
     let motion = Motion::of(&contact, setup.masses);
     motion.is_free()?;
-    remarks.append(motion.flight(&record));
+    motion.flight(&record, &mut remarks);
     let (along_time, mass) = (motion.momentum(), motion.mass(&record));
     let is_slowed = contact.time_s <= record.time_s[0] && record.slowed_over_m.is_some();
     let before = (!is_slowed).then_some(contact.before);
     let FromContact { curve: original, closing_m_per_s: closing, time_s: contact_s, .. } = contact;
     let ImpactSpeed { speed, by, recorded_m_per_s } =
-        remarks.take(ImpactSpeed::of(setup, &record, before)?);
+        ImpactSpeed::of(setup, &record, before, &mut remarks)?;
     let claim = energy::StatedConditions {
         curve: &original,
         masses: setup.masses,
@@ -141,8 +143,8 @@ pub(crate) fn curve_of(
     };
     remarks.append(accepted(along_time)?);
     remarks.append(accepted(mass)?);
-    let (sampled, closing_speed_m_per_s) = remarks.take(sample(&original, &closing, setup)?);
-    remarks.append(consistency::sampling(&original, &sampled));
+    let (sampled, closing_speed_m_per_s) = sample(&original, &closing, setup, &mut remarks)?;
+    consistency::sampling(&original, &sampled, &mut remarks);
     if let Some(time_s) = &record.motion_time_s {
         let from_contact: Vec<f64> = time_s.iter().map(|t| t - contact_s).collect();
         remarks.warnings.extend(consistency::coarse_motion(
@@ -152,7 +154,7 @@ pub(crate) fn curve_of(
             &from_contact,
         ));
     }
-    remarks.append(audited(&original, record.force_kind, balance));
+    audited(&original, record.force_kind, balance, &mut remarks);
     Ok(Extracted {
         speed,
         quality: Quality {
@@ -172,8 +174,7 @@ pub(crate) fn curve_of(
     })
 }
 
-fn filter(class: u32, record: &mut Record) -> Result<Notes, ExtractError> {
-    let mut remarks = Notes::default();
+fn filter(class: u32, record: &mut Record, remarks: &mut Notes) -> Result<(), ExtractError> {
     let filtered = cfc::filter(class, &record.time_s, &record.force_n)?;
     if filtered.resampled {
         remarks.note(format!(
@@ -182,7 +183,7 @@ fn filter(class: u32, record: &mut Record) -> Result<Notes, ExtractError> {
         ));
     }
     record.force_n = filtered.values;
-    Ok(remarks)
+    Ok(())
 }
 
 /// By this share a force before the contact has changed the speed, if it is more than noise.
@@ -194,8 +195,7 @@ const MOST_CONTACT_WORK: f64 = 1.15;
 const MOMENTUM_AGREES: f64 = 0.02;
 
 /// Notes on energy, impulse and the loading branch of a curve.
-fn audited(curve: &Curve, kind: ForceKind, balance: energy::EnergyBalance) -> Notes {
-    let mut remarks = Notes::default();
+fn audited(curve: &Curve, kind: ForceKind, balance: energy::EnergyBalance, remarks: &mut Notes) {
     let is_truncated = loading::loading_end(curve) + 1 == curve.time_s().len();
     if let Some(work) = balance.work.filter(|w| (w - 1.0).abs() > EnergyAudit::TOLERANCE) {
         let of = if is_truncated { " lost up to the last state" } else { "" };
@@ -232,7 +232,6 @@ fn audited(curve: &Curve, kind: ForceKind, balance: energy::EnergyBalance) -> No
             counted(branch.dropped, "sample")
         ));
     }
-    remarks
 }
 
 /// Choices that were made, and what the user should check.
@@ -264,12 +263,6 @@ impl Notes {
     pub(crate) fn append(&mut self, other: Self) {
         self.notes.extend(other.notes);
         self.warnings.extend(other.warnings);
-    }
-
-    /// The result of a step, whose remarks are added after these.
-    pub(crate) fn take<T>(&mut self, (result, remarks): (T, Self)) -> T {
-        self.append(remarks);
-        result
     }
 }
 

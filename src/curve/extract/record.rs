@@ -50,22 +50,22 @@ impl Record {
     pub(super) fn of(
         measured: &Measured<'_>,
         setup: &Setup<'_>,
-    ) -> Result<(Self, Notes), ExtractError> {
-        let mut remarks = Notes::default();
+        remarks: &mut Notes,
+    ) -> Result<Self, ExtractError> {
         let units = measured.units;
-        let motion = remarks.take(Motion::of(measured, setup)?);
-        let force = remarks.take(force(measured, setup)?);
-        let mut record = remarks.take(Self::at_common_times(motion, force, units)?);
+        let motion = Motion::of(measured, setup, remarks)?;
+        let force = force(measured, setup, remarks)?;
+        let mut record = Self::at_common_times(motion, force, units, remarks)?;
         if let MeasuredForce::Body(..) = measured.force {
             record.force_kind = ForceKind::Body;
         }
         if let Some(until_s) = setup.stated.truncate_s {
             remarks.note(record.truncate(until_s)?);
         }
-        remarks.append(record.turn_force(setup.stated.force_sign));
+        record.turn_force(setup.stated.force_sign, remarks);
         if let Some(contact) = measured.contact {
-            let signal = Signal::of(contact, units, units.force(), "contact force", Origin::Force)?;
-            let mut signal = remarks.take(signal);
+            let (factor, what) = (units.force(), "contact force");
+            let mut signal = Signal::of(contact, units, factor, what, Origin::Force, remarks)?;
             let sign = sign_of_impulse(&signal.time_s, &signal.values);
             signal.values.iter_mut().for_each(|f| *f *= sign);
             if setup.stated.contact.is_none() {
@@ -73,7 +73,7 @@ impl Record {
             }
             record.contact = Some(signal);
         }
-        Ok((record, remarks))
+        Ok(record)
     }
 
     /// The record of columns in SI, which were read in `units`.
@@ -82,35 +82,33 @@ impl Record {
         deflection_m: &[f64],
         force_n: &[f64],
         units: UnitSystem,
-    ) -> Result<(Self, Notes), ExtractError> {
-        let mut remarks = Notes::default();
+        remarks: &mut Notes,
+    ) -> Result<Self, ExtractError> {
         let states = |values: &'_ [f64]| time_s.iter().copied().zip(values.to_vec());
         let deflection =
-            remarks.take(Signal::new(states(deflection_m), "displacement", Origin::Motion)?);
-        let motion = Motion::differentiated(deflection, "velocity".into(), &mut remarks);
-        let force = remarks.take(Signal::new(states(force_n), "force", Origin::Force)?);
-        let mut record = remarks.take(Self::at_common_times(motion, force, units)?);
-        remarks.append(record.turn_force(None));
-        Ok((record, remarks))
+            Signal::new(states(deflection_m), "displacement", Origin::Motion, remarks)?;
+        let motion = Motion::differentiated(deflection, "velocity".into(), remarks);
+        let force = Signal::new(states(force_n), "force", Origin::Force, remarks)?;
+        let mut record = Self::at_common_times(motion, force, units, remarks)?;
+        record.turn_force(None, remarks);
+        Ok(record)
     }
 
     /// Makes compression positive, by the impulse where no sign is stated.
-    fn turn_force(&mut self, stated: Option<f64>) -> Notes {
-        let mut remarks = Notes::default();
+    fn turn_force(&mut self, stated: Option<f64>, remarks: &mut Notes) {
         let sign = stated.unwrap_or_else(|| sign_of_impulse(&self.time_s, &self.force_n));
         if sign < 0.0 {
             remarks.note("force: sign flipped, positive in compression");
         }
         self.force_n.iter_mut().for_each(|f| *f *= sign);
-        remarks
     }
 
     fn at_common_times(
         motion: Motion,
         force: Signal,
         units: UnitSystem,
-    ) -> Result<(Self, Notes), ExtractError> {
-        let mut remarks = Notes::default();
+        remarks: &mut Notes,
+    ) -> Result<Self, ExtractError> {
         let mut record = Self {
             first_rate_m_per_s: motion.rate_m_per_s[0],
             slowed_over_m: None,
@@ -130,7 +128,7 @@ impl Record {
             && pairs.all(|(a, b)| (a - b).abs() <= SAME_TIME * to.abs())
         {
             record.force_n = force.values;
-            return Ok((record, remarks));
+            return Ok(record);
         }
         let lead = force.time_s.partition_point(|&t| t < from);
         let whole = impulse(&force.time_s, &force.values);
@@ -170,7 +168,7 @@ impl Record {
             free_m.filter(|_| is_slower).map(|free_m| (record.deflection_m[0] - free_m).abs());
         record.motion_time_s = Some(std::mem::replace(&mut record.time_s, time_s));
         record.force_n = force_n;
-        Ok((record, remarks))
+        Ok(record)
     }
 
     /// Removes the states after the manifest's end of the record; says how many.
@@ -240,13 +238,14 @@ impl Signal {
         factor: f64,
         what: &'static str,
         origin: Origin,
-    ) -> Result<(Self, Notes), ExtractError> {
+        remarks: &mut Notes,
+    ) -> Result<Self, ExtractError> {
         if let Some(i) = history.values.iter().position(|v| !v.is_finite()) {
             let (what, value) = (history.label(), history.values[i]);
             return Err(ExtractError::NotFinite { origin, what, state: i + 1, value });
         }
         let times = history.time.iter().map(|t| t * units.time_s);
-        Self::new(times.zip(history.values.iter().map(|v| v * factor)), what, origin)
+        Self::new(times.zip(history.values.iter().map(|v| v * factor)), what, origin, remarks)
     }
 
     /// The states whose time comes after that of the one before.
@@ -254,8 +253,8 @@ impl Signal {
         states: impl ExactSizeIterator<Item = (f64, f64)>,
         what: &'static str,
         origin: Origin,
-    ) -> Result<(Self, Notes), ExtractError> {
-        let mut remarks = Notes::default();
+        remarks: &mut Notes,
+    ) -> Result<Self, ExtractError> {
         let all = states.len();
         let (mut time_s, mut values) = (Vec::new(), Vec::new());
         for (t, v) in states {
@@ -276,7 +275,7 @@ impl Signal {
         if time_s.len() < 2 {
             return Err(ExtractError::TooShort { origin, what, states: time_s.len() });
         }
-        Ok((Self { time_s, values }, remarks))
+        Ok(Self { time_s, values })
     }
 }
 
@@ -289,34 +288,31 @@ struct Motion {
 }
 
 impl Motion {
-    fn of(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<(Self, Notes), ExtractError> {
-        let mut remarks = Notes::default();
+    fn of(
+        measured: &Measured<'_>,
+        setup: &Setup<'_>,
+        remarks: &mut Notes,
+    ) -> Result<Self, ExtractError> {
         let units = measured.units;
         let bodies = if setup.half_model { 2.0 } else { 1.0 };
-        let deflection = remarks.take(relative(
-            measured.displacement,
-            measured.minus_displacement,
-            units,
-            units.length_m * bodies,
-            "displacement",
-        )?);
+        let (node, minus) = (measured.displacement, measured.minus_displacement);
+        let factor = units.length_m * bodies;
+        let deflection = relative(node, minus, units, factor, "displacement", remarks)?;
         if setup.half_model {
             remarks.note("half model: deflection and speed are twice the run's");
         }
         let Some(velocity) = measured.velocity else {
             let missing = measured.displacement.component.replace("displacement", "velocity");
-            let motion = Self::differentiated(deflection, missing, &mut remarks);
-            return Ok((motion, remarks));
+            return Ok(Self::differentiated(deflection, missing, remarks));
         };
         let (minus, factor) = (measured.minus_velocity, units.speed() * bodies);
-        let rate = remarks.take(relative(velocity, minus, units, factor, "velocity")?);
-        let motion = Self {
+        let rate = relative(velocity, minus, units, factor, "velocity", remarks)?;
+        Ok(Self {
             time_s: deflection.time_s,
             deflection_m: deflection.values,
             rate_m_per_s: rate.values,
             missing_velocity: None,
-        };
-        Ok((motion, remarks))
+        })
     }
 
     fn differentiated(deflection: Signal, missing: String, remarks: &mut Notes) -> Self {
@@ -348,19 +344,24 @@ fn relative(
     units: UnitSystem,
     factor: f64,
     what: &'static str,
-) -> Result<(Signal, Notes), ExtractError> {
-    let (mut signal, mut remarks) = Signal::of(node, units, factor, what, Origin::Motion)?;
+    remarks: &mut Notes,
+) -> Result<Signal, ExtractError> {
+    let mut signal = Signal::of(node, units, factor, what, Origin::Motion, remarks)?;
     if let Some(minus) = minus {
-        let minus = remarks.take(Signal::of(minus, units, factor, what, Origin::Motion)?);
+        let minus = Signal::of(minus, units, factor, what, Origin::Motion, remarks)?;
         for (value, minus) in signal.values.iter_mut().zip(&minus.values) {
             *value -= minus;
         }
     }
-    Ok((signal, remarks))
+    Ok(signal)
 }
 
 /// The force in N, in the direction of the file, at its own rate.
-fn force(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<(Signal, Notes), ExtractError> {
+fn force(
+    measured: &Measured<'_>,
+    setup: &Setup<'_>,
+    remarks: &mut Notes,
+) -> Result<Signal, ExtractError> {
     let units = measured.units;
     let others = measured.minus_displacement.and_then(|history| history.entity);
     let mass = match (&measured.force, setup.masses.other_kg) {
@@ -372,17 +373,18 @@ fn force(measured: &Measured<'_>, setup: &Setup<'_>) -> Result<(Signal, Notes), 
         }
         _ => setup.masses.body_kg,
     };
-    let of = |history, factor, what| Signal::of(history, units, factor, what, Origin::Force);
+    let mut of =
+        |history, factor, what| Signal::of(history, units, factor, what, Origin::Force, remarks);
     match measured.force {
         MeasuredForce::Contact(history) => of(history, units.force(), "force"),
         MeasuredForce::Body(history, RecordedMotion::Acceleration) => {
             of(history, mass * units.acceleration(), "acceleration")
         }
         MeasuredForce::Body(history, RecordedMotion::Velocity) => {
-            let (velocity, mut remarks) = of(history, mass * units.speed(), "velocity")?;
+            let velocity = of(history, mass * units.speed(), "velocity")?;
             remarks.note("body force: mass times the central difference of the velocity");
             let values = derivative(&velocity.time_s, &velocity.values);
-            Ok((Signal { values, ..velocity }, remarks))
+            Ok(Signal { values, ..velocity })
         }
     }
 }
@@ -393,8 +395,8 @@ pub(super) fn sample(
     original: &Curve,
     closing: &[f64],
     setup: &Setup<'_>,
-) -> Result<((Curve, Vec<f64>), Notes), ExtractError> {
-    let mut remarks = Notes::default();
+    remarks: &mut Notes,
+) -> Result<(Curve, Vec<f64>), ExtractError> {
     let sampling = setup.sampling;
     let at = original.time_s();
     let last_s = at[at.len() - 1];
@@ -451,5 +453,5 @@ pub(super) fn sample(
     let deflection = at_times(original.deflection_m())?;
     let force = at_times(original.force_n())?;
     let closing = at_times(closing)?;
-    Ok(((Curve::new(times, deflection, force)?, closing), remarks))
+    Ok((Curve::new(times, deflection, force)?, closing))
 }

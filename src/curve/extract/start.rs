@@ -49,30 +49,32 @@ impl Start {
     pub(crate) fn find(
         setup: &Setup<'_>,
         record: &mut Record,
-    ) -> Result<(Self, Notes), ExtractError> {
+        remarks: &mut Notes,
+    ) -> Result<Self, ExtractError> {
         match setup.stated.contact {
             Some(StatedContact::Time { s: time_s }) => {
                 if !record.holds(time_s) {
                     return Err(record.outside("contact_time", time_s));
                 }
-                let mut remarks = Notes::default();
                 remarks.notes.extend(found_elsewhere(record, time_s, setup));
-                Ok((Self { time_s, by: StartBy::Manifest }, remarks))
+                Ok(Self { time_s, by: StartBy::Manifest })
             }
             Some(StatedContact::Gap { m }) => {
-                let mut remarks = Notes::default();
                 let time_s = closing_time(record, m)?;
                 remarks.note(format!("contact: the gap closes at {}", milliseconds(time_s)));
                 remarks.notes.extend(found_elsewhere(record, time_s, setup));
-                Ok((Self { time_s, by: StartBy::Manifest }, remarks))
+                Ok(Self { time_s, by: StartBy::Manifest })
             }
-            None => Self::in_force(record, setup),
+            None => Self::in_force(record, setup, remarks),
         }
     }
 
     /// Where the contact force begins, if the recipe names one; else the record's.
-    fn in_force(record: &mut Record, setup: &Setup<'_>) -> Result<(Self, Notes), ExtractError> {
-        let mut remarks = Notes::default();
+    fn in_force(
+        record: &mut Record,
+        setup: &Setup<'_>,
+        remarks: &mut Notes,
+    ) -> Result<Self, ExtractError> {
         let (onset, force_n) = onset(record, setup)?;
         if record.contact.is_none() {
             record.force_n = force_n;
@@ -114,12 +116,16 @@ impl Start {
                 StartBy::FirstState { missing_m, at_full_speed, at_most_s: onset.at_most_s }
             }
         };
-        Ok((Self { time_s: onset.time_s, by }, remarks))
+        Ok(Self { time_s: onset.time_s, by })
     }
 
     /// By how much the crush may be off because contact lies somewhere in a step.
-    pub(crate) fn uncertainty(&self, contact: &FromContact, setup: &Setup<'_>) -> Notes {
-        let mut remarks = Notes::default();
+    pub(crate) fn uncertainty(
+        &self,
+        contact: &FromContact,
+        setup: &Setup<'_>,
+        remarks: &mut Notes,
+    ) {
         let curve = &contact.curve;
         let crush_m = curve.deflection_m()[loading::loading_end(curve)];
         let step_m = |interval_s: f64| contact.closing_m_per_s[0].abs() * interval_s;
@@ -222,7 +228,6 @@ impl Start {
             ),
             StartBy::Crossing { .. } | StartBy::Manifest | StartBy::Body => {}
         }
-        remarks
     }
 
     /// Force before the contact, gap or offset that the manifest states.
@@ -231,10 +236,10 @@ impl Start {
         time_s: &[f64],
         force_n: &[f64],
         contact: &FromContact,
-    ) -> Notes {
-        let mut remarks = Notes::default();
+        remarks: &mut Notes,
+    ) {
         if !matches!(self.by, StartBy::Manifest) && contact.time_s <= self.time_s {
-            return remarks;
+            return;
         }
         // A state at the contact itself is the curve's first.
         let earliest_s = contact.time_s - SAME_TIME * contact.time_s.abs();
@@ -251,7 +256,6 @@ impl Start {
                 100.0 * early_ns / (early_ns + rest_ns)
             ));
         }
-        remarks
     }
 }
 
@@ -369,8 +373,8 @@ impl FromContact {
         record: &Record,
         contact_s: f64,
         offset_m: f64,
-    ) -> Result<(Self, Notes), ExtractError> {
-        let mut remarks = Notes::default();
+        remarks: &mut Notes,
+    ) -> Result<Self, ExtractError> {
         let contact_m = record.at(&record.deflection_m, contact_s)?;
         // A rebound can travel further than the crush: what the impact does first counts.
         let direction = if record.at(&record.rate_m_per_s, contact_s)? < 0.0 { -1.0 } else { 1.0 };
@@ -404,13 +408,12 @@ impl FromContact {
             force_n.push(record.force_n[i]);
             closing_m_per_s.push(direction * record.rate_m_per_s[i]);
         }
-        let contact = Self {
+        Ok(Self {
             curve: Curve::new(time_s, deflection_m, force_n)?,
             closing_m_per_s,
             time_s: start_s,
             before: record.time_s.partition_point(|&t| t <= contact_s).saturating_sub(1),
-        };
-        Ok((contact, remarks))
+        })
     }
 }
 
@@ -460,8 +463,8 @@ impl ImpactSpeed {
         setup: &Setup<'_>,
         record: &Record,
         before: Option<usize>,
-    ) -> Result<(Self, Notes), ExtractError> {
-        let mut remarks = Notes::default();
+        remarks: &mut Notes,
+    ) -> Result<Self, ExtractError> {
         let differ = |a: f64, b: f64| (a - b).abs() > SAME_SPEED * a.max(b);
         let first = record.first_rate_m_per_s.abs();
         let of_state = before.map_or(first, |state| record.rate_m_per_s[state].abs());
@@ -513,7 +516,7 @@ impl ImpactSpeed {
         }
         if m_per_s > 0.0 {
             let speed = Speed { m_per_s, kind: setup.kind };
-            Ok((Self { speed, by, recorded_m_per_s: recorded }, remarks))
+            Ok(Self { speed, by, recorded_m_per_s: recorded })
         } else {
             Err(ExtractError::Standing)
         }
