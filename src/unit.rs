@@ -476,26 +476,29 @@ impl<'de> Deserialize<'de> for UnitSystem {
     }
 }
 
-/// Reads text with a unit; a bare number gets the message of a missing unit, not that of
+/// Reads text, as which a bare number is taken: it gets the message of a missing unit, not that of
 /// a wrong type.
-struct TextVisitor(fn(&str) -> Result<f64, Error>);
+pub(crate) struct TextVisitor<T> {
+    pub expecting: &'static str,
+    pub parse: fn(&str) -> Result<T, Error>,
+}
 
-impl serde::de::Visitor<'_> for TextVisitor {
-    type Value = f64;
+impl<T> serde::de::Visitor<'_> for TextVisitor<T> {
+    type Value = T;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a number with a unit, in quotes")
+        f.write_str(self.expecting)
     }
 
-    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<f64, E> {
-        (self.0)(text).map_err(E::custom)
+    fn visit_str<E: serde::de::Error>(self, text: &str) -> Result<T, E> {
+        (self.parse)(text).map_err(E::custom)
     }
 
-    fn visit_i64<E: serde::de::Error>(self, number: i64) -> Result<f64, E> {
+    fn visit_i64<E: serde::de::Error>(self, number: i64) -> Result<T, E> {
         self.visit_str(&number.to_string())
     }
 
-    fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<f64, E> {
+    fn visit_f64<E: serde::de::Error>(self, number: f64) -> Result<T, E> {
         self.visit_str(&number.to_string())
     }
 }
@@ -509,7 +512,9 @@ macro_rules! texts_with_units {
 
         impl<'de> Deserialize<'de> for $name {
             fn deserialize<D: serde::Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-                d.deserialize_any(TextVisitor(|text| $dimension.$parse(text))).map(Self)
+                let expecting = "a number with a unit, in quotes";
+                let parse = |text: &str| $dimension.$parse(text).map(Self);
+                d.deserialize_any(TextVisitor { expecting, parse })
             }
         }
 

@@ -5,12 +5,10 @@
 
 pub(crate) mod draw;
 
-use std::fmt;
-
 use serde::Deserialize;
 
 use crate::error::{Error, error};
-use crate::unit::{LENGTH, MASS, SPEED};
+use crate::unit::{LENGTH, MASS, SPEED, TextVisitor};
 use draw::Distribution;
 
 /// More items than any cluster could run; keeps a mistyped number from passing.
@@ -230,27 +228,9 @@ pub(crate) struct Entry(pub String);
 
 impl<'de> Deserialize<'de> for Entry {
     fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct Visitor;
-        impl serde::de::Visitor<'_> for Visitor {
-            type Value = Entry;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number, or text such as a number with its unit")
-            }
-
-            fn visit_str<E>(self, text: &str) -> Result<Entry, E> {
-                Ok(Entry(text.into()))
-            }
-
-            fn visit_i64<E>(self, number: i64) -> Result<Entry, E> {
-                Ok(Entry(number.to_string()))
-            }
-
-            fn visit_f64<E>(self, number: f64) -> Result<Entry, E> {
-                Ok(Entry(number.to_string()))
-            }
-        }
-        deserializer.deserialize_any(Visitor)
+        let expecting = "a number, or text such as a number with its unit";
+        let parse = |text: &str| Ok(Self(text.into()));
+        deserializer.deserialize_any(TextVisitor { expecting, parse })
     }
 }
 
