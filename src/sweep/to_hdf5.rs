@@ -204,61 +204,57 @@ impl FinishedTable {
         takes: impl Fn(u64) -> bool,
         mut see: impl FnMut(&[f64]),
     ) -> Result<(), Error> {
-        let (items, status) = (self.head.rows(), self.head.columns.len() - 2);
-        let width = self.table.columns[status].values.size();
-        for first in items.clone().step_by(ROWS as usize) {
-            let (row, rows) = (first - items.start, ROWS.min(items.end - first));
-            let columns: Vec<Vec<u8>> = self
-                .head
-                .number_columns()
-                .map(|c| self.table.read(c, row, rows))
-                .collect::<Result<_, _>>()?;
-            let (numbers, states) =
-                (self.table.read(0, row, rows)?, self.table.read(status, row, rows)?);
-            for (k, item) in (first..first + rows).enumerate() {
-                let eighth = |bytes: &[u8]| eight(&bytes[8 * k..8 * (k + 1)]);
-                let state = text(&states[width * k..width * (k + 1)]);
-                let is_whole = Status::ALL.into_iter().any(|of| of.name() == state);
-                if i64::from_le_bytes(eighth(&numbers)) != item as i64 || !is_whole {
-                    return Err(bad_row(&self.path, item));
-                }
-                if takes(item) {
-                    let number = |bytes: &Vec<u8>| f64::from_le_bytes(eighth(bytes));
-                    see(&columns.iter().map(number).collect::<Vec<_>>());
-                }
+        let numbers: Vec<usize> = self.head.number_columns().collect();
+        let read = [&numbers[..], &[0, self.head.columns.len() - 2]].concat();
+        self.rows(&read, |item, _, field| {
+            if takes(item) {
+                see(&numbers.iter().map(|&c| real(field(c))).collect::<Vec<_>>());
             }
-        }
-        Ok(())
+            Ok(())
+        })
     }
 
     fn tally(&self, tally: &mut Tally) -> Result<(), Error> {
         let numbers: Vec<usize> = self.head.number_columns().collect();
         let choices: Vec<usize> = self.head.choice_columns().collect();
+        let number_of_message = self.head.columns.len() - 1;
+        // Every column but the messages.
+        let read: Vec<usize> = (0..self.table.columns.len() - 1).collect();
+        self.rows(&read, |item, status, field| {
+            let message = match integer(field(number_of_message)) {
+                0 => String::new(),
+                k => text(&self.table.read(number_of_message + 1, k as u64, 1)?).into_owned(),
+            };
+            let chosen: HashMap<usize, Cow<'_, str>> =
+                choices.iter().map(|&c| (c, text(field(c)))).collect();
+            let chosen = |c: usize| chosen.get(&c).map(|name| &**name);
+            tally.see(item, numbers.iter().map(|&c| real(field(c))), chosen, status, &message);
+            Ok(())
+        })
+    }
+
+    /// Calls `see` with each item, its status, and its bytes by column, of those that are `read`.
+    fn rows(
+        &self,
+        read: &[usize],
+        mut see: impl for<'b> FnMut(u64, Status, &dyn Fn(usize) -> &'b [u8]) -> Result<(), Error>,
+    ) -> Result<(), Error> {
         let (items, status) = (self.head.rows(), self.head.columns.len() - 2);
+        let mut columns = vec![Vec::new(); self.table.columns.len()];
         for first in items.clone().step_by(ROWS as usize) {
             let (row, rows) = (first - items.start, ROWS.min(items.end - first));
-            // The bytes of every column but the messages.
-            let columns: Vec<Vec<u8>> = (0..self.table.columns.len() - 1)
-                .map(|c| self.table.read(c, row, rows))
-                .collect::<Result<_, _>>()?;
+            for &c in read {
+                columns[c] = self.table.read(c, row, rows)?;
+            }
             for (k, item) in (first..first + rows).enumerate() {
-                let bytes = |c: usize| {
+                let field = |c: usize| {
                     let size = self.table.columns[c].values.size();
                     &columns[c][k * size..(k + 1) * size]
                 };
-                let found = text(bytes(status));
+                let found = text(field(status));
                 let found = Status::ALL.into_iter().find(|s| s.name() == found);
-                let found = found.filter(|_| integer(bytes(0)) == item as i64);
-                let found = found.ok_or_else(|| bad_row(&self.path, item))?;
-                let message = match integer(bytes(status + 1)) {
-                    0 => String::new(),
-                    number => text(&self.table.read(status + 2, number as u64, 1)?).into_owned(),
-                };
-                let number = |&c: &usize| f64::from_le_bytes(eight(bytes(c)));
-                let chosen: HashMap<usize, Cow<'_, str>> =
-                    choices.iter().map(|&c| (c, text(bytes(c)))).collect();
-                let chosen = |c: usize| chosen.get(&c).map(|name| &**name);
-                tally.see(item, numbers.iter().map(number), chosen, found, &message);
+                let found = found.filter(|_| integer(field(0)) == item as i64);
+                see(item, found.ok_or_else(|| bad_row(&self.path, item))?, &field)?;
             }
         }
         Ok(())
@@ -267,6 +263,10 @@ impl FinishedTable {
 
 fn eight(bytes: &[u8]) -> [u8; 8] {
     bytes.try_into().unwrap_or_default()
+}
+
+fn real(bytes: &[u8]) -> f64 {
+    f64::from_le_bytes(eight(bytes))
 }
 
 fn integer(bytes: &[u8]) -> i64 {
