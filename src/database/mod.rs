@@ -480,11 +480,6 @@ fn damaged(path: &Path, place: &str, detail: impl fmt::Display) -> Error {
     error!(Database, "{}: {place}: {detail}", path.display())
 }
 
-/// Turns a curve that breaks its invariant into a database error.
-fn damaged_curve(path: &Path, place: &str, error: Error) -> Error {
-    damaged(path, place, error)
-}
-
 /// Longest name of a case or group, in bytes.
 const MAX_NAME: usize = 200;
 

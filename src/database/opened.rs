@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 use super::group::CASES;
 use super::layout::{FORMAT, HASHES, OLDEST, ORIGINAL, VERSION, WRITTEN_BY, is_altered};
-use super::{CasePath, Database, damaged_curve};
+use super::{CasePath, Database};
 use crate::curve::{
     Case, CaseId, Conditions, Curve, EnergyAudit, ForceKind, Masses, Provenance, Quality,
     RecordedCurves, SourceFile,
@@ -279,11 +279,12 @@ impl Attrs<'_> {
             .map_err(|e| self.place.damaged(format!("attribute {name}: {e}")))
     }
 
-    fn optional_json<T>(&self, name: &str) -> Result<Option<T>, Error>
-    where
-        T: serde::de::DeserializeOwned,
-    {
-        self.map.contains_key(name).then(|| self.json(name)).transpose()
+    fn optional<'s, T>(
+        &'s self,
+        name: &str,
+        read: impl FnOnce(&'s Self, &str) -> Result<T, Error>,
+    ) -> Result<Option<T>, Error> {
+        self.map.contains_key(name).then(|| read(self, name)).transpose()
     }
 }
 
@@ -304,21 +305,11 @@ fn decode_case(
     let sources: Vec<SourceFile> = attrs.json("sources")?;
     let id =
         CaseId { study: attrs.text("study")?.into(), group: group_name.into(), name: name.into() };
-    let optional_number = |name: &str| {
-        if attrs.map.contains_key(name) { attrs.positive(name).map(Some) } else { Ok(None) }
-    };
-    let optional_text = |name: &str| {
-        if attrs.map.contains_key(name) {
-            attrs.text(name).map(|t| Some(t.into()))
-        } else {
-            Ok(None)
-        }
-    };
     let conditions = Conditions {
         speed: Speed { m_per_s: attrs.positive("speed_m_per_s")?, kind },
         masses: Masses {
             body_kg: attrs.positive("mass_kg")?,
-            other_kg: optional_number("other_mass_kg")?,
+            other_kg: attrs.optional("other_mass_kg", Attrs::positive)?,
         },
         parameters: attrs.json("parameters")?,
     };
@@ -343,10 +334,10 @@ fn decode_case(
         fingerprint: attrs.text("fingerprint")?.into(),
         sources,
         solver_wall_time_s: attrs.optional_number("solver_wall_time_s")?,
-        built_utc: optional_text("built_utc")?,
-        origin: attrs.optional_json("origin")?,
-        tags: attrs.optional_json("tags")?.unwrap_or_default(),
-        user_notes: attrs.optional_json("user_notes")?.unwrap_or_default(),
+        built_utc: attrs.optional("built_utc", Attrs::text)?.map(Into::into),
+        origin: attrs.optional("origin", Attrs::json)?,
+        tags: attrs.optional("tags", Attrs::json)?.unwrap_or_default(),
+        user_notes: attrs.optional("user_notes", Attrs::json)?.unwrap_or_default(),
     };
     let case = Case { id, conditions, curves, quality, provenance };
     let hashes = attrs.json(HASHES)?;
@@ -374,8 +365,7 @@ fn decode_curve(group: &Group, place: &Location<'_>) -> Result<Curve, Error> {
     let numbers = |name| numbers(group, name, place).map_err(|e| place.damaged(e));
     let (time, deflection, force) =
         (numbers("time_s")?, numbers("deflection_m")?, numbers("force_N")?);
-    Curve::new(time, deflection, force)
-        .map_err(|e| damaged_curve(place.opened.path, &place.name, e))
+    Curve::new(time, deflection, force).map_err(|e| place.damaged(e))
 }
 
 /// The values of a dataset; why not, in words.
