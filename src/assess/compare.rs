@@ -241,7 +241,7 @@ pub(crate) fn compare(
         inner: left_out.inner,
         mass_kg: case.conditions.masses.effective_kg(),
         window_s: reference.window_s(),
-        window_is_cut: reference.is_cut(),
+        window_is_cut: reference.is_cut,
         reference_peak_force_n: case.peak_force_n(),
         reference_max_crush_m: case.max_deflection_m(),
         fe_time_s: case.provenance.solver_wall_time_s,
@@ -330,7 +330,7 @@ fn nsdm_report(
     settings: &ComparisonSettings,
 ) -> Result<NsdmReport, Error> {
     let errors_at = |fit: &nsdm::Fit, at: &Reference| -> Result<_, Error> {
-        let motion = fit.model.run(at.mass_kg(), at.speed_m_per_s(), at.time_s())?;
+        let motion = fit.model.run(at.mass_kg, at.speed_m_per_s, &at.time_s)?;
         Ok(at.errors_of(&motion.v_m_per_s))
     };
     let mut fits = Vec::new();

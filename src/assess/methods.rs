@@ -127,13 +127,13 @@ pub(super) fn fit_nsdm(fixed: &Case, settings: &ComparisonSettings) -> Result<Fi
 /// The motion of a case that a spring and damper are fitted to: to 30 ms after its maximum
 /// deflection.
 pub(super) fn nsdm_target(reference: &Reference) -> Result<Target, Error> {
-    let until = reference.inside();
+    let until = reference.inside;
     Target::new(
-        reference.mass_kg(),
-        reference.speed_m_per_s(),
-        reference.time_s()[..until].to_vec(),
-        reference.velocity()[..until].to_vec(),
-        reference.acceleration()[..until].to_vec(),
+        reference.mass_kg,
+        reference.speed_m_per_s,
+        reference.time_s[..until].to_vec(),
+        reference.velocity[..until].to_vec(),
+        reference.acceleration[..until].to_vec(),
     )
 }
 

@@ -20,15 +20,18 @@ const FOR_FILTER_S: f64 = 0.050;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
     case: String,
-    mass_kg: f64,
-    speed_m_per_s: f64,
-    time_s: Vec<f64>,
-    /// States inside the window.
-    inside: usize,
+    pub(crate) mass_kg: f64,
+    pub(crate) speed_m_per_s: f64,
+    /// Times of the states that are compared and a little more, in s.
+    pub(crate) time_s: Vec<f64>,
+    /// States inside the window of the comparison.
+    pub(crate) inside: usize,
     /// Whether the record ends inside the window.
-    is_cut: bool,
-    velocity: Vec<f64>,
-    acceleration: Vec<f64>,
+    pub(crate) is_cut: bool,
+    /// FE's closing speed at these times, in m/s.
+    pub(crate) velocity: Vec<f64>,
+    /// Its central differences, in m/s².
+    pub(crate) acceleration: Vec<f64>,
     /// CFC 60.
     acceleration_filtered: Vec<f64>,
 }
@@ -87,11 +90,6 @@ impl Reference {
         self.time_s[self.inside - 1]
     }
 
-    /// Whether the record ends before the window.
-    pub(crate) fn is_cut(&self) -> bool {
-        self.is_cut
-    }
-
     /// Runs one body of the case's effective mass against a wall with a force curve, until the window is over and the body has
     /// stopped, or for 16 windows.
     ///
@@ -126,34 +124,6 @@ impl Reference {
         } else {
             Err(error!(Comparison, "its errors against FE are not finite numbers"))
         }
-    }
-
-    /// Times of the states that are compared and a little more, in s.
-    pub(crate) fn time_s(&self) -> &[f64] {
-        &self.time_s
-    }
-
-    /// States inside the window of the comparison.
-    pub(crate) fn inside(&self) -> usize {
-        self.inside
-    }
-
-    /// FE's closing speed at [`time_s`](Self::time_s), in m/s.
-    pub(crate) fn velocity(&self) -> &[f64] {
-        &self.velocity
-    }
-
-    /// Its central differences, in m/s².
-    pub(crate) fn acceleration(&self) -> &[f64] {
-        &self.acceleration
-    }
-
-    pub(crate) fn mass_kg(&self) -> f64 {
-        self.mass_kg
-    }
-
-    pub(crate) fn speed_m_per_s(&self) -> f64 {
-        self.speed_m_per_s
     }
 
     /// FE's and another motion's accelerations inside the window, CFC 60, from speeds at

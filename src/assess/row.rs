@@ -129,9 +129,9 @@ impl RowBuilder<'_> {
     pub(crate) fn of_nsdm(&self, fitted: &FittedNsdm) -> Result<Row, Error> {
         let reference = self.reference;
         let start = Instant::now();
-        let (mass, speed) = (reference.mass_kg(), reference.speed_m_per_s());
+        let (mass, speed) = (reference.mass_kg, reference.speed_m_per_s);
         let law = &fitted.best().model;
-        let motion = law.run(mass, speed, reference.time_s())?;
+        let motion = law.run(mass, speed, &reference.time_s)?;
         let simulation_s = start.elapsed().as_secs_f64();
         let (finer, at) = self.until_it_stops(law)?;
         let motion = Motion {
@@ -153,8 +153,8 @@ impl RowBuilder<'_> {
     /// The motion on spring and damper, and its state at the end of the window, or where the body stops if that is later.
     fn until_it_stops(&self, law: &Nsdm) -> Result<(nsdm::Motion, usize), Error> {
         let reference = self.reference;
-        let (mass, speed) = (reference.mass_kg(), reference.speed_m_per_s());
-        let interval_s = (reference.time_s()[1] - reference.time_s()[0]) / FINER as f64;
+        let (mass, speed) = (reference.mass_kg, reference.speed_m_per_s);
+        let interval_s = (reference.time_s[1] - reference.time_s[0]) / FINER as f64;
         let window = (reference.window_s() / interval_s).round() as usize;
         let mut states = window + 1;
         loop {
@@ -171,15 +171,15 @@ impl RowBuilder<'_> {
 
     /// Kinetic and stored energy over the initial energy.
     fn left(&self, v_m_per_s: f64, stored_j: f64) -> f64 {
-        let speed = self.reference.speed_m_per_s();
-        let initial_j = 0.5 * self.reference.mass_kg() * speed * speed;
+        let speed = self.reference.speed_m_per_s;
+        let initial_j = 0.5 * self.reference.mass_kg * speed * speed;
         (v_m_per_s / speed).powi(2) + stored_j / initial_j
     }
 
     /// Of one mass, which has all of the energy at first; the force is the mean that stops it. FE's body may still be leaving when the
     /// window is over.
     fn acceptance(&self, left: f64, max_crush_m: f64) -> Acceptance {
-        let last = self.reference.velocity()[self.reference.inside() - 1].abs();
+        let last = self.reference.velocity[self.reference.inside - 1].abs();
         let fe = self.left(self.fe_rebound_m_per_s.map_or(last, |v| v.max(last)), 0.0);
         let crush = max_crush_m / self.max_crush_m;
         Acceptance::of(fe - left, crush - 1.0, 1.0 / crush - 1.0)
@@ -195,11 +195,11 @@ impl RowBuilder<'_> {
     ) -> Result<Row, Error> {
         let Motion { velocity, peak_force_n, max_crush_m, left, simulation_s } = motion;
         let reference = self.reference;
-        let inside = reference.inside();
+        let inside = reference.inside;
         let errors = reference.errors_of(velocity);
         let (fe_a, ours_a) = reference.filtered_accelerations(velocity);
         let rated = |fe: &[f64], ours: &[f64], quantity| -> Result<Rating, Error> {
-            let time_s = &reference.time_s()[..inside];
+            let time_s = &reference.time_s[..inside];
             let signal = |name, values: &[f64]| Signal::new(name, time_s.to_vec(), values.to_vec());
             let settings = RatingSettings { quantity, ..RatingSettings::default() };
             rate(&signal("fe", fe)?, &signal(method, ours)?, &settings)
@@ -224,7 +224,7 @@ impl RowBuilder<'_> {
             simulation_time_s: simulation_s,
             speed_up: over(own_s),
             speed_up_with_training: training_s.and_then(|t| over(t + times.fit_s + own_s)),
-            velocity: rated(&reference.velocity()[..inside], &velocity[..inside], Quantity::Other)?,
+            velocity: rated(&reference.velocity[..inside], &velocity[..inside], Quantity::Other)?,
             acceleration: rated(fe_a, &ours_a, Quantity::Acceleration)?,
         })
     }

@@ -103,11 +103,11 @@ fn apart(run: &Case, mean: &TrainingCase, motion: &Reference) -> Option<Apart> {
         }
         ForceKind::Body => None,
     };
-    let time_s = &motion.time_s()[..motion.inside()];
+    let time_s = &motion.time_s[..motion.inside];
     let own_v = at_times(run.curves.sampled.time_s(), &run.curves.closing_speed_m_per_s, time_s);
     Some(Apart {
         force_l1: l1_ratio(&mean_n, &own_n),
-        velocity_l1: l1_ratio(&motion.velocity()[..motion.inside()], &own_v),
+        velocity_l1: l1_ratio(&motion.velocity[..motion.inside], &own_v),
         declared: Squares::of(&own_n, &mean_n),
         body,
     })

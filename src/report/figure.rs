@@ -11,17 +11,18 @@ const NARROW: f64 = 360.0;
 /// A chart in the page.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Figure {
-    id: String,
+    pub id: String,
     caption: String,
     notes: Vec<String>,
     svg: String,
     /// The same for a narrow screen, where the first would be too small to read.
     narrow_svg: String,
+    /// What the script needs.
     #[serde(skip)]
-    data: Value,
+    pub data: Value,
     /// How many looks it needs.
     #[serde(skip)]
-    looks: usize,
+    pub looks: usize,
 }
 
 impl Figure {
@@ -48,19 +49,6 @@ impl Figure {
         let looks = series.map(|s| s.look + 1).max().unwrap_or_default();
         let (svg, narrow_svg) = (drawing.svg_for(SvgFor::Page), narrow.svg_for(SvgFor::Page));
         Self { id, caption, notes, svg, narrow_svg, data, looks }
-    }
-
-    pub(super) fn id(&self) -> &str {
-        &self.id
-    }
-
-    pub(super) fn looks(&self) -> usize {
-        self.looks
-    }
-
-    /// What the script needs.
-    pub(super) fn data(&self) -> &Value {
-        &self.data
     }
 }
 

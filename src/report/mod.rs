@@ -310,9 +310,9 @@ fn html(content: &Content) -> String {
         })
         .collect();
     let looks =
-        looks_for_pages(figures.iter().map(|figure| figure.looks()).max().unwrap_or(1).max(8));
+        looks_for_pages(figures.iter().map(|figure| figure.looks).max().unwrap_or(1).max(8));
     let figures: BTreeMap<&str, &serde_json::Value> =
-        figures.into_iter().map(|figure| (figure.id(), figure.data())).collect();
+        figures.into_iter().map(|figure| (&*figure.id, &figure.data)).collect();
     let data = serde_json::json!({ "figures": figures, "looks": looks.data });
     let page = environment.get_template("page.html").expect("it was added");
     let style = format!("{STYLE}{}", looks.style);

@@ -45,7 +45,7 @@ pub(super) fn assemble_at(
     }
     let chain = Chain::new(bodies.clone(), interfaces)
         .map_err(|error| no_chain(path, scenario, &layout, error))?;
-    let speed_m_per_s = scenario.meeting_m_per_s();
+    let speed_m_per_s = scenario.meeting_m_per_s;
     let of_one = builder.of_one;
     let of_impact = of_one.iter().flat_map(|of| of.warnings(slots, speed_m_per_s));
     let of_impact: Vec<String> = of_impact.collect();
@@ -159,7 +159,7 @@ pub(crate) fn adjust(
         .map(|tension| tension.map_or(0.0, |curve| own(curve)))
         .collect();
     let (of_one, lasting) = &prepared.of_one;
-    let meeting = scenario.meeting_m_per_s();
+    let meeting = scenario.meeting_m_per_s;
     prepared.warnings.truncate(*lasting);
     prepared.warnings.extend(of_one.iter().flat_map(|of_one| of_one.warnings(slots, meeting)));
     let adjusted = prepared.chain.adjust(&motions, &gaps, &slacks);

@@ -20,7 +20,8 @@ use crate::unit::km_per_h;
 #[derive(Clone, Debug)]
 pub struct CheckedScenario<'a> {
     tables: Cow<'a, Scenario>,
-    meeting_m_per_s: f64,
+    /// Speed at which the first train meets what is in front of it, in m/s; above 0.
+    pub(crate) meeting_m_per_s: f64,
     /// Its text, if it is as in its file.
     document: Option<Document>,
 }
@@ -82,11 +83,6 @@ impl Scenario {
 }
 
 impl CheckedScenario<'_> {
-    /// Speed at which the first train meets what is in front of it, in m/s; above 0.
-    pub(crate) fn meeting_m_per_s(&self) -> f64 {
-        self.meeting_m_per_s
-    }
-
     /// Its text, if it is as in its file.
     pub(super) fn document(&self) -> Option<&Document> {
         self.document.as_ref()

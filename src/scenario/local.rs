@@ -51,7 +51,7 @@ pub(crate) fn assemble(
         .iter()
         .map(|slot| is_local(&slot.joint, slot.role, sources))
         .collect();
-    let meeting_m_per_s = scenario.meeting_m_per_s();
+    let meeting_m_per_s = scenario.meeting_m_per_s;
     if scenario.run.interface_speed != InterfaceSpeed::Local || !own.contains(&true) {
         return assemble_at(path, scenario, sources, &vec![meeting_m_per_s; own.len()]);
     }

@@ -41,7 +41,7 @@ const UNLIKE: f64 = 0.25;
 #[derive(Clone, Debug)]
 pub(super) struct Alignment {
     /// The curves over the common coordinate, in m.
-    curves: Vec<CaseCurve>,
+    pub curves: Vec<CaseCurve>,
     /// Each curve's own deflection over the common coordinate, in m.
     places: Vec<Warp>,
 }
@@ -75,11 +75,6 @@ impl Alignment {
             case.placed(|d| common.at(d))
         });
         Some(Self { curves: curves.collect::<Option<_>>()?, places })
-    }
-
-    /// The curves over the common coordinate, in m.
-    pub(super) fn curves(&self) -> &[CaseCurve] {
-        &self.curves
     }
 
     /// The blend `force_n` of the aligned curves, at an impact speed along increasing deflections in m.

@@ -98,13 +98,13 @@ impl<'a> Material<'a> {
     pub(crate) fn fit(&self, kind: ModelKind) -> Result<Model, Error> {
         let Self { set, cases, curves, .. } = self;
         Model::check_inputs(set, kind)?;
-        let needed_law = match kind.entry().needs_crush_law {
+        let needed_law = match kind.entry.needs_crush_law {
             true => self.crush_law().clone().filter(|law| law.stopped.is_known()),
             false => None,
         };
         let fitted = |curves: &[CaseCurve], force: ForceKind| {
             let (forest, crush_law) = (kind.forest_options(), needed_law.as_ref());
-            (kind.entry().fit)(&FitInput { set, curves, force, forest, crush_law })
+            (kind.entry.fit)(&FitInput { set, curves, force, forest, crush_law })
         };
         Ok(Model {
             written_by: concat!("crumple ", env!("CARGO_PKG_VERSION")).into(),
@@ -163,12 +163,12 @@ impl Model {
     /// Whether the model can be fitted to the set, without fitting it.
     pub(crate) fn check_fits(set: &TrainingSet, kind: ModelKind) -> Result<(), Error> {
         Self::check_inputs(set, kind)?;
-        if kind.entry().needs_crush_law { Self::fit_curves(set, kind).map(|_| ()) } else { Ok(()) }
+        if kind.entry.needs_crush_law { Self::fit_curves(set, kind).map(|_| ()) } else { Ok(()) }
     }
 
     /// Whether number and parameters of the set's cases serve the model.
     fn check_inputs(set: &TrainingSet, kind: ModelKind) -> Result<(), Error> {
-        let (model, entry) = (kind.name(), kind.entry());
+        let (model, entry) = (kind.name(), kind.entry);
         let (found, least) = (set.cases.len(), entry.least_curves);
         if found < least {
             let runs: usize = set.cases.iter().map(|case| case.runs.len()).sum();
@@ -491,7 +491,7 @@ impl Model {
         pairs.into_iter().all(|(feature, (own, asked))| {
             let is_mass = feature.is_mass();
             let share = if is_mass { SAME_MASS } else { NEARLY_INSIDE };
-            let follows = is_mass && self.kind.entry().follows_closing;
+            let follows = is_mass && self.kind.entry.follows_closing;
             follows || (own - asked).abs() <= share * own.abs()
         })
     }

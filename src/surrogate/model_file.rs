@@ -347,20 +347,20 @@ fn fitted_of(kind: &ModelKind, raw: &RawValue) -> Result<Arc<dyn Surrogate>, ser
     };
     if raw.get().starts_with('"') {
         let name: String = serde_json::from_str(raw.get())?;
-        return if name == kind.name() { (kind.entry().load)(None) } else { Err(other(&name)) };
+        return if name == kind.name() { (kind.entry.load)(None) } else { Err(other(&name)) };
     }
     // As this program writes a forest: it is large, and so read once. What follows it would be an error of its own.
-    let is_forest = kind.entry().forest.is_some();
+    let is_forest = kind.entry.forest.is_some();
     let own = raw.get().strip_prefix(&format!("{{\"{}\":", kind.name())).filter(|_| is_forest);
     if let Some(Ok(found)) =
-        own.and_then(|own| own.strip_suffix('}')).map(|own| (kind.entry().load)(Some(own)))
+        own.and_then(|own| own.strip_suffix('}')).map(|own| (kind.entry.load)(Some(own)))
     {
         return Ok(found);
     }
     let named: BTreeMap<String, &RawValue> = serde_json::from_str(raw.get())?;
     match named.first_key_value() {
         Some((name, parameters)) if name == kind.name() => {
-            (kind.entry().load)(Some(parameters.get()))
+            (kind.entry.load)(Some(parameters.get()))
         }
         Some((name, _)) => Err(other(name)),
         None => Err(other("nothing")),

@@ -95,7 +95,8 @@ const MOST_ROWS: usize = 4_000;
 /// Which model, with its options.
 #[derive(Clone, Copy)]
 pub struct ModelKind {
-    entry: &'static ModelEntry,
+    /// What the table of models says of it.
+    pub(crate) entry: &'static ModelEntry,
     forest: Option<ForestOptions>,
 }
 
@@ -165,11 +166,6 @@ impl ModelKind {
     /// The same with other options of its forest, if it has one.
     pub fn with_forest(self, change: impl FnOnce(ForestOptions) -> ForestOptions) -> Self {
         Self { forest: self.forest.map(change), ..self }
-    }
-
-    /// What the table of models says of it.
-    pub(crate) fn entry(&self) -> &'static ModelEntry {
-        self.entry
     }
 
     /// Its name.

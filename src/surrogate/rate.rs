@@ -183,7 +183,7 @@ impl Rate {
         let of = || cases.iter().map(|c| [c.speed_m_per_s, c.end_m(), c.envelope().work()]);
         let prepare = || {
             let alignment = self.alignment(cases);
-            let curves = alignment.as_ref().map_or(cases, Alignment::curves);
+            let curves = alignment.as_ref().map_or(cases, |alignment| &*alignment.curves);
             let levels = self.find_levels(curves);
             let own = self.of_impact.map_or(0.0, |of_impact| self.own_share(curves, of_impact));
             Prepared { of: of().collect(), alignment, levels, own, along: Cached::default() }
