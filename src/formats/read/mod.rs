@@ -30,7 +30,7 @@ use crate::guess;
 use std::path::Path;
 
 use super::{MAX_CURVE_BYTES, MIN_POINTS};
-use crate::curve::{ForceCurve, ForceKind, SourceFile};
+use crate::curve::{ForceCurve, ForceKind};
 use crate::surrogate::PredictedCurve;
 use crate::unit::UnitSystem;
 
@@ -243,7 +243,10 @@ fn parse(path: &Path, options: &ReadOptions) -> Result<(ReadCurve, &'static str)
         iso_mme::check_one(path, &tests).map_err(curve::content(path))?;
         (Vec::new(), None)
     } else {
-        open(path).map(|(bytes, own)| (bytes, Some(own)))?
+        let bytes = file::read(path, MAX_CURVE_BYTES);
+        let bytes = bytes.map_err(|e| curve::content(path)(e.into()))?;
+        let own = curve::source_file(path, &bytes);
+        (bytes, Some(own))
     };
     if bytes.starts_with(ZIP) {
         return Err(curve::content(path)(error!(
@@ -334,11 +337,4 @@ fn reader(input: &Input<'_>) -> Result<&'static Reader, Error> {
         .find(|r| (r.recognise)(input))
         .or_else(|| READERS.iter().find(|r| r.extensions.contains(&&*extension)))
         .ok_or_else(|| error!(CurveFile, "{path}: the format of this file cannot be recognised by its content or extension: expected one of {known}; name it with --from", known = known(), path = input.path.display()))
-}
-
-/// The bytes of a file, up to the bound, and what identifies them.
-fn open(path: &Path) -> Result<(Vec<u8>, SourceFile), Error> {
-    let bytes = file::read(path, MAX_CURVE_BYTES).map_err(|e| curve::content(path)(e.into()))?;
-    let own = curve::source_file(path, &bytes);
-    Ok((bytes, own))
 }

@@ -38,15 +38,12 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
             (length, force, None)
         }
         None => {
-            let own = table.name.starts_with(OURS)
-                && file.units.is_none()
-                && input.options.units.is_none();
-            let stated = if own { Some((UnitSystem::SI, table.line)) } else { file.units };
-            let system = if own {
-                notes.push(format!("units: SI, as crumple export writes {OURS}"));
-                UnitSystem::SI
-            } else {
-                units(stated, input.options.units, REMEDY, &mut notes)?
+            let system = match (file.units, input.options.units) {
+                (None, None) if table.name.starts_with(OURS) => {
+                    notes.push(format!("units: SI, as crumple export writes {OURS}"));
+                    UnitSystem::SI
+                }
+                (stated, given) => units(stated, given, REMEDY, &mut notes)?,
             };
             (system.length_m, system.force(), Some(system))
         }
