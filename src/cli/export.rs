@@ -245,19 +245,19 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     }
     args.target.check(&[format])?;
     let input = Input::read(path)?;
-    let (exported, warnings) = export(args, format, &input, output)?;
-    let outcome = options.warn_all(&warnings);
-    write(&exported, format, output, &warnings, options)?;
+    let exported = export(args, format, &input, output)?;
+    let outcome = options.warn_all(&exported.warnings);
+    write(&exported, format, output, options)?;
     Ok(outcome)
 }
 
-/// The files, and the warnings of the curves.
+/// The files, with the warnings of the curves.
 fn export(
     args: &Args,
     format: &Format,
     input: &Input,
     output: Option<&Path>,
-) -> Result<(Exported, Vec<String>), Failure> {
+) -> Result<Exported, Failure> {
     input.check_said(args)?;
     if format.takes_model() {
         args.target.check_for_model(format)?;
@@ -266,9 +266,7 @@ fn export(
         let mut options = args.target.options(output);
         options.speeds_m_per_s.clone_from(&args.which.speed);
         options.query = args.which.query()?;
-        let mut exported = format.export_model(model, &options)?;
-        let warnings = std::mem::take(&mut exported.warnings);
-        return Ok((exported, warnings));
+        return Ok(format.export_model(model, &options)?);
     }
     if format.takes_case() {
         let cases = input.cases(args, format.name)?;
@@ -284,9 +282,9 @@ fn export(
         let mut exported = format.export_cases(&cases, &args.target.options(output))?;
         if let (Input::File(_), Some(case)) = (input, cases.into_iter().next()) {
             exported.notes.splice(0..0, case.quality.notes);
-            return Ok((exported, case.quality.warnings));
+            exported.warnings = case.quality.warnings;
         }
-        return Ok((exported, Vec::new()));
+        return Ok(exported);
     }
     export_curves(args, format, input, output)
 }
@@ -297,7 +295,7 @@ fn export_curves(
     format: &Format,
     input: &Input,
     output: Option<&Path>,
-) -> Result<(Exported, Vec<String>), Failure> {
+) -> Result<Exported, Failure> {
     let (mut curves, quality) = input.curves(args)?;
     let is_file = quality.is_some();
     let (mut notes, mut warnings) =
@@ -321,7 +319,7 @@ fn export_curves(
     }
     let mut exported = args.target.export(format, &curves, output)?;
     exported.notes.splice(0..0, notes);
-    Ok((exported, warnings))
+    Ok(Exported { warnings, ..exported })
 }
 
 /// Writes the files to standard output if `output` is absent, and prints their notes.
@@ -329,10 +327,9 @@ pub(super) fn write(
     exported: &Exported,
     format: &Format,
     output: Option<&Path>,
-    warnings: &[String],
     options: GlobalOptions,
 ) -> Result<(), Failure> {
-    let (name, notes) = (format.name, &exported.notes);
+    let (name, Exported { notes, warnings, .. }) = (format.name, exported);
     options.say_notes(notes);
     let Some(path) = output else {
         let [(_, bytes)] = &exported.files[..] else {

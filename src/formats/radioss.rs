@@ -23,8 +23,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
     let mut files = Vec::new();
     for (k, curve) in curves.iter().enumerate() {
         let curve = &curve.begun_at_origin(false, &mut notes)?;
-        let units = curve.predicted.provenance.study_units;
-        let units = InUnits(options.units.or(units).unwrap_or(UnitSystem::SI));
+        let units = InUnits::of(curve, options);
         let id = options.id + k as u32;
         if options.deck {
             begin(&mut lines, curve, units, &stem);

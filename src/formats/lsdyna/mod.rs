@@ -32,6 +32,12 @@ pub enum Material {
 pub(super) struct InUnits(pub UnitSystem);
 
 impl InUnits {
+    /// Those that were asked for, else those of the runs.
+    pub(super) fn of(curve: &ExportCurve, options: &Options) -> Self {
+        let of_runs = curve.predicted.provenance.study_units;
+        Self(options.units.or(of_runs).unwrap_or(UnitSystem::SI))
+    }
+
     pub(super) fn length(self, m: f64) -> String {
         nine_digits(m / self.0.length_m)
     }
@@ -61,8 +67,7 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
     line!(lines, "*KEYWORD");
     for (k, curve) in curves.iter().enumerate() {
         let curve = &curve.begun_at_origin(false, &mut notes)?;
-        let units = curve.predicted.provenance.study_units;
-        let units = InUnits(options.units.or(units).unwrap_or(UnitSystem::SI));
+        let units = InUnits::of(curve, options);
         // Of the loading branch and of the material; that of the unloading is one more.
         let id = options.id + 2 * k as u32;
         describe(&mut lines, curve, units, options.material);
