@@ -214,7 +214,7 @@ fn recorded(
     let record = Record::of_columns(time_s, d, f, impact.units, &mut remarks).map_err(of_table)?;
     let (fastest, stated) = (fastest(&record), impact.speed.m_per_s);
     // What else is impossible then follows from it.
-    let other_speed = || {
+    let too_fast_or_slow = || {
         let found = format!(
             "its deflection grows by {fastest:.4} m/s at most, but {stated:.4} m/s is stated"
         );
@@ -224,7 +224,7 @@ fn recorded(
         extract::curve_of(record.clone(), remarks.clone(), setup).map_err(|error| {
             match error {
                 ExtractError::ImpossibleRun(_) if !SPEEDS.contains(&(fastest / stated)) => {
-                    other_speed()
+                    too_fast_or_slow()
                 }
                 error => of_table(error),
             }
@@ -245,11 +245,10 @@ fn recorded(
         ));
     }
     let Extracted { curves, quality, .. } = found;
+    let Quality { audit, notes: of_record, mut warnings } = quality;
     let curves = RecordedCurves { force_kind: impact.force_kind, ..curves };
-    let (of_unloading, mut warnings) = remarks_on(&curves, impact)?;
     // A table has no run: its own line states the contact.
-    let found = quality.warnings.into_iter().map(|w| w.replace(contact::STATED_BY, STATED_BY));
-    warnings.splice(0..0, found);
+    warnings.iter_mut().for_each(|w| *w = w.replace(contact::STATED_BY, STATED_BY));
     if let Some(share) = before {
         warnings.push(format!(
             "contact: there is a force before time 0, the offset or noise of a sensor: contact is taken where it exceeds {:.1} % of its peak; take both off the record, or set {STATED_BY}",
@@ -258,17 +257,6 @@ fn recorded(
     } else if impact.contact_time_s.is_none() && guessed {
         warnings.extend(starts_late(&curves).map(|found| format!("contact: {found}")));
     }
-    notes.extend(of_unloading);
-    notes.extend(quality.notes);
-    Ok((curves, Quality { audit: quality.audit, notes, warnings }))
-}
-
-/// Notes and warnings on a record under an impact.
-fn remarks_on(
-    curves: &RecordedCurves,
-    impact: &Impact,
-) -> Result<(Vec<String>, Vec<String>), Error> {
-    let (mut notes, mut warnings) = (Vec::new(), Vec::new());
     let closing = &curves.closing_speed_m_per_s;
     if let Some(found) = other_speed(closing, impact.speed.m_per_s, SPEEDS) {
         if !impact.accept_energy {
@@ -284,7 +272,8 @@ fn remarks_on(
             Err(warning) => warnings.push(warning),
         }
     }
-    Ok((notes, warnings))
+    notes.extend(of_record);
+    Ok((curves, Quality { audit, notes, warnings }))
 }
 
 /// The largest mean rate of the deflection in m/s over a twentieth of a record: noise and a single wrong value do not make it.

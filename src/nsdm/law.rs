@@ -140,12 +140,6 @@ impl Nsdm {
         self.stiffness.at(x_m) * x_m
     }
 
-    /// `c(|x'|)` in N s/m, at a speed in m/s.
-    #[cfg(test)]
-    pub(crate) fn damping_n_s_per_m(&self, speed_m_per_s: f64) -> f64 {
-        self.damping.at(speed_m_per_s)
-    }
-
     /// The spring alone as an envelope, within 1e-4 of its peak force.
     ///
     /// Between two nodes the force is a parabola, so each segment is cut as finely as its
@@ -320,8 +314,8 @@ mod tests {
         assert_eq!(law.spring_force_n(0.05), 5e7 * 0.05);
         assert_eq!(law.spring_force_n(-0.05), -5e7 * 0.05);
         assert_eq!(law.spring_force_n(2.0), 6e6);
-        assert_eq!(law.damping_n_s_per_m(-9.0), 6e4);
-        assert_eq!(law.damping_n_s_per_m(20.0), 1e5);
+        assert_eq!(law.damping.at(-9.0), 6e4);
+        assert_eq!(law.damping.at(20.0), 1e5);
     }
 
     #[test]

@@ -266,7 +266,7 @@ mod tests {
         let found = target.scales().law(&genes).unwrap();
         let (mut off, mut all) = (0.0, 0.0);
         for ((x, v), a) in motion.x_m.iter().zip(&motion.v_m_per_s).zip(&motion.a_m_per_s2) {
-            let force = found.spring_force_n(*x) + found.damping_n_s_per_m(*v) * v;
+            let force = found.spring_force_n(*x) + found.damping.at(*v) * v;
             off += (force / 24e3 + a).abs();
             all += a.abs();
         }

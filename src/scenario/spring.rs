@@ -219,19 +219,18 @@ impl Spring {
         mut self,
         table: &Table,
     ) -> Result<(ForceLaw, Vec<String>), Error> {
-        let (unloading, warnings) = match table.law {
-            LawName::Elastic => (Some(Unloading::Elastic), Vec::new()),
+        let unloading = match table.law {
+            LawName::Elastic => Some(Unloading::Elastic),
             LawName::Memory | LawName::Rate => self.memory(table)?,
         };
-        self.warnings.extend(warnings);
         Ok((ForceLaw::of_curve(&self.curve, unloading, self.end), self.warnings))
     }
 
-    fn memory(&self, table: &Table) -> Result<(Option<Unloading>, Vec<String>), Error> {
+    fn memory(&mut self, table: &Table) -> Result<Option<Unloading>, Error> {
         let asked = table.unloading.map(|u| u.0);
         let known = self.curve.unloading.stiffness_n_per_m();
         let steepest = self.curve.loading.steepest_rise();
-        let mut warnings = Vec::new();
+        let warnings = &mut self.warnings;
         if asked.is_none() && known.is_none() && steepest > 0.0 {
             warnings.push(format!(
                 "it has no unloading stiffness: it unloads with its steepest rise, {}, which decides the rebound: set unloading = \"…MN/m\"",
@@ -286,7 +285,7 @@ impl Spring {
                 "it {why}, so its unloading stiffness must be given: unloading = \"…MN/m\", or law = \"elastic\""
             ));
         }
-        Ok((asked.map(|stiffness_n_per_m| Unloading::Memory { stiffness_n_per_m }), warnings))
+        Ok(asked.map(|stiffness_n_per_m| Unloading::Memory { stiffness_n_per_m }))
     }
 }
 

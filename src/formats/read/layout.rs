@@ -172,8 +172,8 @@ pub(super) fn layout(
                 CurveFile,
                 "{place}: expected one column of times, such as {example}, found {all}: choose it with {option}, or none for force over deflection without times; histories with different times need to be resampled",
                 all = all.join(", "),
-                example = quantity.example(),
-                option = quantity.option(),
+                example = quantity.terms().example,
+                option = quantity.terms().option,
                 place = Place::Line(line_left)
             ));
         }
