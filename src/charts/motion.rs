@@ -592,7 +592,7 @@ pub fn train_speeds(title: &str, comparison: &TrainComparison) -> Chart {
     let panels = comparison.fe.iter().map(|(vehicle, fe)| {
         // One span for all, so that vehicles can be compared.
         let y = Axis::new("speed", "m/s", 1.0).over(low - room, high + room);
-        let mut panel = Panel::new(Axis::new("time", "ms", 1e3), y);
+        let mut panel = Panel::new(time(), y);
         panel.title = vehicle.clone();
         let time_s = &comparison.time_s;
         panel.series.push(Series::line("FE", 3, time_s.clone(), fe.clone()).shown(Shown::Emphasis));

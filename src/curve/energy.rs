@@ -74,7 +74,8 @@ pub(crate) struct EnergyBalance {
     cause.of_run()
 )]
 pub(crate) struct ImpossibleRun {
-    found: String,
+    /// What was found, without its cause.
+    pub found: String,
     cause: Cause,
 }
 
@@ -104,11 +105,6 @@ impl ImpossibleRun {
     pub(crate) fn by_earlier_force(self) -> Self {
         let cause = "likely a force before the contact that was found, which the curve leaves out: contact_time in the run takes it in";
         Self::of_histories(self.found, cause)
-    }
-
-    /// What was found, without its cause.
-    pub(crate) fn found(&self) -> &str {
-        &self.found
     }
 
     /// The likely cause where the curve is that of a file without a study.

@@ -24,7 +24,7 @@ use crate::unit::Shown;
 pub(crate) const IMPORTED: &str = "imported";
 
 fn impossible_table(impossible: energy::ImpossibleRun) -> Error {
-    impossible_for(impossible.found(), impossible.cause_in_file())
+    impossible_for(&impossible.found, impossible.cause_in_file())
 }
 
 fn impossible_for(found: impl Display, cause: impl Display) -> Error {
@@ -111,7 +111,7 @@ fn retraced(table: &Table<'_>, impact: &Impact) -> Result<(RecordedCurves, Quali
     match claim.check() {
         Ok(_) => {}
         Err(impossible) if impact.accept_energy => {
-            warnings.push(format!("accept_energy: {}", impossible.found()));
+            warnings.push(format!("accept_energy: {}", impossible.found));
         }
         Err(impossible) => return Err(impossible_table(impossible)),
     }

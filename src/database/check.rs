@@ -85,7 +85,11 @@ pub(crate) fn check(path: &Path) -> Result<Checked, Error> {
         let is_altered = checked.findings[before..].iter().any(is_altered);
         of_group(&group, &readable, &mut checked.findings);
         if !is_altered {
-            beside_each_other(&group.name, &readable, &mut checked.findings);
+            // What is unusual in cases compared with their group.
+            for (case, code, message) in siblings::remarks(&readable) {
+                Findings { group: &group.name, case: &case, list: &mut checked.findings }
+                    .add(code, None, None, message);
+            }
         }
         if is_as_written {
             of_stopped_mass(&raw, &group.name, &readable, &mut checked.findings)?;
@@ -427,13 +431,6 @@ fn of_group(found: &FoundGroup, cases: &[Case], list: &mut Vec<Finding>) {
             listed(by_speed.iter().copied())
         );
         add(by_speed[0], "case_order", message);
-    }
-}
-
-/// What is unusual in cases compared with their group.
-fn beside_each_other(group: &str, cases: &[Case], list: &mut Vec<Finding>) {
-    for (case, code, message) in siblings::remarks(cases) {
-        Findings { group, case: &case, list }.add(code, None, None, message);
     }
 }
 

@@ -18,15 +18,13 @@ const RESIDUAL: &str = "stopped_mass_residual_kg";
 pub(super) const GROUP_ATTRIBUTES: [&str; 7] =
     [CASES, DEFLECTION, STOPPED, RATE, RESIDUAL, "NX_class", "default"];
 
-/// The value of a group's attribute `cases`.
-fn case_names(cases: &[Case]) -> AttrValue {
-    AttrValue::VarLenStringArray(cases.iter().map(|c| c.id.name.clone()).collect())
-}
-
 /// The attributes of a group with these cases, in order of speed.
 pub(super) fn attributes(name: &str, cases: &[Case]) -> Vec<(&'static str, AttrValue)> {
-    let mut all =
-        vec![(CASES, case_names(cases)), ("NX_class", AttrValue::String("NXentry".into()))];
+    let names = cases.iter().map(|case| case.id.name.clone()).collect();
+    let mut all = vec![
+        (CASES, AttrValue::VarLenStringArray(names)),
+        ("NX_class", AttrValue::String("NXentry".into())),
+    ];
     // The case that a tool draws which is asked for the group's picture.
     let last = cases.last();
     all.extend(last.map(|case| ("default", AttrValue::VarLenString(case.id.name.clone()))));

@@ -83,7 +83,7 @@ pub(crate) fn curve_of(
     let start = Start::find(setup, &mut record, &mut remarks)?;
     let accepted = |checked: Result<Notes, energy::ImpossibleRun>| match checked {
         Err(impossible) if setup.stated.accept_energy => {
-            Ok(Notes::warning(format!("accept_energy: {}", impossible.found())))
+            Ok(Notes::warning(format!("accept_energy: {}", impossible.found)))
         }
         checked => checked,
     };
@@ -122,7 +122,7 @@ pub(crate) fn curve_of(
     let balance = match claim.check() {
         Ok(balance) => balance,
         Err(impossible) if setup.stated.accept_energy => {
-            remarks.warn(format!("accept_energy: {}", impossible.found()));
+            remarks.warn(format!("accept_energy: {}", impossible.found));
             claim.balance()
         }
         Err(impossible) => {

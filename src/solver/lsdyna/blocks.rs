@@ -57,7 +57,7 @@ pub(crate) fn open(
     };
     frame.states.forget_pending();
     let labels = frame.states.labels();
-    let mut cycles = frame.states.cycles().to_vec();
+    let mut cycles = frame.states.cycles.clone();
     let digits = frame.states.time_digits;
     let mut file = frame.finish(&mut *body);
     let count = layout.count(size, start);

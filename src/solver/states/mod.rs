@@ -70,7 +70,7 @@ pub(crate) struct StateReader<'a> {
     absent_cells: usize,
     /// Places of the kept states' beginnings, and their cycles where the file has them.
     places: Vec<Place>,
-    cycles: Vec<Option<i64>>,
+    pub cycles: Vec<Option<i64>>,
     /// Digits that the file prints of times.
     pub time_digits: i32,
     widths: Widths,

@@ -203,11 +203,6 @@ impl<'a> StateReader<'a> {
         labels
     }
 
-    /// Cycles of the kept states.
-    pub(crate) fn cycles(&self) -> &[Option<i64>] {
-        &self.cycles
-    }
-
     pub(crate) fn channels(&self) -> usize {
         let scalars = self.scalars.iter().filter(|s| s.kept).count();
         self.tables.iter().map(|t| t.channels.len()).sum::<usize>() + scalars
