@@ -85,7 +85,7 @@ pub(super) fn eprint_line(line: &str) {
     let _ = writeln!(io::stderr().lock(), "{}", plain(line));
 }
 
-/// Characters of a file's line that are shown where no terminal bounds them: a log is not place for
+/// Characters of a file's line that are shown where no terminal bounds them: a log is not the place for
 /// a file of one long line.
 const WIDEST: usize = 200;
 

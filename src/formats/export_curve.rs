@@ -57,8 +57,7 @@ impl ExportCurve {
     /// Makes the curve of one force ready for a target.
     ///
     /// # Errors
-    /// If the curve does not have that force or is damaged,
-    /// If the tail does not form a valid curve.
+    /// If the curve does not have that force or is damaged, or the tail does not form a valid curve.
     pub fn new(
         curve: &PredictedCurve,
         force: ForceKind,

@@ -4,7 +4,7 @@
 //! all measures at once. Whatever the unit of the values, both have the same.
 //!
 //! The rate of 10 kHz is that of ISO/TS 18571, so that all measures see the same samples. The basic measures (`l1_ratio`,
-//! matched peaks) stay in `curve/rating`, where surrogates and validation use them. ISO/TS 18571 and CORA search a shift and
+//! matched peaks) stay in `signal`, where surrogates and validation use them. ISO/TS 18571 and CORA search a shift and
 //! (ISO) a warping path, both with the square of the length: they take up to 20 000 samples, for 80 MB and seconds.
 //!
 //! objective-rating-metrics 1.3 gives the same scores to 1e-9, with two exceptions. Straight lines correlate equally at

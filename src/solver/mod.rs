@@ -66,7 +66,7 @@ pub use source::{Access, Source};
 /// # Errors
 /// If the file cannot be opened, its kind is not known, it has several
 /// sections and none is selected, or a selected section, id or component is not in it.
-/// Damage within the file is not error: see [`SolverFile::problems`].
+/// Damage within the file is not an error: see [`SolverFile::problems`].
 pub fn read(path: &Path, format: Option<&str>, selection: &Selection) -> Result<SolverFile, Error> {
     let mut sections = sections_of(path, format, selection)?;
     if sections.len() > 1 {

@@ -26,7 +26,7 @@ pub(super) struct Args {
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     let database = Database::read(&args.database)?;
     let selection = args.chosen.selection();
-    // A database without cases has nothing to list, which is not error.
+    // A database without cases has nothing to list, which is not an error.
     let cases: Vec<&Case> = if selection.is_all() {
         database.all().collect()
     } else {
