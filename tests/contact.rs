@@ -4,8 +4,8 @@ use std::fs;
 use std::path::Path;
 
 use crate::common::{build_fixture, crumple_fails, crumple_in, crumple_ok, entries, fixture, says};
-use crumple::curve::Masses;
 use crumple::curve::{Extracted, Measured, MeasuredForce, Setup, Stated, StatedContact, extract};
+use crumple::curve::{Masses, Quality};
 use crumple::curve::{Recipe, RecordedMotion};
 use crumple::history::{EntityId, History};
 use crumple::solver::{self, Selection};
@@ -651,6 +651,25 @@ fn the_contact_is_relative_to_the_peak() {
     let late = format!("{CONTACT_RECIPE}\ncontact_threshold = 0.5");
     let late = Run::read(36).after_flight(20).extract_with(&late, Stated::default()).unwrap();
     assert!(crush(&late) < crush(&whole), "{} and {}", crush(&late), crush(&whole));
+}
+
+/// A run that ended before its body stood has more impulse than the body has lost momentum, by the crush zone that is stopped already.
+#[test]
+fn a_sound_run_that_ended_early_is_not_accused() {
+    let cut = |mass: f64| {
+        let mut run = Run::read(72);
+        run.mass_kg *= mass;
+        let stated = Stated { truncate_s: Some(0.055), ..Stated::default() };
+        run.extract_with(CONTACT_RECIPE, stated).unwrap().quality
+    };
+    let sound = cut(1.0);
+    let accused = |quality: &Quality| {
+        quality.warnings.iter().any(|w| w.starts_with("energy:") || w.starts_with("impulse:"))
+    };
+    assert!(!accused(&sound), "{:?}", sound.warnings);
+    let note = "of the momentum that the body has lost: it stops the crush zone before the body";
+    assert!(sound.notes.iter().any(|n| n.contains(note)), "{:?}", sound.notes);
+    assert!(accused(&cut(1.3)) && accused(&cut(0.8)));
 }
 
 /// The group knows more of a run than the run itself: a force of 0.95, a run of another design, and

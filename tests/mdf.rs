@@ -346,7 +346,7 @@ fn times_and_records_are_not_lost() {
     write("odd.mf4", &|bytes| bytes[data(channel) + 8] = 63);
     says(
         &said("odd.mf4"),
-        "its times are in channel \"time\": it does not hold numbers in whole bytes; or leave them out with --time-column none",
+        "its times are in channel \"time\": it does not hold numbers in whole bytes; choose another with --time-column, or none",
     );
     write("open.mf4", &|bytes| bytes[..8].copy_from_slice(b"UnFinMF "));
     says(

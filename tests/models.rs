@@ -472,6 +472,22 @@ fn older_models_have_no_band_of_the_body_force() {
     );
 }
 
+/// The ends of the range that could be left out say nothing of what lies beyond the data of fast runs which all ended early.
+#[test]
+fn beyond_runs_that_died_there_is_no_band() {
+    let mut cases = family(&[6.0, 8.0, 10.0, 12.0, 14.0]);
+    let band = |cases: &[Case]| {
+        let model = train("made", cases, Choice::Kind(ModelKind::rate())).unwrap();
+        let of = |v: f64| predict(&model, &Query::at(v)).unwrap().provenance.band.is_some();
+        [of(13.9), of(14.3)]
+    };
+    assert_eq!(band(&cases), [true, true]);
+    for k in [3, 4] {
+        cases[k] = died(cases[k].clone(), 0.9);
+    }
+    assert_eq!(band(&cases), [false, false]);
+}
+
 /// 500 km/h of a model trained to 72 was answered as if it were 50.
 #[test]
 fn far_outside_the_training_speeds_nothing_is_answered_unasked() {
@@ -485,6 +501,12 @@ fn far_outside_the_training_speeds_nothing_is_answered_unasked() {
         let said = asked.warnings.iter().find(|w| w.code.name() == "out_of_range").unwrap();
         assert_eq!(said.message.contains("more than a third of the range"), refused, "{said}");
     }
+    // A fast run that ended early shows nothing of a speed above the others.
+    let mut cases = family(&[10.0, 13.0, 16.0, 30.0]);
+    cases[3] = died(cases[3].clone(), 0.1);
+    let model = train("made", &cases, Choice::Kind(ModelKind::rate())).unwrap();
+    let error = predict(&model, &Query::at(20.0)).unwrap_err().to_string();
+    assert!(error.contains("72 km/h is 14.4 km/h above the highest training speed"), "{error}");
     let one = train("made", &family(&[10.0]), Choice::Kind(ModelKind::nearest())).unwrap();
     predict(&one, &Query::at(10.0)).unwrap();
     let error = predict(&one, &Query::at(11.0)).unwrap_err().to_string();

@@ -29,6 +29,7 @@ const NAMED: usize = 3;
 
 /// What states the contact of a run, in messages.
 pub(super) const STATED_BY: &str = "contact_time or gap in the run";
+pub(super) const OR_BY: &str = ", or contact_threshold in the recipe";
 
 /// The force above which a record is in contact: a share of its largest.
 pub(crate) fn threshold_n(force_n: &[f64], share: f64) -> f64 {

@@ -248,14 +248,18 @@ fn recorded(
     let Quality { audit, notes: of_record, mut warnings } = quality;
     let curves = RecordedCurves { force_kind: impact.force_kind, ..curves };
     // A table has no run: its own line states the contact.
-    warnings.iter_mut().for_each(|w| *w = w.replace(contact::STATED_BY, STATED_BY));
+    let of_table =
+        |w: &String| w.replace(contact::STATED_BY, STATED_BY).replace(contact::OR_BY, "");
+    warnings.iter_mut().for_each(|w| *w = of_table(w));
     if let Some(share) = before {
         warnings.push(format!(
             "contact: there is a force before time 0, the offset or noise of a sensor: contact is taken where it exceeds {:.1} % of its peak; take both off the record, or set {STATED_BY}",
             100.0 * share
         ));
     } else if impact.contact_time_s.is_none() && guessed {
-        warnings.extend(starts_late(&curves).map(|found| format!("contact: {found}")));
+        warnings.extend(
+            starts_late(&curves, impact.speed.m_per_s).map(|found| format!("contact: {found}")),
+        );
     }
     let closing = &curves.closing_speed_m_per_s;
     if let Some(found) = other_speed(closing, impact.speed.m_per_s, SPEEDS) {
@@ -352,20 +356,29 @@ fn before_zero(time_s: &[f64], force_n: &[f64]) -> Option<f64> {
     let peak_n = contact::threshold_n(&positive, 1.0);
     let most_n = positive[..states].iter().fold(0.0, |most: f64, f| most.max(f.abs()));
     let share = NOISE * most_n / peak_n;
-    (states >= LEAST_BEFORE && share > contact::THRESHOLD && share < MOST_BEFORE).then_some(share)
+    // What is there from the beginning is not a first touch before a late trigger.
+    let first_n = positive[..states.div_ceil(3)].iter().fold(0.0, |most: f64, f| most.max(f.abs()));
+    (states >= LEAST_BEFORE
+        && first_n > 0.5 * most_n
+        && share > contact::THRESHOLD
+        && share < MOST_BEFORE)
+        .then_some(share)
 }
 
-/// A record that begins with a larger share of its peak lacks what was before.
+/// A record that begins with a larger share of its peak, and less than this of its speed, lacks what was before.
 const MOST_FIRST: f64 = 0.1;
+const FULL_SPEED: f64 = 0.998;
 
 /// What of a record that seems to begin in contact may be missing, or not be contact.
-fn starts_late(curves: &RecordedCurves) -> Option<String> {
+fn starts_late(curves: &RecordedCurves, speed_m_per_s: f64) -> Option<String> {
     let force_n = curves.original.force_n();
     let peak_n = contact::threshold_n(force_n, 1.0);
     let first = force_n[0] / peak_n;
-    if first > MOST_FIRST {
+    // A force may begin with a step: then the body has its speed.
+    let is_slowed = curves.closing_speed_m_per_s[0] < FULL_SPEED * speed_m_per_s;
+    if first > MOST_FIRST && is_slowed {
         return Some(format!(
-            "the record begins with {:.0} % of its peak force: the crush before it is missing, unless the force begins so at once",
+            "the record begins with {:.0} % of its peak force, and the body is slower than stated: the crush before it is missing",
             100.0 * first
         ));
     }

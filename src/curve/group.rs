@@ -57,7 +57,10 @@ pub(crate) fn remarks(cases: &[Case]) -> Vec<Remark> {
             let (low, high) = extremes.without(found);
             // A line through few runs is not trusted beyond them.
             let is_outside = !(low - OUTSIDE..=high + OUTSIDE).contains(&found);
-            let is_unlike = |of: f64| (found / of - 1.0).abs() > UNLIKE;
+            // Two others show no line, which a run beyond both may follow.
+            let is_end = points.len() == LEAST_ALIKE && i != 1;
+            let unlike = if is_end { 2.0 * UNLIKE } else { UNLIKE };
+            let is_unlike = |of: f64| (found / of - 1.0).abs() > unlike;
             if is_outside && is_unlike(expected) && is_unlike(expected.max(low).min(high)) {
                 let own = |ratio: f64| scaled(ratio, heaviest_kg / of_mass(case));
                 let (found, expected) = (own(found), own(expected));
@@ -81,21 +84,25 @@ pub(crate) fn remarks(cases: &[Case]) -> Vec<Remark> {
 /// first takes a part that changes little with the speed.
 /// `share` is that of a run's mass in the largest.
 fn early_forces(runs: &[&Case], share: impl Fn(&Case) -> f64) -> Vec<Remark> {
-    let mut alike: BTreeMap<String, Vec<(&Case, f64)>> = BTreeMap::new();
+    let mut alike: BTreeMap<String, Vec<&Case>> = BTreeMap::new();
     for case in runs.iter().filter(|case| case.curves.force_kind == ForceKind::Contact) {
         let of = alike.entry(format!("{:?}", case.conditions.parameters)).or_default();
-        of.push((case, lead(case) * share(case)));
+        of.push(*case);
     }
     let mut found = Vec::new();
     for runs in alike.values().filter(|runs| runs.len() >= LEAST_ALIKE) {
-        let extremes = Extremes::of(runs.iter().map(|(_, lead)| *lead));
-        for (case, lead) in runs {
-            let (_, most) = extremes.without(*lead);
+        let of = |case: &Case, upto_m: f64| lead(case, upto_m) * share(case);
+        let leads = Extremes::of(runs.iter().map(|case| of(case, f64::INFINITY)));
+        let crushes = Extremes::of(runs.iter().map(|case| case.max_deflection_m()));
+        for case in runs {
+            // The longest crush has stopped more than the others can show.
+            let lead = of(case, crushes.without(case.max_deflection_m()).1);
+            let (_, most) = leads.without(of(case, f64::INFINITY));
             // Coarse states, missing ones and an uncertain contact shift the impulse by as much.
             let is_coarse = case.quality.warnings.iter().any(|warning| {
                 ["contact:", "sampling:", "time:"].iter().any(|of| warning.starts_with(of))
             });
-            if *lead > most + LEAD && !is_coarse {
+            if lead > most + LEAD && !is_coarse {
                 let words = format!(
                     "the impulse of its force runs ahead of the momentum that the body has lost by up to {:.1} % of the impact's momentum, that of the group's other runs by {:.1} % at most: its force may be recorded early",
                     lead / share(case) * 100.0,
@@ -108,13 +115,16 @@ fn early_forces(runs: &[&Case], share: impl Fn(&Case) -> f64) -> Vec<Remark> {
     found
 }
 
-/// By how much the impulse is ahead of the lost momentum, up to the maximum deflection, at most, as a share of the impact's momentum.
-fn lead(case: &Case) -> f64 {
+/// By how much the impulse is ahead of the lost momentum, up to a deflection or the maximum one, at most, as a share of the impact's
+/// momentum.
+fn lead(case: &Case, upto_m: f64) -> f64 {
     let (curve, closing) = (&case.curves.sampled, &case.curves.closing_speed_m_per_s);
     let (t, f) = (curve.time_s(), curve.force_n());
     let momentum = case.conditions.masses.effective_kg() * closing[0];
     let mut impulse = 0.0;
-    let ahead = (1..=loading::loading_end(curve)).map(|i| {
+    let d = curve.deflection_m();
+    let states = (1..=loading::loading_end(curve)).take_while(|&i| d[i] <= upto_m);
+    let ahead = states.map(|i| {
         impulse += 0.5 * (f[i] + f[i - 1]) * (t[i] - t[i - 1]);
         impulse / momentum - (1.0 - closing[i] / closing[0])
     });

@@ -290,6 +290,9 @@ impl LeftOut {
 /// Bodies that close more slowly than this share of their first speed at a record's end may go on together.
 const MOVES_ON: f64 = 0.7;
 
+/// Bodies whose speed has changed by less than this share may be driven.
+const DRIVEN: f64 = 1e-4;
+
 /// Why a run is left out.
 #[derive(Clone, Debug, PartialEq, Serialize, thiserror::Error)]
 #[serde(tag = "reason", rename_all = "snake_case")]
@@ -319,7 +322,7 @@ pub(crate) enum Reason {
         damage: String,
     },
     #[error(
-        "it terminated early: the record ends at {end}, while the bodies still close at {} % of their first speed{}{damage}", (share * 100.0).round(), if *.share < MOVES_ON { " (an obstacle that keeps moving needs --kind pair --minus-node ID, and its node among the histories)" } else { "" }
+        "it terminated early: the record ends at {end}, while the bodies still close at {} % of their first speed{}{damage}", (share * 100.0).round(), if *.share < MOVES_ON { " (an obstacle that keeps moving needs --kind pair --minus-node ID, and its node among the histories)" } else if (*.share - 1.0).abs() < DRIVEN { " (if their motion is prescribed, write a table of deflection and force, which crumple histories gives, and add it with crumple db add)" } else { "" }
     )]
     EndsWhileLoading {
         /// Last time that motion and force share, with its unit if that is known.

@@ -78,7 +78,7 @@ impl Impact {
             last_s: time_s[time_s.len() - 1],
             interval_s: interval(if force_n.is_empty() { &time_s } else { &force_time_s }),
             states: record.states,
-            masses: record.masses(units.mass_kg),
+            masses: record.masses(units),
             force_time_s,
             force_n,
         }

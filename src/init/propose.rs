@@ -269,11 +269,6 @@ fn agree_on_units(
         }
     }
     for record in ended {
-        if record.is_driven() {
-            let why = "the bodies keep their speed although a force acts: their motion is prescribed. Write a table of deflection and force (crumple histories gives both), and add it with crumple db add";
-            left_out.push(LeftOut::new(record.run.path, Reason::Unusable { why: why.into() }));
-            continue;
-        }
         let end = record.time.last().copied().unwrap_or_default();
         let motion = &record.run.sources.motion;
         // Its solver may have written more of one file than of the other.

@@ -13,6 +13,7 @@ use crate::history::{EntityId, History};
 use crate::signal::interpolate;
 use crate::solver::WantedId;
 use crate::study::StudyKind;
+use crate::unit::UnitSystem;
 
 /// A run that was looked over.
 pub(super) struct Run {
@@ -32,8 +33,6 @@ const SLOWED: f64 = 0.005;
 const EXPLAINED: f64 = 0.01;
 /// A body that has moved by this share of what follows is slower than at the impact.
 const MOVED: f64 = 0.1;
-/// A body whose speed changes by less than this share although a force acts is driven.
-const DRIVEN: f64 = 1e-4;
 /// A motion that goes on for more states than this goes on without its force.
 const FURTHER: usize = 3;
 /// A flight after the contact that is shorter than this, in states and as a share of the record,
@@ -45,6 +44,9 @@ const MOMENT: f64 = 0.05;
 const CHANCE: f64 = 3.0;
 /// A force that changes a mass by less than this share is left out.
 const LEAST_BESIDE: f64 = 0.01;
+/// A weight accelerates by standard gravity (ISO 80000-3), as far as a record shows it.
+const STANDARD_GRAVITY: f64 = 9.80665;
+const WEIGHT: f64 = 0.03;
 /// Accelerations before and after the contact that differ by less are that of one force, which acts all along.
 const ALIKE: f64 = 0.2;
 
@@ -204,13 +206,6 @@ impl Record {
         }
     }
 
-    /// Whether the bodies keep their speed although forces act.
-    pub(super) fn is_driven(&self) -> bool {
-        let keeps = |i: usize| (self.closing(i) / self.closing(0) - 1.0).abs() < DRIVEN;
-        self.run.survey.forces.iter().any(|force| force.size() > 0.0)
-            && (0..self.time.len()).all(keeps)
-    }
-
     /// What the body has moved at the times of the force, up to the end of the loading; in the file's unit.
     pub(super) fn path_while_loading(&self) -> Vec<f64> {
         let end = self.loading_end().unwrap_or(self.time.len() - 1);
@@ -270,23 +265,32 @@ impl Record {
             speed: self.closing(0),
             crush: (self.travel[end] - self.travel[begin]).abs(),
             loading_time: self.time[end] - self.time[begin],
-            mass: self.masses_by_momentum().map(|(masses, _)| masses[0]),
+            mass: self.masses_by_momentum(|_| 0.0).map(|(masses, _)| masses[0]),
             named_m_per_s: speed_in(&self.run.name),
         }
     }
 
     /// What the run says of the mass of each body; `unit_kg`: the file's unit of mass.
-    pub(super) fn masses(&self, unit_kg: f64) -> Vec<MassEstimates> {
-        let (by_momentum, in_free_flight) = self.masses_by_momentum().unzip();
+    pub(super) fn masses(&self, units: UnitSystem) -> Vec<MassEstimates> {
+        let unit_kg = units.mass_kg;
         let by_energy = self.masses_by_energy();
+        // An energy needs no help.
+        let gravity = STANDARD_GRAVITY * units.time_s.powi(2) / units.length_m;
+        let beside = |velocity: &[f64]| match by_energy {
+            Some(_) => None,
+            None => self.in_flight(velocity).and_then(|of| of.all_along(gravity)),
+        };
+        let (by_momentum, in_free_flight) =
+            self.masses_by_momentum(|velocity| beside(velocity).unwrap_or(0.0)).unzip();
         let kg = |masses: &Option<Vec<f64>>, k: usize| masses.as_ref().map(|of| of[k] * unit_kg);
         let estimates = |k: usize| MassEstimates {
             by_momentum: kg(&by_momentum, k),
             in_free_flight: in_free_flight.unwrap_or_default(),
-            unexplained: self.unexplained(k),
-            has_constant_force: self
-                .in_flight(&self.velocities[k])
-                .is_some_and(|of| of.all_along().is_some()),
+            unexplained: match beside(&self.velocities[k]) {
+                Some(_) => 0.0,
+                None => self.unexplained(k),
+            },
+            has_constant_force: beside(&self.velocities[k]).is_some(),
             by_energy: kg(&by_energy, k),
             energy_is_whole: self
                 .run
@@ -315,16 +319,18 @@ impl Record {
     /// The first body's mass, given or by kinetic energy, over that by momentum.
     pub(super) fn over_momentum(&self, given: Option<f64>) -> Option<f64> {
         let mass = given.or_else(|| self.masses_by_energy()?.first().copied())?;
-        Some(mass / self.masses_by_momentum()?.0.first()?)
+        Some(mass / self.masses_by_momentum(|_| 0.0)?.0.first()?)
     }
 
     /// The bodies' masses by momentum, `∫F dt / Δv`: after the contact, where both rest (and whether
     /// that is so); while it never ends, by all states of the loading together.
-    fn masses_by_momentum(&self) -> Option<(Vec<f64>, bool)> {
+    ///
+    /// `beside`: acceleration of a body by a force that acts all along.
+    fn masses_by_momentum(&self, beside: impl Fn(&[f64]) -> f64) -> Option<(Vec<f64>, bool)> {
         let end = self.loading_end().ok()?;
         let free = self.free_flight(end);
         let body = |velocity: &Vec<f64>| {
-            let beside = self.in_flight(velocity).and_then(|of| of.all_along()).unwrap_or(0.0);
+            let beside = beside(velocity);
             let (mut of, mut by) = (0.0, 0.0);
             for i in free.map_or(0..end + 1, |from| from..self.time.len()) {
                 let change = velocity[i] - velocity[0] - beside * (self.time[i] - self.time[0]);
@@ -365,6 +371,7 @@ impl Record {
             before: trend(0, before),
             after: trend(free.unwrap_or(all), all),
             share_of: span / (velocity[at] - velocity[0]).abs(),
+            direction: velocity[0].signum(),
         })
     }
 
@@ -374,9 +381,6 @@ impl Record {
         let Ok(end) = self.loading_end() else { return 0.0 };
         let velocity = &self.velocities[k];
         let Some(flights) = self.in_flight(velocity) else { return 0.0 };
-        if flights.all_along().is_some() {
-            return 0.0;
-        }
         let free = self.free_flight(end);
         let while_loading = if free.is_none() {
             constant_force(&self.impulse[..=end], &velocity[..=end], &self.time[..=end])
@@ -452,6 +456,8 @@ fn constant_force(impulse: &[f64], velocity: &[f64], time: &[f64]) -> f64 {
 struct Trend {
     slope: f64,
     by_chance: f64,
+    /// Whether both halves have this slope.
+    is_even: bool,
 }
 
 /// The accelerations of a body before and after the contact, where it flies for long enough.
@@ -460,6 +466,8 @@ struct Flights {
     after: Option<Trend>,
     /// By what share an acceleration all along changes the mass.
     share_of: f64,
+    /// 1 or −1: of the body at first.
+    direction: f64,
 }
 
 impl Flights {
@@ -468,13 +476,25 @@ impl Flights {
         [self.before, self.after].into_iter().flatten().map(|of| of.sure()).fold(0.0, f64::max)
     }
 
-    /// The acceleration by a force that changes the mass and acts all along: a weight has the same after the contact, a brake turns
-    /// with the motion, so that one seen after it alone may be either.
-    fn all_along(&self) -> Option<f64> {
-        let before = self.before.filter(|of| of.sure() * self.share_of > LEAST_BESIDE)?;
-        let open = ALIKE * before.slope.abs() + before.by_chance;
-        let is_same = |of: Trend| (before.slope - of.slope).abs() < open + of.by_chance;
-        self.after.is_none_or(is_same).then_some(before.slope)
+    /// The acceleration by a force that changes the mass and acts all along: a weight, by which a falling body gains `gravity`, or what
+    /// both flights show alike. A brake turns with the motion, and what a short flight shows may be a vibration.
+    fn all_along(&self, gravity: f64) -> Option<f64> {
+        let before =
+            self.before.filter(|of| of.is_even && of.sure() * self.share_of > LEAST_BESIDE)?;
+        let is_near = |a: f64, share: f64| (before.slope.abs() - a.abs()).abs() < share * a.abs();
+        let is_same = |of: Trend| {
+            is_near(of.slope, ALIKE)
+                && of.slope * before.slope > 0.0
+                && of.by_chance < of.slope.abs()
+        };
+        let is_weight = self.direction * before.slope > 0.0
+            && is_near(gravity, WEIGHT)
+            && before.by_chance < WEIGHT * gravity;
+        match self.after {
+            Some(after) => is_same(after),
+            None => is_weight,
+        }
+        .then_some(before.slope)
     }
 }
 
@@ -483,18 +503,23 @@ impl Trend {
     /// √12 s / (T √n), and they cross their line n/2 times; vibrations cross it less often.
     fn of(time: &[f64], values: &[f64]) -> Self {
         let mean = |all: &[f64]| all.iter().sum::<f64>() / all.len() as f64;
-        let (t0, v0) = (mean(time), mean(values));
-        let (of, by) = time
-            .iter()
-            .zip(values)
-            .fold((0.0, 0.0), |(of, by), (t, v)| (of + (t - t0) * (v - v0), by + (t - t0).powi(2)));
-        let slope = of / by;
+        let slope_of = |time: &[f64], values: &[f64]| {
+            let (t0, v0) = (mean(time), mean(values));
+            let pairs = time.iter().zip(values).map(|(t, v)| (t - t0, v - v0));
+            let (of, by) = pairs.fold((0.0, 0.0), |(of, by), (t, v)| (of + t * v, by + t.powi(2)));
+            of / by
+        };
+        let (t0, v0, slope) = (mean(time), mean(values), slope_of(time, values));
+        let half = time.len() / 2;
+        let halves = [(&time[..half], &values[..half]), (&time[half..], &values[half..])];
+        let is_near = |(time, values)| (slope_of(time, values) - slope).abs() < ALIKE * slope.abs();
         let left = time.iter().zip(values).map(|(t, v)| v - v0 - slope * (t - t0));
         let left: Vec<f64> = left.collect();
         let scatter = (left.iter().map(|r| r * r).sum::<f64>() / time.len() as f64).sqrt();
         let crossings = left.windows(2).filter(|pair| pair[0] * pair[1] < 0.0).count();
         let by_chance = CHANCE * scatter * (6.0 / crossings as f64).sqrt().min(1.0);
-        Self { slope, by_chance: by_chance / (time[time.len() - 1] - time[0]) }
+        let is_even = halves.into_iter().all(is_near);
+        Self { slope, by_chance: by_chance / (time[time.len() - 1] - time[0]), is_even }
     }
 
     /// What surely is not chance.

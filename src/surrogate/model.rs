@@ -255,6 +255,17 @@ impl Model {
         })
     }
 
+    /// The lowest and the highest speed of these runs, in m/s.
+    pub(super) fn shown_range_m_per_s(&self) -> (f64, f64) {
+        let speeds = self.showing().map(|case| case.speed_m_per_s);
+        speeds.fold((f64::INFINITY, 0.0), |(low, high), v| (low.min(v), high.max(v)))
+    }
+
+    /// Whether the fastest of these runs ends while loading.
+    pub(super) fn fastest_is_truncated(&self) -> bool {
+        self.showing().last().is_some_and(|case| case.truncated)
+    }
+
     /// Whether a query lies between these training speeds, but for the rounding of units.
     pub(super) fn contains(&self, at: &QueryPoint<'_>) -> bool {
         let speeds = self.speeds_around(at);

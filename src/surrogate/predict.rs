@@ -285,8 +285,10 @@ impl<'a> Prediction<'a> {
             let of = if data_end_m < longest_m { "nearest run" } else { "training runs" };
             warnings.push(Warning::beyond_data(crush_m, (data_end_m, of), by_speed_m));
         }
-        // Between the training speeds no curve that was left out goes on there: a mass does that.
-        let is_beyond = is_beyond(crush_m, longest_m) && model.contains(&asked.at());
+        // Between the training speeds no curve that was left out goes on there: a mass does that. Nor above them if the fastest run is
+        // cut, so that it could not be left out.
+        let is_beyond = is_beyond(crush_m, longest_m)
+            && (model.contains(&asked.at()) || model.fastest_is_truncated());
         let ratio = asked.mass_kg / model.masses().effective_kg();
         let without_band = match () {
             () if is_unlike(ratio) && !model.has_mass() => {

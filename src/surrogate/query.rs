@@ -89,7 +89,7 @@ impl<'a> ResolvedQuery<'a> {
                 speed_m_per_s = v
             ));
         }
-        let (low, high) = model.range_m_per_s();
+        let (low, high) = model.shown_range_m_per_s();
         if !query.extrapolate && is_far_outside(v, low, high) {
             return Err(error!(
                 Prediction,

@@ -80,8 +80,10 @@ pub(super) fn row(
 fn interval_s(prepared: &Prepared, time_s: &[f64]) -> f64 {
     const OUTPUTS_PER_STATE: f64 = 8.0;
     const FINEST_S: f64 = 1e-4;
-    let own_s = (time_s[time_s.len() - 1] - time_s[0]) / (time_s.len() - 1) as f64;
-    prepared.settings.output_interval_s.min(own_s.min(FINEST_S.max(own_s / OUTPUTS_PER_STATE)))
+    let fe_s = (time_s[time_s.len() - 1] - time_s[0]) / (time_s.len() - 1) as f64;
+    // A whole part of the scenario's own, whose last output remains.
+    let own_s = prepared.settings.output_interval_s;
+    own_s / (own_s / fe_s.min(FINEST_S.max(fe_s / OUTPUTS_PER_STATE))).ceil()
 }
 
 fn vehicle_errors(

@@ -154,7 +154,7 @@ pub(crate) fn curve_of(
             &from_contact,
         ));
     }
-    audited(&original, record.force_kind, balance, &mut remarks);
+    audited(&original, &closing, record.force_kind, balance, &mut remarks);
     Ok(Extracted {
         speed,
         quality: Quality {
@@ -194,9 +194,33 @@ const MOST_CONTACT_WORK: f64 = 1.15;
 /// Impulse and change of momentum that differ by no more than this share confirm the mass.
 const MOMENTUM_AGREES: f64 = 0.02;
 
-/// Notes on energy, impulse and the loading branch of a curve.
-fn audited(curve: &Curve, kind: ForceKind, balance: energy::EnergyBalance, remarks: &mut Notes) {
+/// Notes on energy, impulse and the loading branch of a curve, whose states have these closing speeds in m/s.
+fn audited(
+    curve: &Curve,
+    closing: &[f64],
+    kind: ForceKind,
+    balance: energy::EnergyBalance,
+    remarks: &mut Notes,
+) {
     let is_truncated = loading::loading_end(curve) + 1 == curve.time_s().len();
+    if let (true, ForceKind::Contact, Some(work), Some(impulse)) =
+        (is_truncated, kind, balance.work, balance.impulse)
+    {
+        // What is stopped already counts as moving with the body, and more so the less that has lost of its speed.
+        let (first, last) = (closing[0], closing[closing.len() - 1]);
+        let most = 1.0 + (MOST_CONTACT_WORK - 1.0) * first / (first - last);
+        let is_usual = |ratio: f64| (1.0..=most).contains(&ratio);
+        let is_more =
+            work > 1.0 + EnergyAudit::TOLERANCE || impulse > 1.0 + energy::IMPULSE_TOLERANCE;
+        if is_more && is_usual(work) && is_usual(impulse) {
+            remarks.note(format!(
+                "energy: up to the last state the contact force has {:.1} % of the energy and {:.1} % of the momentum that the body has lost: it stops the crush zone before the body",
+                work * 100.0,
+                impulse * 100.0
+            ));
+            return of_loading_branch(curve, remarks);
+        }
+    }
     if let Some(work) = balance.work.filter(|w| (w - 1.0).abs() > EnergyAudit::TOLERANCE) {
         let of = if is_truncated { " lost up to the last state" } else { "" };
         let share = work * 100.0;
@@ -219,7 +243,12 @@ fn audited(curve: &Curve, kind: ForceKind, balance: energy::EnergyBalance, remar
             impulse * 100.0
         ));
     }
-    if is_truncated {
+    of_loading_branch(curve, remarks);
+}
+
+/// Notes on the loading branch of a curve, and whether it is whole.
+fn of_loading_branch(curve: &Curve, remarks: &mut Notes) {
+    if loading::loading_end(curve) + 1 == curve.time_s().len() {
         remarks.warn(
             "truncated: the maximum deflection is at the last state, so the record ends while loading",
         );

@@ -257,14 +257,17 @@ impl Signal {
     ) -> Result<Self, ExtractError> {
         let all = states.len();
         let (mut time_s, mut values) = (Vec::new(), Vec::new());
+        let mut copies = 0;
         for (t, v) in states {
             if time_s.last().is_none_or(|&last| t > last) {
                 time_s.push(t);
                 values.push(v);
+            } else {
+                copies += usize::from(time_s.last() == Some(&t) && values.last() == Some(&v));
             }
         }
         let skipped = all - time_s.len();
-        if skipped as f64 > REPEATED * all as f64 {
+        if (skipped - copies) as f64 > REPEATED * all as f64 {
             remarks.warn(format!(
                 "{what}: {skipped} of {all} states left out because time did not increase: do its times have too few digits?"
             ));

@@ -3,7 +3,7 @@
 use super::ExtractError;
 use super::record::{Record, impulse};
 use super::{Notes, Setup, StatedContact};
-use crate::curve::contact::{self, STATED_BY, milliseconds};
+use crate::curve::contact::{self, OR_BY, STATED_BY, milliseconds};
 use crate::curve::{Curve, ForceKind, loading};
 use crate::unit::{Shown, Speed, km_per_h};
 
@@ -154,7 +154,7 @@ impl Start {
                     )
                 });
                 remarks.warn(format!(
-                    "contact: its place between two states is uncertain by about {:.2} mm{}, {:.1} % of the crush: set {STATED_BY}",
+                    "contact: its place between two states is uncertain by about {:.2} mm{}, {:.1} % of the crush: set {STATED_BY}{OR_BY}",
                     step_m(interval_s) * 1e3,
                     most_mm.unwrap_or_default(),
                     100.0 * step_m(interval_s) / crush_m

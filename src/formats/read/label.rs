@@ -101,7 +101,7 @@ impl Quantity {
         self == Self::Time && is_one(&unit, OF_TEMPERATURE)
     }
 
-    fn named(name: &str) -> Option<Self> {
+    pub(super) fn named(name: &str) -> Option<Self> {
         let plain: String =
             name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect();
         let is_named = |quantity: &Self| {
@@ -257,7 +257,7 @@ fn in_brackets(text: &str) -> Option<(&str, &str)> {
 }
 
 /// The name of a column and its unit: in brackets, or after a slash, comma, blank or underscore.
-fn name_and_unit(text: &str) -> (&str, Option<&str>) {
+pub(super) fn name_and_unit(text: &str) -> (&str, Option<&str>) {
     let text = text.trim().trim_matches('"').trim();
     if let Some((name, unit)) = in_brackets(text) {
         return (name, Some(unit));

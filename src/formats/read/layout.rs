@@ -4,7 +4,7 @@
 use super::ReadOptions;
 use super::columns::LISTED;
 use super::curve::{Place, expected, shown};
-use super::label::{Label, Quantity, no_unit};
+use super::label::{Label, Quantity, name_and_unit, no_unit};
 use super::table::{Purpose, Row, Table, names_all, unit_of};
 use crate::error::{Error, error};
 use crate::unit::UnitSystem;
@@ -161,7 +161,9 @@ pub(super) fn layout(
         }
         // Columns with times of their own would be paired row by row.
         let is_other = |(field, (_, name)): &(usize, &(u64, String))| {
-            is_free(*field) && is_of_time(name) && found.iter().all(|column| column.field != *field)
+            is_free(*field)
+                && found.iter().all(|column| column.field != *field)
+                && is_of_time(name, found.is_empty())
         };
         let others_of_time = names.iter().enumerate().filter(is_other);
         let others_of_time: Vec<String> =
@@ -217,13 +219,24 @@ pub(super) fn layout(
     Ok((columns, are_used))
 }
 
-/// Whether a column is in a unit of time and called after it, as `Time Force [s]` and `t_F [ms]` are.
-fn is_of_time(name: &str) -> bool {
-    let label = Label::of_named(Quantity::Time, name);
-    let name = name.to_lowercase();
-    let first = name.split(|c: char| !c.is_alphanumeric()).find(|word| !word.is_empty());
-    label.unit.is_some_and(|unit| Quantity::Time.size_of(&unit).is_some())
-        && first.is_some_and(|w| w == "t" || w.starts_with("time") || w.starts_with("zeit"))
+/// Whether a column is in a unit of time and called after it; beside the times only with another quantity or a number behind, as
+/// `Time Force [s]`, `t_F [ms]` and `Time2 [s]` are.
+fn is_of_time(name: &str, alone: bool) -> bool {
+    let (text, unit) = name_and_unit(name);
+    if unit.is_none_or(|unit| Quantity::Time.size_of(unit).is_none()) {
+        return false;
+    }
+    let text = text.to_lowercase();
+    let mut words = text.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty());
+    let first = words.next().unwrap_or_default();
+    let plain = first.trim_end_matches(|c: char| c.is_ascii_digit());
+    if alone {
+        return plain == "t" || ["time", "zeit"].iter().any(|of| first.contains(of));
+    }
+    let is_numbered = plain.len() < first.len() && plain != "t";
+    let is_other =
+        |word| matches!(Quantity::named(word), Some(Quantity::Deflection | Quantity::Force));
+    ["t", "time", "zeit"].contains(&plain) && (is_numbered || words.any(is_other))
 }
 
 /// Whether a title names this quantity, as `Force vs displacement` does.

@@ -146,12 +146,12 @@ pub(super) fn read(input: &Input<'_>) -> Result<ReadCurve, Error> {
         let _ = writeln!(text, "# {line}");
     }
     // Without them it would be a table of deflections and forces alone.
-    if let (Some(why), false, false) =
-        (&group.lost_times, group.has(Quantity::Time), input.options.is_without_times())
+    if let (Some(why), None, false) =
+        (&group.lost_times, &input.options.time_column, group.has(Quantity::Time))
     {
         return Err(error!(
             CurveFile,
-            "group {}: its times are in channel {why}; or leave them out with --time-column none",
+            "group {}: its times are in channel {why}; choose another with --time-column, or none",
             group.name
         ));
     }
