@@ -1802,7 +1802,8 @@ fn gravity_does_not_falsify_the_mass() {
     let gravity = |_: f64, _: f64| 9.81;
     let brakes = |v: f64, _: f64| -5.0 * v.signum();
     let coupler = |_: f64, time_s: f64| if time_s < 0.02 { -9.81 } else { 0.0 };
-    let beside: [(&str, &dyn Fn(f64, f64) -> f64); 3] =
+    type Beside = dyn Fn(f64, f64) -> f64;
+    let beside: [(&str, &Beside); 3] =
         [("drop", &gravity), ("braked", &brakes), ("coupled", &coupler)];
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
