@@ -313,6 +313,13 @@ fn iso_mme_tests() {
         files.dedup();
         assert_eq!(files.len(), curve.files.len(), "{path}: no file twice");
     }
+    // Masses and speeds of the test, with and without a unit.
+    for (mass, speed) in [("24000", "10"), ("24 t", "36 km/h")] {
+        let text = format!("Mass of test object 1 :{mass}\nVelocity test object 1 :{speed}\n");
+        fs::write(folder.path().join("T1/T1.mme"), text).unwrap();
+        let facts = read(&folder.path().join("T1"), &given(None)).unwrap().0.facts;
+        assert_eq!((facts.mass_kg, facts.speed_m_per_s), (Some(24e3), Some(10.0)));
+    }
     // A second force: the codes choose.
     fs::write(channels.join("T1.004"), channel("12FRONT00000FOXP", "kN", &f)).unwrap();
     let path = folder.path().join("T1");

@@ -19,6 +19,7 @@ use crate::curve::SourceFile;
 use crate::error::{Error, error};
 use crate::file;
 use crate::signal::interpolate;
+use crate::unit::{MASS, SPEED};
 
 /// Files of a folder that are examined: a test has some hundred channels.
 const MOST_FILES: usize = 1_000;
@@ -135,8 +136,13 @@ fn test_facts(input: &Input<'_>, columns: &mut ReadCurve) -> Result<(), Error> {
 /// Takes masses (kg) and velocities (m/s) of the test objects.
 fn described(bytes: &str, facts: &mut Metadata) {
     let header = Header::read(bytes);
+    // In kg and m/s, unless a unit stands behind the number.
     let of = |what: &str, k: usize| {
-        let text = |key: String| number(header.text(&key));
+        let dimension = if what == "mass" { &MASS } else { &SPEED };
+        let text = |key: String| {
+            let text = header.text(&key);
+            number(text).or_else(|| dimension.parse(text.trim()).ok())
+        };
         text(format!("{what} test object {k}"))
             .or_else(|| text(format!("{what} of test object {k}")))
     };
