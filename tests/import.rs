@@ -753,7 +753,7 @@ fn a_sensor_before_the_impact_is_not_in_contact() {
     assert!(!said.contains("before time 0") && (crush_m() / exact_m - 1.0).abs() < 0.005, "{said}");
     let said = table(HEADER, -1_000, &|_| 0.0, 4);
     assert!(!said.contains("warning: nose: contact: there"), "{said}");
-    // A coupler that is touched before a late trigger is none.
+    // A coupler that is touched before a late trigger is not noise.
     let coupler = |i: i32| if i > -700 { 60e3 } else { 0.0 };
     let said = table(HEADER, -1_000, &coupler, 4);
     assert!(!said.contains("offset or noise"), "{said}");

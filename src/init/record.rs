@@ -274,7 +274,7 @@ impl Record {
     pub(super) fn masses(&self, units: UnitSystem) -> Vec<MassEstimates> {
         let unit_kg = units.mass_kg;
         let by_energy = self.masses_by_energy();
-        // An energy needs no help.
+        // Where a kinetic energy gives the mass, momentum only confirms it.
         let gravity = STANDARD_GRAVITY * units.time_s.powi(2) / units.length_m;
         let beside = |velocity: &[f64]| match by_energy {
             Some(_) => None,

@@ -206,7 +206,8 @@ fn audited(
     if let (true, ForceKind::Contact, Some(work), Some(impulse)) =
         (is_truncated, kind, balance.work, balance.impulse)
     {
-        // What is stopped already counts as moving with the body, and more so the less that has lost of its speed.
+        // The crush zone has lost all of its speed, the body only a part: the earlier the record ends, the more that is
+        // of the body's loss.
         let (first, last) = (closing[0], closing[closing.len() - 1]);
         let most = 1.0 + (MOST_CONTACT_WORK - 1.0) * first / (first - last);
         let is_usual = |ratio: f64| (1.0..=most).contains(&ratio);

@@ -220,7 +220,7 @@ fn sign_of_impulse(time_s: &[f64], force_n: &[f64]) -> f64 {
     if impulse(time_s, force_n) < 0.0 { -1.0 } else { 1.0 }
 }
 
-/// A share of states with a time that repeats or goes back of more than this is no accident.
+/// Up to this share of the states may repeat a time, or go back in it, without a warning.
 const REPEATED: f64 = 0.02;
 
 /// A history in SI with strictly increasing times.
