@@ -824,8 +824,8 @@ fn what_is_no_run_is_named_and_left_out() {
     let path = here.join("converted/nodout");
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.replacen("smp d R14", "smp d R13", 1)).unwrap();
-    // Died at once, died while loading, cut behind the crash.
-    for (name, states) in [("died", 3), ("aborted", 90), ("short", 250)] {
+    // Died at once, soon, and in the crash; cut behind it.
+    for (name, states) in [("died", 3), ("aborted", 70), ("late", 90), ("short", 250)] {
         copy_run(&from.join("72kmh"), &here.join(name), TEXTS);
         let lines = " n o d a l   p r i n t   o u t ";
         cut(&here.join(name).join("nodout"), lines, states);
@@ -838,7 +838,20 @@ fn what_is_no_run_is_named_and_left_out() {
     let document = json(&crumple_ok(&here, "init --json"));
     let runs = document["runs"].as_array().unwrap();
     let names: Vec<&str> = runs.iter().map(|run| run["name"].as_str().unwrap()).collect();
-    assert_eq!(names, ["25kmh", "36kmh", "48kmh", "60kmh", "short"]);
+    assert_eq!(names, ["25kmh", "36kmh", "48kmh", "60kmh", "late", "short"]);
+    // What died in the crash has a curve as far as it goes, and the others' mass.
+    for run in runs {
+        assert_eq!(run["mass_kg"]["value"], 24e3, "{run}");
+        assert_eq!(run["truncated"], run["name"] == "late", "{run}");
+    }
+    let notes = runs[4]["notes"][0].as_str().unwrap();
+    says(
+        notes,
+        "the record ends at 66.754 ms, while the bodies still close at 62 % of their first",
+    );
+    says(notes, "if the obstacle keeps moving, use --kind pair --minus-node ID");
+    let mass = runs[4]["mass_kg"]["from"].as_str().unwrap();
+    says(mass, "that of other runs; this record ends in contact, and momentum gives 26.9 t");
     let out = left_out(&document);
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
     let said = |folder: &str, expected: &str| {
@@ -854,7 +867,7 @@ fn what_is_no_run_is_named_and_left_out() {
     said("died", "it terminated early: nodout holds 3 complete states (line 33: the file ends");
     said(
         "aborted",
-        "it terminated early: the record ends at 66.754 ms, while the bodies still close at 62 % of",
+        "it terminated early: the record ends at 51.751 ms, while the bodies still close at 71 % of",
     );
     said("empty", "the folder is empty");
     said("planned", "it holds a deck but no solver output: it has not been run");
@@ -865,6 +878,16 @@ fn what_is_no_run_is_named_and_left_out() {
     assert_eq!(out.len(), 7);
     says(&text, "\n# [[run]]\n# path = \"aborted\"\n");
     crumple_ok(&here, "build -q");
+    // Its mass alone is not known well enough.
+    let printed = crumple_ok(&here, "init late -o late.toml");
+    let row = printed.lines().find(|line| line.starts_with("late ")).unwrap();
+    let row: Vec<&str> = row.split_whitespace().collect();
+    assert_eq!(row, ["late", "72", "km/h", "?", ">", "1.098", "90"]);
+    let text = fs::read_to_string(here.join("late.toml")).unwrap();
+    says(
+        &text,
+        "# fill in: the record ends in contact, where momentum gives about 26.9 t: use --mass",
+    );
 }
 
 /// Keeps the first states of a text, as a killed solver leaves them.

@@ -209,7 +209,10 @@ fn print(out: &mut dyn std::io::Write, proposal: &Proposal, output: &Path) -> st
                 None => own,
             }
         })
-        .column("max crush (m)", |run| known(run.crush_m.map(|m| format!("{m:.3}"))))
+        .column("max crush (m)", |run| {
+            let more = if run.truncated { "> " } else { "" };
+            known(run.crush_m.map(|m| format!("{more}{m:.3}")))
+        })
         .column("states", |run| run.states.to_string());
     output::table(out, runs)?;
     for note in &proposal.notes {

@@ -49,7 +49,8 @@ impl Facts<'_> {
         let (filter, cuts) = self.filter();
         let runs = self.runs(&cuts, &mut warnings);
         self.warn(&mut warnings);
-        let impacts: Vec<&Impact> = self.impacts().map(|(_, impact)| impact).collect();
+        let whole = self.impacts().filter(|(record, _)| self.counts(record));
+        let impacts: Vec<&Impact> = whole.map(|(_, impact)| impact).collect();
         let no_units = || Proposed::missing("the times are unknown without units");
         Proposal {
             group,
@@ -75,6 +76,12 @@ impl Facts<'_> {
     /// The runs with their values in SI: none if the units are unknown.
     fn impacts(&self) -> impl Iterator<Item = (&Record, &Impact)> {
         self.records.iter().filter_map(|record| Some((record, record.impact.as_ref()?)))
+    }
+
+    /// Whether a record has a say in the recipe: one that ends while loading has not, unless all do.
+    fn counts(&self, record: &Record) -> bool {
+        let is_whole = |record: &Record| record.loading_end().is_ok();
+        is_whole(record) || !self.records.iter().any(is_whole)
     }
 
     fn force_is_of_section(&self) -> bool {
@@ -127,7 +134,8 @@ impl Facts<'_> {
         }
         let mut because = format!("the bodies start along {}", direction.axis());
         if force.is_some() {
-            let of_runs = match self.records.len() {
+            let whole = self.records.iter().filter(|record| self.counts(record));
+            let of_runs = match whole.count() {
                 1 => "the run".into(),
                 2 => "both runs".into(),
                 runs => format!("all {runs} runs"),
@@ -230,6 +238,9 @@ impl Facts<'_> {
             let loading = contact.min(path.len())..path.len().min(filtered.values.len());
             let of = |force: &[f64]| force[loading.clone()].to_vec();
             let kept = cfc::work_kept(&of(&filtered.values), &of(force), &of(&path));
+            if !self.counts(record) {
+                continue;
+            }
             // Without a path there is no work.
             least = least.min(if kept.is_nan() { 1.0 } else { kept });
         }
@@ -383,10 +394,14 @@ impl Facts<'_> {
                 other_mass_kg: others.as_ref().and_then(|others| others.get(k)).cloned(),
                 truncate_s: cuts[k].map(|s| Proposed::found(s, Computed, cut_because)),
                 crush_m: impact.map(|impact| impact.crush_m),
+                truncated: record.loading_end().is_err(),
                 states: record.states,
                 notes: impact
                     .filter(|_| !is_half)
-                    .map_or(Vec::new(), |impact| doubts_of_speed(record, impact)),
+                    .map_or(Vec::new(), |impact| doubts_of_speed(record, impact))
+                    .into_iter()
+                    .chain(self.early_end(record))
+                    .collect(),
             });
         }
         let speed = |run: &ProposedRun| run.speed_m_per_s.value().copied().unwrap_or_default();
@@ -404,6 +419,23 @@ impl Facts<'_> {
             ));
         }
         runs
+    }
+
+    /// Says of a record that ends while loading what it is good for.
+    fn early_end(&self, record: &Record) -> Option<String> {
+        record.loading_end().err()?;
+        let (end, share) = record.end_while_loading(self.units.value());
+        let moving = match self.recipe.kind {
+            StudyKind::Wall if !self.hints.half_model => {
+                "; if the obstacle keeps moving, use --kind pair --minus-node ID"
+            }
+            _ => "",
+        };
+        Some(format!(
+            "the record ends at {end}, while the bodies still close at {} % of their first speed: the curve goes up to there, and the maximum crush is larger{moving}{}",
+            percent(share),
+            record.other_files()
+        ))
     }
 
     /// Speed of a run, from its first velocities or those right before the contact.

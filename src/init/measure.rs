@@ -111,11 +111,16 @@ pub(super) struct MassEstimates {
     /// Interval of the states over the time from contact to the largest crush, of which a mass by momentum may be off by
     /// half; after the contact that of the forces alone.
     pub coarseness: f64,
-    /// Whether the record starts in contact: what is stopped already has no part in a mass by momentum.
-    pub is_late: bool,
+    /// [`STARTS`] or [`ENDS`] where the record does so in contact: a mass by momentum then lacks what is stopped already, or holds
+    /// it twice.
+    pub in_contact: Option<&'static str>,
 }
 
-/// The share of a mass that momentum gives at least where a record starts in contact: crush zones are lighter than the rest.
+pub(super) const STARTS: &str = "starts";
+pub(super) const ENDS: &str = "ends";
+
+/// The share of a mass that momentum gives at least where a record starts in contact, and the inverse of what it gives at most
+/// where one ends so: crush zones are lighter than the rest.
 const LEAST_LEFT: f64 = 0.85;
 
 /// Above it other forces are warned of; the waves in a body that has left the contact look like less.
@@ -225,11 +230,13 @@ pub(super) fn agree(
             ));
         }
     }
-    let is_late =
-        |mass: &MassEstimates| mass.is_late && mass.kg().is_some_and(|(_, by_energy)| !by_energy);
-    let are_all_late = runs.iter().all(|(_, mass)| mass.kg().is_none() || is_late(mass));
+    let is_partial = |mass: &MassEstimates| {
+        mass.in_contact.is_some() && mass.kg().is_some_and(|(_, by_energy)| !by_energy)
+    };
+    let are_all_partial = runs.iter().all(|(_, mass)| mass.kg().is_none() || is_partial(mass));
     let of = |(k, (_, mass)): (usize, &(String, MassEstimates))| {
-        let (kg, by_energy) = mass.kg().filter(|_| are_all_late || !is_late(mass))?;
+        let counts = !is_partial(mass) || (are_all_partial && mass.in_contact != Some(ENDS));
+        let (kg, by_energy) = mass.kg().filter(|_| counts)?;
         Some((k, kg, if by_energy { 0.0 } else { (0.5 * mass.coarseness).min(MOST_COARSE) }))
     };
     let mut by_mass: Vec<(usize, f64, f64)> = runs.iter().enumerate().filter_map(of).collect();
@@ -258,20 +265,32 @@ pub(super) fn agree(
             found[k] = Proposed::found(rounded(median), Computed, from);
         }
     }
-    // Such a mass is too low, by what is stopped already: one that is further off is that of another vehicle.
+    // Such a mass is off by what is stopped already: one that is further off is that of another vehicle.
     let agreed: Vec<f64> = found.iter().filter_map(|mass| mass.value().copied()).collect();
     for (k, (_, mass)) in runs.iter().enumerate() {
-        let Some((own, _)) = mass.kg().filter(|_| !are_all_late && is_late(mass)) else { continue };
-        let lacks = |kg: &&f64| (LEAST_LEFT..=1.0 + SAME_MASS).contains(&(own / **kg));
-        let nearest = |a: &&f64, b: &&f64| (own / **b).total_cmp(&(own / **a));
-        found[k] = match agreed.iter().filter(lacks).min_by(nearest) {
+        let Some((own, _)) = mass.kg().filter(|_| found[k].value().is_none() && is_partial(mass))
+        else {
+            continue;
+        };
+        let ends = mass.in_contact == Some(ENDS);
+        let (least, most) = if ends { (1.0, LEAST_LEFT.recip()) } else { (LEAST_LEFT, 1.0) };
+        let range = least - SAME_MASS..=most + SAME_MASS;
+        let is_it = |kg: &&f64| range.contains(&(own / **kg));
+        let off = |kg: &f64| (own / kg).ln().abs();
+        let nearest = |a: &&f64, b: &&f64| off(a).total_cmp(&off(b));
+        found[k] = match agreed.iter().filter(is_it).min_by(nearest) {
             Some(kg) => {
                 let own = shown_mass(own);
                 let from = format!(
-                    "that of other runs; this record starts in contact, and momentum gives {own}"
+                    "that of other runs; this record {} in contact, and momentum gives {own}",
+                    mass.in_contact.unwrap_or_default()
                 );
                 Proposed::found(*kg, Computed, from)
             }
+            None if ends => Proposed::missing(format!(
+                "the record ends in contact, where momentum gives about {}: use --mass",
+                shown_mass(own)
+            )),
             None => Proposed::found(rounded(own), Computed, mass.from()),
         };
     }
@@ -408,7 +427,7 @@ mod tests {
         assert_eq!(warnings, [""; 0]);
         assert!(differ(&found).unwrap().contains("(20.2, 24 t)"));
         // What is stopped before a record begins has no part in its mass.
-        let late = |kg: f64| MassEstimates { is_late: true, ..by_momentum(kg) };
+        let late = |kg: f64| MassEstimates { in_contact: Some(STARTS), ..by_momentum(kg) };
         let runs = [("a", by_momentum(24e3)), ("b", late(22_100.0)), ("c", by_momentum(60e3))];
         let found = agree(&runs.map(|(name, mass)| (name.into(), mass)), "", &mut warnings);
         assert_eq!(found[1].value(), Some(&24e3));

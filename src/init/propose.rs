@@ -19,7 +19,6 @@ use super::sources::Sources;
 use super::survey::{ForceCandidate, Named, Survey};
 use super::write::{Proposal, Proposed};
 use super::{GivenForce, UserHints, units};
-use crate::curve::contact::milliseconds;
 use crate::error::{Error, error};
 use crate::file::folder_of;
 use crate::study::extract::is_alike;
@@ -249,8 +248,13 @@ fn agree_on_units(
     left_out: &mut Vec<LeftOut>,
 ) -> (Proposed<UnitSystem>, Vec<Record>, Vec<String>) {
     let mut warnings = Vec::new();
-    let (whole, ended): (Vec<Record>, Vec<Record>) =
+    let (mut whole, ended): (Vec<Record>, Vec<Record>) =
         records.into_iter().partition(|record| record.loading_end().is_ok());
+    let (mut cut, ended): (Vec<Record>, Vec<Record>) =
+        ended.into_iter().partition(Record::is_worth_keeping);
+    if whole.is_empty() {
+        whole = std::mem::take(&mut cut);
+    }
     let of: Vec<units::Magnitudes> = whole.iter().map(Record::magnitudes).collect();
     let [stated, metals] = units_of_decks(&whole, &mut warnings);
     let most = units::most_agree(&of);
@@ -268,28 +272,12 @@ fn agree_on_units(
             None => kept.push(record),
         }
     }
+    // They have a curve, but no say in what the recipe is.
+    kept.extend(cut);
     for record in ended {
-        let end = record.time.last().copied().unwrap_or_default();
-        let motion = &record.run.sources.motion;
-        // Its solver may have written more of one file than of the other.
-        let others = match &motion.others[..] {
-            [] => String::new(),
-            others => format!(
-                "; {} also holds it, and is read where there is no {}",
-                others.join(" and "),
-                motion.shown()
-            ),
-        };
-        let reason = Reason::EndsWhileLoading {
-            end: match units.value() {
-                Some(units) => milliseconds(end * units.time_s),
-                None => format!("{end} in the file's unit of time"),
-            } + &record.force_ends.as_ref().map_or(String::new(), |file| {
-                format!(", where {file} ends but the motion goes on")
-            }),
-            share: record.loading_end().err().unwrap_or_default(),
-            damage: record.damage() + &others,
-        };
+        let (end, share) = record.end_while_loading(units.value());
+        let damage = record.damage() + &record.other_files();
+        let reason = Reason::EndsWhileLoading { end, share, damage };
         left_out.push(LeftOut::new(record.run.path, reason));
     }
     (units, kept, warnings)

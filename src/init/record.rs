@@ -3,12 +3,13 @@
 
 use std::path::PathBuf;
 
-use super::folders::{Reason, speed_in};
-use super::measure::{Impact, MassEstimates, interval};
+use super::folders::{MOVES_ON, Reason, speed_in};
+use super::measure::{ENDS, Impact, MassEstimates, STARTS, interval};
 use super::recipe::CommonRecipe;
 use super::sources::{ENERGIES, Source, Sources, component, impulse, picked, rising, velocity};
 use super::survey::{STOPPED, Survey, bracketed};
 use super::units::Magnitudes;
+use crate::curve::contact::milliseconds;
 use crate::history::{EntityId, History};
 use crate::signal::interpolate;
 use crate::solver::WantedId;
@@ -76,6 +77,9 @@ pub(super) struct Record {
     /// The same in SI, once the units are known.
     pub impact: Option<Impact>,
 }
+
+/// Bodies that lose less than this share of their first speed over a tenth of a record are not being stopped any more.
+const STILL_STOPPED: f64 = 0.01;
 
 impl Record {
     pub(super) fn read(run: Run, recipe: &CommonRecipe) -> Result<Self, Reason> {
@@ -206,6 +210,45 @@ impl Record {
         }
     }
 
+    /// Whether a record that ends while loading holds most of the crash: the bodies have lost much of their speed, and are
+    /// still being stopped. Those that go on together have met an obstacle that moves.
+    pub(super) fn is_worth_keeping(&self) -> bool {
+        let last = self.time.len() - 1;
+        let mean = |from: f64, to: f64| {
+            let part = |share: f64| (share * last as f64) as usize;
+            let closing = (part(from)..=part(to)).map(|state| self.closing(state));
+            closing.sum::<f64>() / (part(to) - part(from) + 1) as f64
+        };
+        let first = self.closing(0);
+        self.closing(last) < MOVES_ON * first
+            && mean(0.9, 1.0) < mean(0.8, 0.9) - STILL_STOPPED * first
+    }
+
+    /// Where such a record ends, and at what share of their first speed the bodies still close there.
+    pub(super) fn end_while_loading(&self, units: Option<&UnitSystem>) -> (String, f64) {
+        let end = self.time.last().copied().unwrap_or_default();
+        let end = match units {
+            Some(units) => milliseconds(end * units.time_s),
+            None => format!("{end} in the file's unit of time"),
+        };
+        let of_force = |file: &String| format!(", where {file} ends but the motion goes on");
+        let end = end + &self.force_ends.as_ref().map_or(String::new(), of_force);
+        (end, self.loading_end().err().unwrap_or_default())
+    }
+
+    /// The files that hold the same motion: a solver may have written more of one than of the other.
+    pub(super) fn other_files(&self) -> String {
+        let motion = &self.run.sources.motion;
+        match &motion.others[..] {
+            [] => String::new(),
+            others => format!(
+                "; {} also holds it, and is read where there is no {}",
+                others.join(" and "),
+                motion.shown()
+            ),
+        }
+    }
+
     /// What the body has moved at the times of the force, up to the end of the loading; in the file's unit.
     pub(super) fn path_while_loading(&self) -> Vec<f64> {
         let end = self.loading_end().unwrap_or(self.time.len() - 1);
@@ -282,9 +325,10 @@ impl Record {
         };
         let (by_momentum, in_free_flight) =
             self.masses_by_momentum(|velocity| beside(velocity).unwrap_or(0.0)).unzip();
+        let ends = self.loading_end().is_err();
         let kg = |masses: &Option<Vec<f64>>, k: usize| masses.as_ref().map(|of| of[k] * unit_kg);
         let estimates = |k: usize| MassEstimates {
-            by_momentum: kg(&by_momentum, k),
+            by_momentum: kg(&by_momentum, k).filter(|_| !ends || by_energy.is_none()),
             in_free_flight: in_free_flight.unwrap_or_default(),
             unexplained: match beside(&self.velocities[k]) {
                 Some(_) => 0.0,
@@ -300,7 +344,10 @@ impl Record {
                 .is_some_and(|e| e.name == ENERGIES[0]),
             is_shared: self.velocities.len() > 1,
             coarseness: self.coarseness().unwrap_or_default(),
-            is_late: self.starts_in_contact(),
+            in_contact: match self.starts_in_contact() {
+                true => Some(STARTS),
+                false => ends.then_some(ENDS),
+            },
         };
         (0..self.velocities.len()).map(estimates).collect()
     }
@@ -323,11 +370,11 @@ impl Record {
     }
 
     /// The bodies' masses by momentum, `∫F dt / Δv`: after the contact, where both rest (and whether
-    /// that is so); while it never ends, by all states of the loading together.
+    /// that is so); while it never ends, by all states of the loading together, as far as the record goes.
     ///
     /// `beside`: acceleration of a body by a force that acts all along.
     fn masses_by_momentum(&self, beside: impl Fn(&[f64]) -> f64) -> Option<(Vec<f64>, bool)> {
-        let end = self.loading_end().ok()?;
+        let end = self.loading_end().unwrap_or(self.time.len() - 1);
         let free = self.free_flight(end);
         let body = |velocity: &Vec<f64>| {
             let beside = beside(velocity);

@@ -313,6 +313,8 @@ pub(crate) struct ProposedRun {
     pub(crate) truncate_s: Option<Proposed<f64>>,
     /// Maximum crush in m, if the units are known: doubled for half a model.
     pub(crate) crush_m: Option<f64>,
+    /// Whether the record ends before it: then what it reached.
+    pub(crate) truncated: bool,
     /// Whole states that motion and force both have.
     pub(crate) states: usize,
     #[serde(skip_serializing_if = "Vec::is_empty")]
