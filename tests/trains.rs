@@ -3,7 +3,8 @@
 
 use crate::common::crash::{History, Layout, MM_T_S, Motions, Node};
 use crate::common::{
-    crumple_fails, crumple_in, crumple_ok, demo_folder, json as parsed, read_json, root, says,
+    build_fixture, crumple_fails, crumple_in, crumple_ok, demo_folder, json as parsed, read_json,
+    root, says,
 };
 use serde_json::{Value, json};
 
@@ -1561,4 +1562,42 @@ fn occupants_of_vehicles_at_rest_meet_nothing() {
     // While the vehicles still move, occupants may meet something.
     let short = unknown(&text.replace("\"2s\"", "\"200ms\""));
     assert!(short[0].to_string().contains("B1"), "{short:?}");
+}
+
+/// What multi-body.md says of two noses that meet, against one at the wall, at the same crush of each.
+#[test]
+fn facing_noses_push_otherwise_than_one_at_the_wall() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let points = |group: &str, run: &str, noses: f64| -> Vec<(f64, f64)> {
+        build_fixture(here, group);
+        let case = format!("curves.h5 --case {group}/{run} --force contact --to csv -o c.csv");
+        crumple_ok(here, &format!("export -q --overwrite {case}"));
+        let text = std::fs::read_to_string(here.join("c.csv")).unwrap();
+        let rows = text.lines().filter_map(|line| line.split_once(','));
+        let number = |text: &str| text.split(',').next()?.parse::<f64>().ok();
+        rows.filter_map(|(d, f)| Some((number(d)? / noses, number(f)?))).collect()
+    };
+    let wall = points("lead-car-wall", "36kmh", 1.0);
+    let pair = points("lead-car-pair", "72kmh", 2.0);
+    let groups = parsed(&crumple_ok(here, "db ls curves.h5 --json"));
+    let largest = |group: &str, run: &str| -> f64 {
+        let cases = groups["groups"][group].as_array().unwrap();
+        let case = cases.iter().find(|case| case["name"] == run).unwrap();
+        case["max_deflection_m"].as_f64().unwrap()
+    };
+    let (of_pair, of_wall) = (largest("lead-car-pair", "72kmh"), largest("lead-car-wall", "36kmh"));
+    assert!((0.5 * of_pair / of_wall - 1.0).abs() < 0.04);
+    let work = |curve: &[(f64, f64)], from: f64, to: f64| -> f64 {
+        let inside = |p: &&(f64, f64)| (from..=to).contains(&p.0);
+        let points: Vec<&(f64, f64)> = curve.iter().filter(inside).collect();
+        let mean: f64 =
+            points.windows(2).map(|w| 0.5 * (w[0].1 + w[1].1) * (w[1].0 - w[0].0)).sum();
+        mean / (points[points.len() - 1].0 - points[0].0)
+    };
+    let ranges = [(0.05, 0.2, 0.95, 1.05), (0.25, 0.42, 0.82, 0.86), (0.42, 0.54, 0.95, 1.05)];
+    for (from, to, least, most) in ranges {
+        let ratio = work(&pair, from, to) / work(&wall, from, to);
+        assert!((least..=most).contains(&ratio), "{from} to {to} m: {ratio}");
+    }
 }
