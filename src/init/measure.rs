@@ -276,7 +276,7 @@ pub(super) fn agree(
         let (least, most) = if ends { (1.0, LEAST_LEFT.recip()) } else { (LEAST_LEFT, 1.0) };
         let range = least - SAME_MASS..=most + SAME_MASS;
         let is_it = |kg: &&f64| range.contains(&(own / **kg));
-        let off = |kg: &f64| (own / kg).ln().abs();
+        let off = |kg: &f64| (own / kg).max(kg / own);
         let nearest = |a: &&f64, b: &&f64| off(a).total_cmp(&off(b));
         found[k] = match agreed.iter().filter(is_it).min_by(nearest) {
             Some(kg) => {
