@@ -132,6 +132,23 @@ fn bundled_runs_give_the_shipped_studies() {
     like_shipped(&fixture("fe/steel-rail"), T01, &[]);
 }
 
+/// What is so of all runs is said once.
+#[test]
+fn notes_of_many_runs_are_lines_of_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = fixture("fe/steel-rail/study.toml");
+    let printed = crumple_ok(folder.path(), &["build", study.to_str().unwrap(), "-o", "c.h5"]);
+    let notes: Vec<&str> = printed.lines().filter_map(|line| line.strip_prefix("note: ")).collect();
+    let of_all = notes.iter().filter(|note| note.starts_with("all 7 runs: ")).count();
+    assert_eq!(of_all, 4, "{printed}");
+    says(&printed, "\nnote: all 7 runs: rwforc: read from section rwforc of crashT01\n");
+    says(
+        &printed,
+        "\nnote: 27kmh, 34kmh: short: the record holds 447 of 449 states from contact on\n",
+    );
+    assert_eq!(notes.len(), 7, "{printed}");
+}
+
 /// Of text and T01 of one run the curves differ by what the text's six digits round: in deflection
 /// by 2e-5 m at most (bodies move by up to 6 m), in force by 1e-5 of the peak.
 #[test]
@@ -830,8 +847,8 @@ fn what_is_no_run_is_named_and_left_out() {
     let path = here.join("converted/nodout");
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.replacen("smp d R14", "smp d R13", 1)).unwrap();
-    // Died at once, soon, and in the crash; cut behind it.
-    for (name, states) in [("died", 3), ("aborted", 70), ("late", 90), ("short", 250)] {
+    // Died at once, while loading, and late in it; cut behind the crash.
+    for (name, states) in [("died", 3), ("aborted", 90), ("late", 120), ("short", 250)] {
         copy_run(&from.join("72kmh"), &here.join(name), TEXTS);
         let lines = " n o d a l   p r i n t   o u t ";
         cut(&here.join(name).join("nodout"), lines, states);
@@ -845,7 +862,7 @@ fn what_is_no_run_is_named_and_left_out() {
     let runs = document["runs"].as_array().unwrap();
     let names: Vec<&str> = runs.iter().map(|run| run["name"].as_str().unwrap()).collect();
     assert_eq!(names, ["25kmh", "36kmh", "48kmh", "60kmh", "late", "short"]);
-    // What died in the crash has a curve as far as it goes, and the others' mass.
+    // What died late has a curve as far as it goes, and the others' mass.
     for run in runs {
         assert_eq!(run["mass_kg"]["value"], 24e3, "{run}");
         assert_eq!(run["truncated"], run["name"] == "late", "{run}");
@@ -853,11 +870,9 @@ fn what_is_no_run_is_named_and_left_out() {
     let notes = runs[4]["notes"][0].as_str().unwrap();
     says(
         notes,
-        "the record ends at 66.754 ms, while the bodies still close at 62 % of their first",
+        "the record ends at 89.25 ms, while the bodies still close at 45 % of their first speed",
     );
-    says(notes, "if the obstacle keeps moving, use --kind pair --minus-node ID");
-    let mass = runs[4]["mass_kg"]["from"].as_str().unwrap();
-    says(mass, "that of other runs; this record ends in contact, and momentum gives 26.9 t");
+    assert_eq!(runs[4]["mass_kg"]["from"], "that of the other runs");
     let out = left_out(&document);
     let text = fs::read_to_string(here.join("study.toml")).unwrap();
     let said = |folder: &str, expected: &str| {
@@ -873,7 +888,7 @@ fn what_is_no_run_is_named_and_left_out() {
     said("died", "it terminated early: nodout holds 3 complete states (line 33: the file ends");
     said(
         "aborted",
-        "it terminated early: the record ends at 51.751 ms, while the bodies still close at 71 % of",
+        "it terminated early: the record ends at 66.754 ms, while the bodies still close at 62 % of",
     );
     said("empty", "the folder is empty");
     said("planned", "it holds a deck but no solver output: it has not been run");
@@ -884,16 +899,6 @@ fn what_is_no_run_is_named_and_left_out() {
     assert_eq!(out.len(), 7);
     says(&text, "\n# [[run]]\n# path = \"aborted\"\n");
     crumple_ok(&here, "build -q");
-    // Its mass alone is not known well enough.
-    let printed = crumple_ok(&here, "init late -o late.toml");
-    let row = printed.lines().find(|line| line.starts_with("late ")).unwrap();
-    let row: Vec<&str> = row.split_whitespace().collect();
-    assert_eq!(row, ["late", "72", "km/h", "?", ">", "1.098", "90"]);
-    let text = fs::read_to_string(here.join("late.toml")).unwrap();
-    says(
-        &text,
-        "# fill in: the record ends in contact, where momentum gives about 26.9 t: use --mass",
-    );
 }
 
 /// Keeps the first states of a text, as a killed solver leaves them.
@@ -901,6 +906,41 @@ fn keep(path: &Path, state_line: &str, states: usize) {
     let text = fs::read_to_string(path).unwrap();
     let end = text.match_indices(state_line).nth(states).unwrap().0;
     fs::write(path, &text[..end]).unwrap();
+}
+
+/// A run that ended in the crash changes nothing of the others, and gives the curve that it would have if it had gone on.
+#[test]
+fn a_run_that_ended_in_the_crash_is_kept_beside_whole_ones() {
+    let (_folder, here) = four_runs();
+    let alone = study(&here, {
+        crumple_ok(&here, "init -o alone.toml");
+        "alone.toml"
+    });
+    let cut_at = |states: usize| {
+        copy_run(&fixture("fe/lead-car-wall/72kmh"), &here.join("72kmh"), TEXTS);
+        let lines = "\n\n\n n o d a l   p r i n t";
+        keep(&here.join("72kmh/nodout"), lines, states);
+        let printed = crumple_ok(&here, "init -o cut.toml --overwrite");
+        (printed, study(&here, "cut.toml"))
+    };
+    for states in [115, 140, 170, 190] {
+        let (printed, with) = cut_at(states);
+        let row = printed.lines().find(|line| line.starts_with("72kmh ")).unwrap();
+        assert!(row.starts_with("72kmh  72 km/h  24.00 t        > "), "{row}");
+        assert_eq!(with["recipe"], alone["recipe"], "{states}");
+        assert_eq!(with["run"].as_array().unwrap()[..4], alone["run"].as_array().unwrap()[..]);
+        assert_eq!(with["run"][4]["mass"], alone["run"][0]["mass"]);
+        crumple_ok(&here, "build -q cut.toml -o cut.h5");
+    }
+    let (printed, _) = cut_at(100);
+    says(&printed, "left out: 72kmh: it terminated early: the record ends at 74.25");
+    // A force that ends before the obstacle stops, or another mass, is not that of a run that was stopped in the crash.
+    let (_, whole) = cut_at(170);
+    assert_eq!(whole["run"].as_array().unwrap().len(), 5);
+    for wrong in ["--mass 20t", "--mass 30t"] {
+        let printed = crumple_ok(&here, &format!("init -o wrong.toml --overwrite {wrong}"));
+        says(&printed, "left out: 72kmh: it terminated early");
+    }
 }
 
 /// A run that was killed early says where its record ends, alone and among others.

@@ -149,6 +149,9 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     Ok(outcome)
 }
 
+/// A note of more runs says how many they are.
+const MOST_NAMED: usize = 5;
+
 /// What became of a run, in a word and in the sentence of its error.
 fn outcome_of(run: &BuiltRun) -> (&'static str, Option<String>) {
     match &run.outcome {
@@ -179,10 +182,25 @@ fn print(out: &mut dyn Write, report: &BuildReport, database: &str) -> io::Resul
     let runs = Table::of(&report.runs)
         .column("run", |run| format!("{} ({})", run.name, outcome_of(run).0));
     output::table(out, case_columns(runs, |run| report.case(run)))?;
+    // What is so of many runs is said once.
+    let (mut notes, mut runs_of) = (Vec::new(), BTreeMap::<&str, Vec<&str>>::new());
     for run in &report.runs {
         for note in report.case(run).into_iter().flat_map(|case| &case.quality.notes) {
-            writeln!(out, "note: {}: {note}", run.name)?;
+            let runs = runs_of.entry(note).or_default();
+            if runs.is_empty() {
+                notes.push(note);
+            }
+            runs.push(&run.name);
         }
+    }
+    for note in notes {
+        let runs = &runs_of[&**note];
+        let named = match runs.len() {
+            all if all == report.runs.len() && all > 1 => format!("all {all} runs"),
+            many if many > MOST_NAMED => format!("{many} of {} runs", report.runs.len()),
+            _ => runs.join(", "),
+        };
+        writeln!(out, "note: {named}: {note}")?;
     }
     for name in removed(report) {
         writeln!(out, "note: {name}: no longer in the study, removed")?;

@@ -49,8 +49,7 @@ impl Facts<'_> {
         let (filter, cuts) = self.filter();
         let runs = self.runs(&cuts, &mut warnings);
         self.warn(&mut warnings);
-        let whole = self.impacts().filter(|(record, _)| self.counts(record));
-        let impacts: Vec<&Impact> = whole.map(|(_, impact)| impact).collect();
+        let impacts: Vec<&Impact> = self.impacts().map(|(_, impact)| impact).collect();
         let no_units = || Proposed::missing("the times are unknown without units");
         Proposal {
             group,
@@ -76,12 +75,6 @@ impl Facts<'_> {
     /// The runs with their values in SI: none if the units are unknown.
     fn impacts(&self) -> impl Iterator<Item = (&Record, &Impact)> {
         self.records.iter().filter_map(|record| Some((record, record.impact.as_ref()?)))
-    }
-
-    /// Whether a record has a say in the recipe: one that ends while loading has not, unless all do.
-    fn counts(&self, record: &Record) -> bool {
-        let is_whole = |record: &Record| record.loading_end().is_ok();
-        is_whole(record) || !self.records.iter().any(is_whole)
     }
 
     fn force_is_of_section(&self) -> bool {
@@ -134,8 +127,7 @@ impl Facts<'_> {
         }
         let mut because = format!("the bodies start along {}", direction.axis());
         if force.is_some() {
-            let whole = self.records.iter().filter(|record| self.counts(record));
-            let of_runs = match whole.count() {
+            let of_runs = match self.records.len() {
                 1 => "the run".into(),
                 2 => "both runs".into(),
                 runs => format!("all {runs} runs"),
@@ -238,9 +230,6 @@ impl Facts<'_> {
             let loading = contact.min(path.len())..path.len().min(filtered.values.len());
             let of = |force: &[f64]| force[loading.clone()].to_vec();
             let kept = cfc::work_kept(&of(&filtered.values), &of(force), &of(&path));
-            if !self.counts(record) {
-                continue;
-            }
             // Without a path there is no work.
             least = least.min(if kept.is_nan() { 1.0 } else { kept });
         }
@@ -394,18 +383,15 @@ impl Facts<'_> {
                 other_mass_kg: others.as_ref().and_then(|others| others.get(k)).cloned(),
                 truncate_s: cuts[k].map(|s| Proposed::found(s, Computed, cut_because)),
                 crush_m: impact.map(|impact| impact.crush_m),
-                truncated: record.loading_end().is_err(),
+                truncated: false,
                 states: record.states,
                 notes: impact
                     .filter(|_| !is_half)
-                    .map_or(Vec::new(), |impact| doubts_of_speed(record, impact))
-                    .into_iter()
-                    .chain(self.early_end(record))
-                    .collect(),
+                    .map_or(Vec::new(), |impact| doubts_of_speed(record, impact)),
             });
         }
+        sort(&mut runs);
         let speed = |run: &ProposedRun| run.speed_m_per_s.value().copied().unwrap_or_default();
-        runs.sort_by(|a, b| speed(a).total_cmp(&speed(b)).then(a.name.cmp(&b.name)));
         let alike: Vec<String> = runs
             .windows(2)
             .filter(|pair| speed(&pair[0]) > 0.0)
@@ -421,21 +407,50 @@ impl Facts<'_> {
         runs
     }
 
-    /// Says of a record that ends while loading what it is good for.
-    fn early_end(&self, record: &Record) -> Option<String> {
-        record.loading_end().err()?;
-        let (end, share) = record.end_while_loading(self.units.value());
-        let moving = match self.recipe.kind {
-            StudyKind::Wall if !self.hints.half_model => {
-                "; if the obstacle keeps moving, use --kind pair --minus-node ID"
-            }
-            _ => "",
+    /// A run whose record ends while loading, if it fits the recipe and the masses of the whole ones and holds most of a crash.
+    pub(super) fn cut_run(&self, record: &Record, whole: &Proposal) -> Option<ProposedRun> {
+        let units = *self.units.value()?;
+        let path = seen_from(self.folder, &record.run.path)?;
+        let one = |of: fn(&ProposedRun) -> Option<&Proposed<f64>>| {
+            let first = of(whole.runs.first()?)?;
+            let kg = |run| of(run)?.value();
+            whole.runs.iter().all(|run| kg(run) == first.value()).then_some(*first.value()?)
         };
-        Some(format!(
-            "the record ends at {end}, while the bodies still close at {} % of their first speed: the curve goes up to there, and the maximum crush is larger{moving}{}",
+        let kg = one(|run| Some(&run.mass_kg))?;
+        let other_kg = one(|run| run.other_mass_kg.as_ref());
+        let are_equal = whole.runs.iter().all(|run| run.other_mass_kg.is_none());
+        if record.magnitudes().impossible(&units).is_some()
+            || !(are_equal || other_kg.is_some())
+            || !record.holds_most_of_a_crash(kg / units.mass_kg)
+        {
+            return None;
+        }
+        let impact = &Impact::of(record, units, self.hints.half_model);
+        let (end, share) = record.end_while_loading(Some(&units));
+        let sampling = whole.sampling.value()?;
+        let window_s = impact.contact_s + (sampling.states - 1) as f64 * sampling.interval_s;
+        let of_others = |kg: f64| Proposed::found(kg, Computed, "that of the other runs");
+        let mut notes = doubts_of_speed(record, impact);
+        notes.push(format!(
+            "the record ends at {end}, while the bodies still close at {} % of their first speed: the curve goes up to there, and the maximum crush is larger{}",
             percent(share),
             record.other_files()
-        ))
+        ));
+        Some(ProposedRun {
+            folder: record.run.path.clone(),
+            path,
+            name: record.run.name.clone(),
+            speed_m_per_s: self.speed(record, impact),
+            mass_kg: of_others(kg),
+            other_mass_kg: other_kg.map(of_others),
+            truncate_s: (impact.last_s > window_s).then(|| {
+                Proposed::found(window_s, Computed, "the sampling of the others ends there")
+            }),
+            crush_m: Some(impact.crush_m),
+            truncated: true,
+            states: record.states,
+            notes,
+        })
     }
 
     /// Speed of a run, from its first velocities or those right before the contact.
@@ -563,6 +578,12 @@ impl Facts<'_> {
         }
         Some(format!("judging by their velocities, {times} times the mass: use --other-mass"))
     }
+}
+
+/// By speed, then by name.
+pub(super) fn sort(runs: &mut [ProposedRun]) {
+    let speed = |run: &ProposedRun| run.speed_m_per_s.value().copied().unwrap_or_default();
+    runs.sort_by(|a, b| speed(a).total_cmp(&speed(b)).then(a.name.cmp(&b.name)));
 }
 
 /// Why not the usual class, which keeps so much of the work.

@@ -288,7 +288,7 @@ impl LeftOut {
 }
 
 /// Bodies that close more slowly than this share of their first speed at a record's end may go on together.
-pub(super) const MOVES_ON: f64 = 0.7;
+const MOVES_ON: f64 = 0.7;
 
 /// Bodies whose speed has changed by less than this share may be driven.
 const DRIVEN: f64 = 1e-4;

@@ -111,16 +111,11 @@ pub(super) struct MassEstimates {
     /// Interval of the states over the time from contact to the largest crush, of which a mass by momentum may be off by
     /// half; after the contact that of the forces alone.
     pub coarseness: f64,
-    /// [`STARTS`] or [`ENDS`] where the record does so in contact: a mass by momentum then lacks what is stopped already, or holds
-    /// it twice.
-    pub in_contact: Option<&'static str>,
+    /// Whether the record starts in contact: what is stopped already has no part in a mass by momentum.
+    pub is_late: bool,
 }
 
-pub(super) const STARTS: &str = "starts";
-pub(super) const ENDS: &str = "ends";
-
-/// The share of a mass that momentum gives at least where a record starts in contact, and the inverse of what it gives at most
-/// where one ends so: crush zones are lighter than the rest.
+/// The share of a mass that momentum gives at least where a record starts in contact: crush zones are lighter than the rest.
 const LEAST_LEFT: f64 = 0.85;
 
 /// Above it other forces are warned of; the waves in a body that has left the contact look like less.
@@ -230,13 +225,11 @@ pub(super) fn agree(
             ));
         }
     }
-    let is_partial = |mass: &MassEstimates| {
-        mass.in_contact.is_some() && mass.kg().is_some_and(|(_, by_energy)| !by_energy)
-    };
-    let are_all_partial = runs.iter().all(|(_, mass)| mass.kg().is_none() || is_partial(mass));
+    let is_late =
+        |mass: &MassEstimates| mass.is_late && mass.kg().is_some_and(|(_, by_energy)| !by_energy);
+    let are_all_late = runs.iter().all(|(_, mass)| mass.kg().is_none() || is_late(mass));
     let of = |(k, (_, mass)): (usize, &(String, MassEstimates))| {
-        let counts = !is_partial(mass) || (are_all_partial && mass.in_contact != Some(ENDS));
-        let (kg, by_energy) = mass.kg().filter(|_| counts)?;
+        let (kg, by_energy) = mass.kg().filter(|_| are_all_late || !is_late(mass))?;
         Some((k, kg, if by_energy { 0.0 } else { (0.5 * mass.coarseness).min(MOST_COARSE) }))
     };
     let mut by_mass: Vec<(usize, f64, f64)> = runs.iter().enumerate().filter_map(of).collect();
@@ -265,32 +258,20 @@ pub(super) fn agree(
             found[k] = Proposed::found(rounded(median), Computed, from);
         }
     }
-    // Such a mass is off by what is stopped already: one that is further off is that of another vehicle.
+    // Such a mass is too low, by what is stopped already: one that is further off is that of another vehicle.
     let agreed: Vec<f64> = found.iter().filter_map(|mass| mass.value().copied()).collect();
     for (k, (_, mass)) in runs.iter().enumerate() {
-        let Some((own, _)) = mass.kg().filter(|_| found[k].value().is_none() && is_partial(mass))
-        else {
-            continue;
-        };
-        let ends = mass.in_contact == Some(ENDS);
-        let (least, most) = if ends { (1.0, LEAST_LEFT.recip()) } else { (LEAST_LEFT, 1.0) };
-        let range = least - SAME_MASS..=most + SAME_MASS;
-        let is_it = |kg: &&f64| range.contains(&(own / **kg));
-        let off = |kg: &f64| (own / kg).max(kg / own);
-        let nearest = |a: &&f64, b: &&f64| off(a).total_cmp(&off(b));
-        found[k] = match agreed.iter().filter(is_it).min_by(nearest) {
+        let Some((own, _)) = mass.kg().filter(|_| !are_all_late && is_late(mass)) else { continue };
+        let lacks = |kg: &&f64| (LEAST_LEFT..=1.0 + SAME_MASS).contains(&(own / **kg));
+        let nearest = |a: &&f64, b: &&f64| (own / **b).total_cmp(&(own / **a));
+        found[k] = match agreed.iter().filter(lacks).min_by(nearest) {
             Some(kg) => {
                 let own = shown_mass(own);
                 let from = format!(
-                    "that of other runs; this record {} in contact, and momentum gives {own}",
-                    mass.in_contact.unwrap_or_default()
+                    "that of other runs; this record starts in contact, and momentum gives {own}"
                 );
                 Proposed::found(*kg, Computed, from)
             }
-            None if ends => Proposed::missing(format!(
-                "the record ends in contact, where momentum gives about {}: use --mass",
-                shown_mass(own)
-            )),
             None => Proposed::found(rounded(own), Computed, mass.from()),
         };
     }
@@ -377,7 +358,10 @@ pub(super) fn sampling(runs: &[&Impact]) -> Option<Proposed<Sampling>> {
     let finest = FINEST_S.min(Sampling::interval_for(shortest.fold(f64::INFINITY, f64::min), 0.0));
     let least = coarsest.max(finest).max(longest / MOST_STATES);
     let interval_s = rounded_interval(least, longest);
-    let states = (longest / interval_s * (1.0 + 1e-6)).floor() as usize + 1;
+    // The largest crush may be in a record's last state.
+    let crush = runs.iter().map(|run| run.crush_time_s).fold(0.0, f64::max);
+    let last = (longest / interval_s * (1.0 + 1e-6)).floor();
+    let states = last.max((crush / interval_s * (1.0 - 1e-6)).ceil()) as usize + 1;
     let alike = runs.iter().all(|run| is_near(run.interval_s, coarsest, 0.01));
     let ms = |s: f64| digits(s * 1e3);
     let from = if least > 1.01 * coarsest {
@@ -427,7 +411,7 @@ mod tests {
         assert_eq!(warnings, [""; 0]);
         assert!(differ(&found).unwrap().contains("(20.2, 24 t)"));
         // What is stopped before a record begins has no part in its mass.
-        let late = |kg: f64| MassEstimates { in_contact: Some(STARTS), ..by_momentum(kg) };
+        let late = |kg: f64| MassEstimates { is_late: true, ..by_momentum(kg) };
         let runs = [("a", by_momentum(24e3)), ("b", late(22_100.0)), ("c", by_momentum(60e3))];
         let found = agree(&runs.map(|(name, mass)| (name.into(), mass)), "", &mut warnings);
         assert_eq!(found[1].value(), Some(&24e3));
@@ -506,6 +490,12 @@ mod tests {
         let found = proposed(&[record(1e-3, 0.0, 0.1), record(0.5e-3, 0.0, 0.2)]);
         assert_eq!((found.states, found.interval_s), (201, 1e-3));
         assert!(sampling(&[]).is_none());
+        // The largest crush, in the last state, is no multiple of the interval after the contact.
+        let late = Impact { crush_time_s: 0.0767, ..record(2e-4, 1e-3, 0.0777) };
+        assert_eq!(
+            (proposed(&[late]).states, proposed(&[record(2e-4, 1e-3, 0.0777)]).states),
+            (385, 384)
+        );
         // A short crush of a fine record.
         let short = Impact { crush_time_s: 1.3e-3, ..record(1e-6, 0.001, 0.005) };
         assert_eq!(proposed(&[short]).interval_s, 2e-5);

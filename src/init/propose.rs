@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use rayon::iter::Either;
 use rayon::prelude::*;
 
-use super::describe::{Facts, units_of_decks};
+use super::describe::{Facts, sort, units_of_decks};
 use super::folders::{Folders, LeftOut, Reason, names, no_usable_run, seen_from};
 use super::measure::{Impact, SAME_MASS, is_near};
 use super::recipe::{CommonRecipe, sum_of_forces};
@@ -63,6 +63,8 @@ pub(crate) fn propose(
     refuse_hints(&recipe, &surveys, hints)?;
     let records = record(runs, &recipe, &mut left_out);
     let records = without_duplicates(records, &mut left_out);
+    let (records, ended): (Vec<Record>, Vec<Record>) =
+        records.into_iter().partition(|record| record.loading_end().is_ok());
     let (units, records, warnings) = agree_on_units(records, hints, &mut left_out);
     let (recipe, records) = adding_shares(recipe, records, units.value(), hints, &mut left_out);
     let folder = folder_of(study);
@@ -73,6 +75,7 @@ pub(crate) fn propose(
         LeftOut::new(record.run.path, Reason::Unusable { why })
     }));
     if records.is_empty() {
+        left_out.extend(ended.into_iter().map(|record| ends_while_loading(record, units.value())));
         return Err(no_usable_run(&left_out, &warnings));
     }
     if let Some(units) = units.value() {
@@ -82,6 +85,18 @@ pub(crate) fn propose(
     }
     let facts = Facts { recipe: &recipe, records: &records, units, hints, folder };
     let mut proposal = facts.proposal(group, warnings);
+    // They have no say in the recipe: what the others have must fit them.
+    for record in ended {
+        let path = record.run.path.clone();
+        match Record::read(record.run, &recipe) {
+            Ok(record) => match facts.cut_run(&record, &proposal) {
+                Some(run) => proposal.runs.push(run),
+                None => left_out.push(ends_while_loading(record, facts.units.value())),
+            },
+            Err(reason) => left_out.push(LeftOut::new(path, reason)),
+        }
+    }
+    sort(&mut proposal.runs);
     proposal.left_out = left_out;
     leave_out_refused(&mut proposal, study)?;
     for out in &mut proposal.left_out {
@@ -240,21 +255,20 @@ fn without_duplicates(records: Vec<Record>, left_out: &mut Vec<LeftOut>) -> Vec<
     unique
 }
 
-/// The units of the runs, without those that are possible in other units only and those whose
-/// crash the record does not hold.
+/// A run whose crash the record does not hold.
+fn ends_while_loading(record: Record, units: Option<&UnitSystem>) -> LeftOut {
+    let (end, share) = record.end_while_loading(units);
+    let damage = record.damage() + &record.other_files();
+    LeftOut::new(record.run.path, Reason::EndsWhileLoading { end, share, damage })
+}
+
+/// The units of the runs, without those that are possible in other units only.
 fn agree_on_units(
-    records: Vec<Record>,
+    whole: Vec<Record>,
     hints: &UserHints,
     left_out: &mut Vec<LeftOut>,
 ) -> (Proposed<UnitSystem>, Vec<Record>, Vec<String>) {
     let mut warnings = Vec::new();
-    let (mut whole, ended): (Vec<Record>, Vec<Record>) =
-        records.into_iter().partition(|record| record.loading_end().is_ok());
-    let (mut cut, ended): (Vec<Record>, Vec<Record>) =
-        ended.into_iter().partition(Record::is_worth_keeping);
-    if whole.is_empty() {
-        whole = std::mem::take(&mut cut);
-    }
     let of: Vec<units::Magnitudes> = whole.iter().map(Record::magnitudes).collect();
     let [stated, metals] = units_of_decks(&whole, &mut warnings);
     let most = units::most_agree(&of);
@@ -271,14 +285,6 @@ fn agree_on_units(
             }
             None => kept.push(record),
         }
-    }
-    // They have a curve, but no say in what the recipe is.
-    kept.extend(cut);
-    for record in ended {
-        let (end, share) = record.end_while_loading(units.value());
-        let damage = record.damage() + &record.other_files();
-        let reason = Reason::EndsWhileLoading { end, share, damage };
-        left_out.push(LeftOut::new(record.run.path, reason));
     }
     (units, kept, warnings)
 }

@@ -3,8 +3,8 @@
 
 use std::path::PathBuf;
 
-use super::folders::{MOVES_ON, Reason, speed_in};
-use super::measure::{ENDS, Impact, MassEstimates, STARTS, interval};
+use super::folders::{Reason, speed_in};
+use super::measure::{Impact, MassEstimates, SAME_MASS, interval};
 use super::recipe::CommonRecipe;
 use super::sources::{ENERGIES, Source, Sources, component, impulse, picked, rising, velocity};
 use super::survey::{STOPPED, Survey, bracketed};
@@ -78,8 +78,14 @@ pub(super) struct Record {
     pub impact: Option<Impact>,
 }
 
-/// Bodies that lose less than this share of their first speed over a tenth of a record are not being stopped any more.
-const STILL_STOPPED: f64 = 0.01;
+/// A record that ends while loading holds most of the crash if the bodies still close at less than this share of their first
+/// speed: three quarters of the energy are gone.
+const MOSTLY_STOPPED: f64 = 0.5;
+/// The force acts still if its mean over the last tenth of such a record is more than this share of that over all of it: bodies
+/// that have met an obstacle that moves go on with it.
+const ACTS_STILL: f64 = 0.2;
+/// Largest share of a mass that is its crush zone.
+const CRUSH_ZONE: f64 = 0.35;
 
 impl Record {
     pub(super) fn read(run: Run, recipe: &CommonRecipe) -> Result<Self, Reason> {
@@ -210,20 +216,6 @@ impl Record {
         }
     }
 
-    /// Whether a record that ends while loading holds most of the crash: the bodies have lost much of their speed, and are
-    /// still being stopped. Those that go on together have met an obstacle that moves.
-    pub(super) fn is_worth_keeping(&self) -> bool {
-        let last = self.time.len() - 1;
-        let mean = |from: f64, to: f64| {
-            let part = |share: f64| (share * last as f64) as usize;
-            let closing = (part(from)..=part(to)).map(|state| self.closing(state));
-            closing.sum::<f64>() / (part(to) - part(from) + 1) as f64
-        };
-        let first = self.closing(0);
-        self.closing(last) < MOVES_ON * first
-            && mean(0.9, 1.0) < mean(0.8, 0.9) - STILL_STOPPED * first
-    }
-
     /// Where such a record ends, and at what share of their first speed the bodies still close there.
     pub(super) fn end_while_loading(&self, units: Option<&UnitSystem>) -> (String, f64) {
         let end = self.time.last().copied().unwrap_or_default();
@@ -247,6 +239,28 @@ impl Record {
                 motion.shown()
             ),
         }
+    }
+
+    /// Whether a record that ends while loading can be that of a body of `mass`, in the file's unit, of which it holds most
+    /// of the crash: the force still acts, and has the impulse that stops this mass and, at most, a crush zone that rests already.
+    pub(super) fn holds_most_of_a_crash(&self, mass: f64) -> bool {
+        let (last, share) =
+            (self.time.len() - 1, self.closing(self.time.len() - 1) / self.closing(0));
+        let mean = |force: &[f64]| force.iter().map(|f| f.abs()).sum::<f64>() / force.len() as f64;
+        let Some((first, _)) = self.contact() else { return false };
+        let at = |time: f64| self.force_time.partition_point(|&t| t < time);
+        // The motion may end before the force.
+        let force = &self.force[at(first)..at(self.time[last]).max(at(first))];
+        if force.len() < FREE.0 {
+            return false;
+        }
+        let velocity = &self.velocities[0];
+        let over = (self.impulse[last] / (velocity[last] - velocity[0])).abs() / mass;
+        let most = 1.0 + CRUSH_ZONE * share / (1.0 - share);
+        share < MOSTLY_STOPPED
+            && mean(&force[force.len() - force.len().div_ceil(10)..]) > ACTS_STILL * mean(force)
+            && (1.0 - SAME_MASS..=most + SAME_MASS).contains(&over)
+            && !self.starts_in_contact()
     }
 
     /// What the body has moved at the times of the force, up to the end of the loading; in the file's unit.
@@ -325,10 +339,9 @@ impl Record {
         };
         let (by_momentum, in_free_flight) =
             self.masses_by_momentum(|velocity| beside(velocity).unwrap_or(0.0)).unzip();
-        let ends = self.loading_end().is_err();
         let kg = |masses: &Option<Vec<f64>>, k: usize| masses.as_ref().map(|of| of[k] * unit_kg);
         let estimates = |k: usize| MassEstimates {
-            by_momentum: kg(&by_momentum, k).filter(|_| !ends || by_energy.is_none()),
+            by_momentum: kg(&by_momentum, k),
             in_free_flight: in_free_flight.unwrap_or_default(),
             unexplained: match beside(&self.velocities[k]) {
                 Some(_) => 0.0,
@@ -344,10 +357,7 @@ impl Record {
                 .is_some_and(|e| e.name == ENERGIES[0]),
             is_shared: self.velocities.len() > 1,
             coarseness: self.coarseness().unwrap_or_default(),
-            in_contact: match self.starts_in_contact() {
-                true => Some(STARTS),
-                false => ends.then_some(ENDS),
-            },
+            is_late: self.starts_in_contact(),
         };
         (0..self.velocities.len()).map(estimates).collect()
     }
@@ -370,11 +380,11 @@ impl Record {
     }
 
     /// The bodies' masses by momentum, `∫F dt / Δv`: after the contact, where both rest (and whether
-    /// that is so); while it never ends, by all states of the loading together, as far as the record goes.
+    /// that is so); while it never ends, by all states of the loading together.
     ///
     /// `beside`: acceleration of a body by a force that acts all along.
     fn masses_by_momentum(&self, beside: impl Fn(&[f64]) -> f64) -> Option<(Vec<f64>, bool)> {
-        let end = self.loading_end().unwrap_or(self.time.len() - 1);
+        let end = self.loading_end().ok()?;
         let free = self.free_flight(end);
         let body = |velocity: &Vec<f64>| {
             let beside = beside(velocity);
