@@ -132,7 +132,7 @@ fn bundled_runs_give_the_shipped_studies() {
     like_shipped(&fixture("fe/steel-rail"), T01, &[]);
 }
 
-/// What is so of all runs is said once.
+/// What holds for many runs is said once.
 #[test]
 fn notes_of_many_runs_are_lines_of_their_own() {
     let folder = tempfile::tempdir().unwrap();

@@ -149,7 +149,7 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     Ok(outcome)
 }
 
-/// A note of more runs says how many they are.
+/// A note of more runs than these says how many they are, not which.
 const MOST_NAMED: usize = 5;
 
 /// What became of a run, in a word and in the sentence of its error.
@@ -182,7 +182,7 @@ fn print(out: &mut dyn Write, report: &BuildReport, database: &str) -> io::Resul
     let runs = Table::of(&report.runs)
         .column("run", |run| format!("{} ({})", run.name, outcome_of(run).0));
     output::table(out, case_columns(runs, |run| report.case(run)))?;
-    // What is so of many runs is said once.
+    // What holds for many runs is said once.
     let (mut notes, mut runs_of) = (Vec::new(), BTreeMap::<&str, Vec<&str>>::new());
     for run in &report.runs {
         for note in report.case(run).into_iter().flat_map(|case| &case.quality.notes) {
@@ -196,7 +196,8 @@ fn print(out: &mut dyn Write, report: &BuildReport, database: &str) -> io::Resul
     for note in notes {
         let runs = &runs_of[&**note];
         let named = match runs.len() {
-            all if all == report.runs.len() && all > 1 => format!("all {all} runs"),
+            2 if report.runs.len() == 2 => "both runs".into(),
+            all if all > 1 && all == report.runs.len() => format!("all {all} runs"),
             many if many > MOST_NAMED => format!("{many} of {} runs", report.runs.len()),
             _ => runs.join(", "),
         };

@@ -222,6 +222,7 @@ fn lines(curve: &PredictedCurve) -> Vec<(&'static str, String)> {
     }
     let away = km_per_h(provenance.distance_to_nearest_m_per_s);
     lines.push(("nearest training", format!("{away} away")));
+    lines.extend(curve.warnings.iter().map(|warning| ("warning", warning.to_string())));
     lines
 }
 

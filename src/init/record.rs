@@ -84,7 +84,7 @@ const MOSTLY_STOPPED: f64 = 0.5;
 /// The force acts still if its mean over the last tenth of such a record is more than this share of that over all of it: bodies
 /// that have met an obstacle that moves go on with it.
 const ACTS_STILL: f64 = 0.2;
-/// Largest share of a mass that is its crush zone.
+/// Largest share of a mass that its crush zone may be; in the bundled groups it is at most a tenth.
 const CRUSH_ZONE: f64 = 0.35;
 
 impl Record {
@@ -241,8 +241,8 @@ impl Record {
         }
     }
 
-    /// Whether a record that ends while loading can be that of a body of `mass`, in the file's unit, of which it holds most
-    /// of the crash: the force still acts, and has the impulse that stops this mass and, at most, a crush zone that rests already.
+    /// Whether a record that ends while loading holds most of the crash of a body of `mass`, in the file's unit: the force still
+    /// acts, and its impulse is what slowed this mass, and stopped at most a crush zone.
     pub(super) fn holds_most_of_a_crash(&self, mass: f64) -> bool {
         let (last, share) =
             (self.time.len() - 1, self.closing(self.time.len() - 1) / self.closing(0));
