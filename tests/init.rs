@@ -908,7 +908,7 @@ fn keep(path: &Path, state_line: &str, states: usize) {
     fs::write(path, &text[..end]).unwrap();
 }
 
-/// A run that ended in the crash changes nothing of the others, and gives the curve that it would have if it had gone on.
+/// A run that ended late in the crash is added to the study, and changes nothing of the other runs.
 #[test]
 fn a_run_that_ended_in_the_crash_is_kept_beside_whole_ones() {
     let (_folder, here) = four_runs();
@@ -934,7 +934,7 @@ fn a_run_that_ended_in_the_crash_is_kept_beside_whole_ones() {
     }
     let (printed, _) = cut_at(100);
     says(&printed, "left out: 72kmh: it terminated early: the record ends at 74.25");
-    // A force that ends before the obstacle stops, or another mass, is not that of a run that was stopped in the crash.
+    // Its impulse does not fit another mass.
     let (_, whole) = cut_at(170);
     assert_eq!(whole["run"].as_array().unwrap().len(), 5);
     for wrong in ["--mass 20t", "--mass 30t"] {

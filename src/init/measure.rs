@@ -490,7 +490,7 @@ mod tests {
         let found = proposed(&[record(1e-3, 0.0, 0.1), record(0.5e-3, 0.0, 0.2)]);
         assert_eq!((found.states, found.interval_s), (201, 1e-3));
         assert!(sampling(&[]).is_none());
-        // The largest crush, in the last state, is no multiple of the interval after the contact.
+        // The largest crush, in the last state, lies between two multiples of the interval.
         let late = Impact { crush_time_s: 0.0767, ..record(2e-4, 1e-3, 0.0777) };
         assert_eq!(
             (proposed(&[late]).states, proposed(&[record(2e-4, 1e-3, 0.0777)]).states),
