@@ -390,11 +390,12 @@ fn wrong_wishes_are_refused() {
     fs::write(folder.join("cut.csv"), "# crumple sweep, layout 1\n# written").unwrap();
     fs::write(folder.join("other.csv"), "time_s,b\n0,1\n").unwrap();
     fs::write(folder.join("part.csv"), "time_s,v_m_per_s[A1]\n0,1\n1,2\n").unwrap();
+    fs::write(folder.join("forces.csv"), "time_s,force_N[A1|wall]\n0,1\n1,2\n").unwrap();
     fs::write(folder.join("back.csv"), "time_s,v_m_per_s[A1]\n0,1\n1,2\n0.5,3\n").unwrap();
     let before = entries(folder);
     #[rustfmt::skip]
     let cases = [
-        (1, "part.csv --quantity acceleration -o a.svg", "part has no accelerations: expected columns such as a_m_per_s2[A1]"),
+        (1, "forces.csv --quantity acceleration -o a.svg", "forces has no speeds of bodies: expected columns such as v_m_per_s[A1]"),
         (1, "part.csv --quantity force -o a.svg", "part has no forces of interfaces"),
         (1, "part.csv --quantity crush -o a.svg", "part has no deflections"),
         (1, "back.csv -o a.svg", "line 4, column 1: expected a time after 1 s, found 0.5"),

@@ -10,7 +10,7 @@ use crate::plot::{Axis, Band, Chart, Panel, Series, Shown};
 use crate::plural::counted;
 use crate::rating::acceptance::StageRecord;
 use crate::scenario::{PLATES, Prepared};
-use crate::signal::{CfcError, cfc};
+use crate::signal::{CfcError, cfc, mean_rates};
 
 /// What of a run is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,7 +40,6 @@ struct BodyMotion {
     name: String,
     /// Speed in m/s, one value per time.
     v_m_per_s: Vec<f64>,
-    a_m_per_s2: Vec<f64>,
     /// Whether it is drawn without being asked for: crush zones are not.
     is_usual: bool,
 }
@@ -165,7 +164,6 @@ impl Motion {
             .cloned()
             .map(|name| BodyMotion {
                 v_m_per_s: of("v_m_per_s", &name),
-                a_m_per_s2: of("a_m_per_s2", &name),
                 is_usual: !is_crush_zone(&name, &known),
                 name,
             })
@@ -194,7 +192,6 @@ impl Motion {
         let body = |&i: &usize| BodyMotion {
             name: bodies[i].name.clone(),
             v_m_per_s: run.bodies[i].v_m_per_s.clone(),
-            a_m_per_s2: run.bodies[i].a_m_per_s2.clone(),
             is_usual: prepared.vehicles.contains(&i),
         };
         let interfaces = prepared.chain.interfaces().iter().zip(&run.interfaces);
@@ -247,8 +244,9 @@ impl Motion {
     fn holds(&self, quantity: Quantity) -> bool {
         let (mut bodies, mut interfaces) = (self.bodies.iter(), self.interfaces.iter());
         match quantity {
-            Quantity::Velocity => bodies.any(|body| !body.v_m_per_s.is_empty()),
-            Quantity::Acceleration => bodies.any(|body| !body.a_m_per_s2.is_empty()),
+            Quantity::Velocity | Quantity::Acceleration => {
+                bodies.any(|body| !body.v_m_per_s.is_empty())
+            }
             Quantity::Crush => interfaces.any(|of| !of.deflection_m.is_empty()),
             Quantity::Force => interfaces.any(|of| !of.force_n.is_empty()),
             // That of a result is refused where it is drawn.
@@ -290,8 +288,9 @@ pub fn motion(
 ) -> Result<Chart, Error> {
     if let Some((name, _)) = runs.iter().find(|(_, run)| !run.holds(quantity)) {
         let missing = match quantity {
-            Quantity::Velocity => "speeds of bodies: expected columns such as v_m_per_s[A1]",
-            Quantity::Acceleration => "accelerations: expected columns such as a_m_per_s2[A1]",
+            Quantity::Velocity | Quantity::Acceleration => {
+                "speeds of bodies: expected columns such as v_m_per_s[A1]"
+            }
             Quantity::Crush => "deflections: expected columns such as deflection_m[A1|A2]",
             _ => "forces of interfaces: expected columns such as force_N[A1|A2]",
         };
@@ -385,7 +384,8 @@ fn lines(
             let parts = match (quantity, body, interface) {
                 (Quantity::Velocity, Some(body), _) => vec![over_time(body.v_m_per_s.clone())],
                 (Quantity::Acceleration, Some(body), _) => {
-                    vec![over_time(filtered(run, body, filter_class, &mut notes))]
+                    let (time_s, a) = filtered(run, body, filter_class, &mut notes);
+                    vec![(Shown::Line, time_s, a)]
                 }
                 (Quantity::Force, _, Some(of)) => vec![over_time(of.force_n.clone())],
                 (Quantity::Crush, _, Some(of)) => crush(of),
@@ -464,9 +464,16 @@ fn axes(quantity: Quantity, lines: &[Line<'_>]) -> (Axis, Axis) {
     (x, y)
 }
 
-/// A body's acceleration, filtered; as it is, and why, where the filter does not take it.
-fn filtered(run: &Motion, body: &BodyMotion, class: u32, notes: &mut Vec<String>) -> Vec<f64> {
-    match cfc::filter_from_rest(class, &run.time_s, &body.a_m_per_s2) {
+/// A body's mean accelerations between the outputs, filtered, with their times; as they are, and why, where the filter does
+/// not take them.
+fn filtered(
+    run: &Motion,
+    body: &BodyMotion,
+    class: u32,
+    notes: &mut Vec<String>,
+) -> (Vec<f64>, Vec<f64>) {
+    let (time_s, a_m_per_s2) = mean_rates(&run.time_s, &body.v_m_per_s);
+    let values = match cfc::filter_from_rest(class, &time_s, &a_m_per_s2) {
         Ok(filtered) => filtered.values,
         Err(error) => {
             let why = match error {
@@ -479,9 +486,10 @@ fn filtered(run: &Motion, body: &BodyMotion, class: u32, notes: &mut Vec<String>
             if !notes.contains(&note) {
                 notes.push(note);
             }
-            body.a_m_per_s2.clone()
+            a_m_per_s2
         }
-    }
+    };
+    (time_s, values)
 }
 
 type Part = (Shown, Vec<f64>, Vec<f64>);

@@ -138,6 +138,13 @@ fn check_limits(limits: &LimitsTable, trains: &[TrainTable]) -> Result<(), Error
             return Err(error.at(KeyPath::of("limits").key(key)));
         }
     }
+    for (key, text) in [("standard", &limits.standard), ("edition", &limits.edition)] {
+        if text.trim().is_empty() {
+            let error =
+                error!(Scenario, "[limits] {key} is empty: state which one the limits are of");
+            return Err(error.at(KeyPath::of("limits").key(key)));
+        }
+    }
     if limits.trains.as_ref().is_some_and(Vec::is_empty) {
         return Err(error!(
             Scenario at "limits.trains",

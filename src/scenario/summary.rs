@@ -1,11 +1,13 @@
 //! A run in numbers: bodies, interfaces, what happened when, limits.
 
+use std::ops::Range;
+
 use serde::Serialize;
 
 use super::sequence::{Event, common_speed_time_s, sequence};
 use super::{CurveInUse, LimitsTable, PLATES, Prepared};
 use crate::multibody::{Interface, InterfaceHistory, Run, STANDARD_GRAVITY_M_PER_S2};
-use crate::signal::cfc;
+use crate::signal::{cfc, mean_rates};
 
 /// A run in numbers.
 #[derive(Serialize)]
@@ -65,7 +67,10 @@ impl BodySummary<'_> {
             Some((from_s, _)) if is_last && self.still_loaded_at_end => {
                 format!("{mean_g:.2} g so far, from {:.0} ms", 1e3 * from_s)
             }
-            Some((from, to)) => format!("{mean_g:.2} g, {:.0} to {:.0} ms", 1e3 * from, 1e3 * to),
+            Some((from, to)) => {
+                let digits = if to - from < 0.01 { 1 } else { 0 };
+                format!("{mean_g:.2} g, {:.digits$} to {:.digits$} ms", 1e3 * from, 1e3 * to)
+            }
             None => format!("{mean_g:.2} g"),
         };
         let main_g = self.main_mean_deceleration_g;
@@ -196,13 +201,31 @@ pub(crate) struct OccupantLimit<'a> {
 
 impl Prepared {
     /// Whether a contact that acts when the run ends, or one that is to come, may change the speed of body `i` by more than the largest so
-    /// far: what it has changed, the bodies that still close with it, and a rebound by as much as both are all that can drive it.
+    /// far: what it has changed, the bodies that still close with it, a neighbour that bodies beyond it throw back, and a rebound by
+    /// as much as all these are all that can drive it.
     fn may_have_larger_contact(&self, run: &Run, i: usize) -> bool {
         let count = self.chain.bodies().len();
         // A wall stands still.
         let speed = |k: usize| run.bodies.get(k).map_or(0.0, |body| body.final_v_m_per_s);
+        let mass_kg =
+            |k: usize| self.chain.bodies().get(k).map_or(f64::INFINITY, |body| body.mass_kg);
         let closing = |k: usize| speed(k) - speed(k + 1);
         let has = |k: usize| k < run.interfaces.len();
+        // What interfaces of loaded bodies store may drive body `k` away, and what closes turn it round. Where forces balance, a
+        // train that is pressed together springs back in many small steps: that is left out.
+        let thrown = |k: usize, beyond: Range<usize>| {
+            let speed_of = |energy_j: f64| (2.0 * energy_j / mass_kg(k)).sqrt();
+            let closing_j = |k: usize| {
+                let closing = closing(k).max(0.0);
+                0.5 * closing * closing / (1.0 / mass_kg(k) + 1.0 / mass_kg(k + 1))
+            };
+            let is_loaded = |k: usize| {
+                run.bodies.get(k).is_some_and(|body| body.running_and_largest_change.0.is_some())
+            };
+            let unsettled = beyond.clone().filter(|k| is_loaded(*k) || is_loaded(k + 1));
+            let stored_j = unsettled.map(|k| run.interfaces[k].stored_at_end_j).sum();
+            speed_of(stored_j) + 2.0 * speed_of(beyond.map(closing_j).sum())
+        };
         let mut behind = i;
         while behind > 0 && closing(behind - 1) > -LEAST_CLOSING_M_PER_S {
             behind -= 1;
@@ -214,8 +237,14 @@ impl Prepared {
         let (running, largest) = run.bodies[i].running_and_largest_change;
         let is_hit = |k: usize| has(k) && closing(k) > LEAST_CLOSING_M_PER_S;
         let goes_on = running.is_some() || i > 0 && is_hit(i - 1) || is_hit(i);
-        let drive = (speed(behind) - speed(i)).max(speed(i) - speed(ahead)).max(0.0);
-        goes_on && 2.0 * (running.unwrap_or(0.0) + drive) > largest
+        let pushed = (speed(behind) - speed(i)).max(speed(i) - speed(ahead));
+        let drive = if goes_on { running.unwrap_or(0.0) + pushed.max(0.0) } else { 0.0 };
+        let back = [
+            (i > 0).then(|| closing(i - 1) + thrown(i - 1, 0..i - 1)),
+            has(i).then(|| closing(i) + thrown(i + 1, i + 1..run.interfaces.len())),
+        ];
+        let back = back.into_iter().flatten().filter(|back| *back > LEAST_CLOSING_M_PER_S);
+        2.0 * back.fold(drive, f64::max) > largest
     }
 
     /// What `run`, a run of this scenario, comes to.
@@ -228,7 +257,7 @@ impl Prepared {
         let of_body = |&i: &usize| {
             let (body, history) = (&bodies[i], &run.bodies[i]);
             let in_g = |a_m_per_s2: f64| a_m_per_s2 / STANDARD_GRAVITY_M_PER_S2;
-            let peak = peak_deceleration(&run.time_s, &history.a_m_per_s2);
+            let peak = peak_deceleration(&run.time_s, &history.v_m_per_s);
             BodySummary {
                 name: &body.name,
                 mass_kg: body.mass_kg
@@ -370,9 +399,10 @@ const LEAST_CLOSING_M_PER_S: f64 = 1e-3;
 /// Class of the filter for decelerations of vehicles.
 const CLASS: u32 = 60;
 
-/// Time in s, and largest filtered deceleration in m/s², in magnitude.
-fn peak_deceleration(time_s: &[f64], a_m_per_s2: &[f64]) -> Option<(f64, f64)> {
-    let filtered = cfc::filter_from_rest(CLASS, time_s, a_m_per_s2).ok()?.values;
+/// Time in s, and largest filtered deceleration in m/s², in magnitude, of the mean ones between the outputs.
+fn peak_deceleration(time_s: &[f64], v_m_per_s: &[f64]) -> Option<(f64, f64)> {
+    let (time_s, a_m_per_s2) = mean_rates(time_s, v_m_per_s);
+    let filtered = cfc::filter_from_rest(CLASS, &time_s, &a_m_per_s2).ok()?.values;
     let pairs = time_s.iter().zip(&filtered);
     pairs.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).map(|(time_s, a)| (*time_s, -a))
 }

@@ -53,6 +53,15 @@ pub fn derivative(time: &[f64], values: &[f64]) -> Vec<f64> {
         .collect()
 }
 
+/// Mean rate of `values` in every interval of `time`, with its middle: whatever happens within an interval counts by
+/// its mean, where samples of a rate would show it as something slower.
+///
+/// `time`: strictly increasing, as many as `values`. Returns one pair less.
+pub(crate) fn mean_rates(time: &[f64], values: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let intervals = time.windows(2).zip(values.windows(2));
+    intervals.map(|(t, v)| (0.5 * (t[0] + t[1]), (v[1] - v[0]) / (t[1] - t[0]))).unzip()
+}
+
 /// Why a history has no value at a time.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error("time {time_s} s lies outside the history ({first_s} s to {last_s} s)")]

@@ -4,7 +4,7 @@
 //! taken as a straight line. Contacts that open and close within a step announce themselves.
 
 /// A span counts while its net force exceeds this, in N, as in finding the contact of an FE run,
-/// if it changes the body's speed by [`LEAST_SHARE`] of the largest change. Without it rounding
+/// if it changes the body's speed by [`LEAST_SHARE`] of the range of its speeds. Without it rounding
 /// would decide: where vehicles touch without closing, what runs ahead of a shock grows from it,
 /// and where neighbours come to press equally, the force dies away without an end. What is back
 /// at the next look has not ended.
@@ -12,10 +12,15 @@ pub(super) const LEAST_N: f64 = 1e3;
 /// Of a light body less counts: what it decelerates by a tenth of g.
 pub(super) const LEAST_M_PER_S2: f64 = 1.0;
 const LEAST_SHARE: f64 = 0.005;
+/// The same of one shorter than [`INTERRUPTION_S`].
+const LEAST_SHARE_OF_SHORT: f64 = 0.05;
 /// By so much a span has to be larger than those before it to be kept, so that few are.
 const LARGER: f64 = 1.1;
 /// Time between looks in s, if steps are not longer.
 pub(in super::super) const LOOK_S: f64 = 0.25e-3;
+/// A pause or a push the other way that is shorter, in s, does not end a contact: vehicles that touch behind a force that begins
+/// above zero are pushed both ways in turn. The half period of a vehicle on its buffers is ten times as long.
+const INTERRUPTION_S: f64 = 4.0 * LOOK_S;
 
 /// A time and the speed of a body at it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -178,14 +183,26 @@ impl Span {
         (self.begin.time_s, self.end.time_s)
     }
 
-    fn goes_on_from(&self, before: &Self) -> bool {
+    fn follows(&self, before: &Self) -> bool {
+        self.begin.time_s - before.end.time_s < INTERRUPTION_S
+    }
+
+    fn is_alike(&self, other: &Self) -> bool {
         let gained = |span: &Self| span.end.v_m_per_s - span.begin.v_m_per_s;
-        let is_alike = match (self.push, before.push) {
+        match (self.push, other.push) {
             // Brakes may slow a body that is pushed forwards.
             (Some(push), Some(other)) => push == other,
-            _ => gained(self) * gained(before) > 0.0,
-        };
-        self.begin.time_s - before.end.time_s < LOOK_S && is_alike
+            _ => gained(self) * gained(other) > 0.0,
+        }
+    }
+
+    fn is_short(&self) -> bool {
+        self.end.time_s - self.begin.time_s < INTERRUPTION_S
+    }
+
+    fn extend(&mut self, by: &Self) {
+        (self.end, self.is_cut) = (by.end, by.is_cut);
+        self.push = self.push.or(by.push);
     }
 
     /// Magnitude of the change of speed.
@@ -201,26 +218,56 @@ impl Span {
 /// Spans of a body that may count.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Spans {
-    /// The last one, which goes on if a push in its direction follows within a look: a contact that chatters is one.
+    /// The last one, which goes on if a push in its direction follows soon: a contact that chatters is one.
     last: Option<Span>,
+    /// A push the other way since then, as long as it is an interruption.
+    aside: Option<Span>,
     closed: Vec<Span>,
     /// The one with the largest change of speed so far.
     largest: Option<Span>,
+    /// Lowest and highest speed at begins and ends.
+    speeds: Option<(f64, f64)>,
 }
 
 impl Spans {
     /// Keeps a span that may count: before it there may be many that do not.
     pub(crate) fn close(&mut self, span: Span) {
+        for Moment { v_m_per_s: v, .. } in [span.begin, span.end] {
+            let (low, high) = self.speeds.unwrap_or((v, v));
+            self.speeds = Some((low.min(v), high.max(v)));
+        }
+        match (&mut self.last, self.aside.take()) {
+            (Some(last), Some(aside)) if span.follows(&aside) && span.is_alike(last) => {
+                last.extend(&span);
+            }
+            (_, Some(mut aside)) if span.follows(&aside) => {
+                aside.extend(&span);
+                self.append(aside);
+            }
+            (_, Some(aside)) => {
+                self.begin_with(aside);
+                self.append(span);
+            }
+            (_, None) => self.append(span),
+        }
+    }
+
+    fn append(&mut self, span: Span) {
         match &mut self.last {
-            Some(last) if span.goes_on_from(last) => {
-                (last.end, last.is_cut) = (span.end, span.is_cut);
-                last.push = last.push.or(span.push);
+            Some(last) if span.follows(last) && span.is_alike(last) => last.extend(&span),
+            // Nothing shows that the end of the run is that of the contact.
+            Some(last) if span.follows(last) && span.is_short() && span.is_cut => {
+                last.extend(&span);
             }
-            last => {
-                if let Some(before) = last.replace(span) {
-                    self.keep(before);
-                }
-            }
+            Some(last) if span.follows(last) && span.is_short() => self.aside = Some(span),
+            _ => self.begin_with(span),
+        }
+    }
+
+    /// The last one has ended.
+    fn begin_with(&mut self, span: Span) {
+        if let Some(before) = self.last.replace(span) {
+            self.keep(before);
         }
     }
 
@@ -235,8 +282,8 @@ impl Spans {
 
     /// All have been closed.
     pub(crate) fn ended(mut self) -> Self {
-        if let Some(last) = self.last.take() {
-            self.keep(last);
+        for span in [self.last.take(), self.aside.take()].into_iter().flatten() {
+            self.keep(span);
         }
         self
     }
@@ -255,14 +302,17 @@ impl Spans {
         self.closed = closed;
     }
 
-    /// Whether a span counts beside the largest so far.
+    /// Whether a span counts beside all that has changed the speed so far.
     fn counts(&self, span: &Span) -> bool {
-        let largest = self.largest.map_or(0.0, |largest| largest.change());
-        span.change() >= LEAST_SHARE * largest && span.end.time_s > span.begin.time_s
+        let range = self.speeds.map_or(0.0, |(low, high)| high - low);
+        let least_share = if span.is_short() { LEAST_SHARE_OF_SHORT } else { LEAST_SHARE };
+        span.change() >= least_share * range && span.end.time_s > span.begin.time_s
     }
 
     pub(crate) fn first(&self) -> Option<&Span> {
-        self.closed.iter().find(|span| self.counts(span))
+        // Where many small ones change the speed there is only the largest of them.
+        let largest = self.largest.as_ref().filter(|span| span.end.time_s > span.begin.time_s);
+        self.closed.iter().find(|span| self.counts(span)).or(largest)
     }
 
     /// The one that changes the speed most, if a smaller one comes before it.
