@@ -1181,6 +1181,28 @@ fn pairs_of_unequal_masses() {
     };
     let crush = |other| predict(&model, &ask(other)).unwrap().max_deflection_m;
     assert!(crush(24e3) < crush(30e3));
+    // Of masses that differ between the runs none is more likely than another.
+    let error = predict(&model, &Query::at(11.0)).map(|_| ()).unwrap_err().to_string();
+    says(&error, "the model needs other_mass_kg, the mass of the other body");
+    assert!(
+        predict(&model, &ask(30e3)).unwrap().warnings.iter().all(|w| w.code.name() != "other_mass")
+    );
+    // That of the body alone leaves the other as it was.
+    let turned: Vec<Case> = cases
+        .iter()
+        .map(|case| {
+            let Masses { body_kg, other_kg } = case.conditions.masses;
+            let mut case = case.clone();
+            case.conditions.masses = Masses { body_kg: other_kg.unwrap(), other_kg: Some(body_kg) };
+            case
+        })
+        .collect();
+    let bodies = train("made", &turned, Choice::Kind(of_parameters())).unwrap();
+    let curve = predict(&bodies, &Query { mass_kg: Some(30e3), ..Query::at(11.0) }).unwrap();
+    assert_eq!(curve.max_deflection_m, crush(30e3));
+    let asked = Query { mass_kg: Some(30e3), ..ask(30e3) };
+    let codes = predict(&bodies, &asked).unwrap().warnings;
+    assert!(codes.iter().any(|w| w.code.name() == "other_mass"), "{codes:?}");
     // The other mass is known to what reads the curve, although all runs have the same two.
     let of_one = |other_kg: f64| -> Vec<Case> {
         let with = |case: &Case| {

@@ -63,6 +63,11 @@ pub(crate) const MASS: &str = "mass_kg";
 /// Masses that differ by less than this share are one: mass scaling and rounding change one design by that much, and no model of
 /// speed alone could take them otherwise.
 pub(crate) const SAME_MASS: f64 = 5e-3;
+
+pub(crate) fn is_same_mass(a_kg: f64, b_kg: f64) -> bool {
+    (a_kg / b_kg - 1.0).abs() <= SAME_MASS
+}
+
 /// The same for other numbers, of which only the rounding is known.
 const SAME_NUMBER: f64 = 1e-9;
 /// The mass of the other body of a pair, where it is not that of the first.
@@ -141,6 +146,12 @@ pub(crate) fn feature_values(
             return error!(
                 Dataset,
                 "the model needs {name}, the mass of the body: give --mass, or --parameter {name}=…"
+            );
+        }
+        if name == OTHER_MASS {
+            return error!(
+                Dataset,
+                "the model needs {name}, the mass of the other body: give --parameter {name}=…"
             );
         }
         error!(

@@ -223,7 +223,8 @@ impl OfOneImpact {
                 km_per_h(meeting_m_per_s)
             ));
         }
-        let now_kg = slots.iter().find(|slot| slot.name == *interface).map(|slot| slot.mass_kg);
+        let now_kg =
+            slots.iter().find(|slot| slot.name == *interface).map(|slot| slot.masses.equal_kg());
         let masses = self.mass_kg.zip(now_kg).filter(|(own_kg, now_kg)| differs(*own_kg, *now_kg));
         if let Some((own_kg, now_kg)) = masses {
             let shown = Shown::mass(own_kg.max(now_kg));
@@ -249,7 +250,7 @@ struct CachedLaw {
 }
 
 /// What decides a law: its curve; role, and whether vehicles are split; speed and mass if a model gives it.
-type LawKey = (String, (u8, bool, u64, u64));
+type LawKey = (String, (u8, bool, [u64; 3]));
 
 /// Laws of models, with the table that each was made for, so that a sweep, whose interfaces close at few different speeds,
 /// makes each once.
@@ -338,7 +339,7 @@ impl<'a> Builder<'a> {
         speed: f64,
     ) -> Result<(Interface, CurveInUse), Error> {
         let (model, scale) = self.model(end.curve)?;
-        let crush = crush_end(model, end, slot.mass_kg, speed, scale)
+        let crush = crush_end(model, end, slot.masses.equal_kg(), speed, scale)
             .map_err(|source| self.no_spring(end.curve, source))?;
         let (stopping, (interface, used)) =
             (crush.stopping.clone(), self.crushed(slot, end.curve, crush)?);
@@ -447,10 +448,14 @@ impl<'a> Builder<'a> {
         let table = &self.scenario.curves[curve];
         let source = self.sources.curves.get(curve);
         let source = source.ok_or_else(|| self.not_read(curve))?;
-        let is_model = matches!(source, CurveSource::Model(_));
-        let of_model = |value: f64| if is_model { value.to_bits() } else { 0 };
-        let key = (slot.role as u8, slot.split, of_model(speed), of_model(slot.mass_kg));
-        let key = (curve.to_string(), key);
+        let (is_model, needs) = match source {
+            CurveSource::Model(model) => {
+                let masses = model.masses_as_trained(slot.masses);
+                (true, [speed, masses.body_kg, masses.other_kg.unwrap_or(0.0)].map(f64::to_bits))
+            }
+            _ => (false, [0; 3]),
+        };
+        let key = (curve.to_string(), (slot.role as u8, slot.split, needs));
         // What belongs to the interface and not to its law.
         let of_law = CurveTable { gap: None, tension: None, damping: None, ..table.clone() };
         let laws = if is_model { &self.sources.laws } else { &self.of_files };

@@ -1,6 +1,7 @@
 //! Layout: the bodies of a scenario in their row, and the places between them.
 
 use super::{CheckedScenario, CrushZone, TrainTable, VehicleTable};
+use crate::curve::Masses;
 use crate::multibody::Body;
 
 /// Bodies from the back of the first train to its nose and on, and what lies between them.
@@ -22,8 +23,8 @@ pub(super) struct Connection<'a> {
     /// Free distance, if the curve's own does not hold.
     pub gap_m: Option<f64>,
     pub role: Role,
-    /// Mass of the vehicle, or of each of two equal vehicles with the same reduced mass.
-    pub mass_kg: f64,
+    /// Mass of the vehicle, or those of two.
+    pub masses: Masses,
     /// Whether a vehicle's crush zone at this place is a body of its own.
     pub split: bool,
 }
@@ -90,22 +91,22 @@ pub(super) fn layout<'a>(scenario: &'a CheckedScenario<'_>) -> Layout<'a> {
     }
     let nose = &first.vehicles[0];
     let contact = &scenario.contact;
-    let (name, role, mass_kg, split) = match (&scenario.wall, scenario.train.get(1)) {
+    let (name, role, masses, split) = match (&scenario.wall, scenario.train.get(1)) {
         (None, Some(second)) => {
             let other = &second.vehicles[0];
             let split = nose.front_zone().or(other.front_zone()).is_some();
             let name = format!("{}|{}", nose.name, other.name);
-            (name, Role::Noses, equal_mass_kg(nose, other), split)
+            (name, Role::Noses, masses(nose, Some(other)), split)
         }
         (wall, _) => {
             let wall = wall.as_ref().map_or("wall", |w| &w.name);
             let name = format!("{}|{wall}", nose.name);
-            (name, Role::Wall, nose.mass.0, nose.front_zone().is_some())
+            (name, Role::Wall, masses(nose, None), nose.front_zone().is_some())
         }
     };
     let gap_m = contact.gap.map(|g| g.0);
     let joint = joint(nose.front_zone(), contact.curve.as_deref());
-    layout.slots.push(Connection { name, joint, gap_m, role, mass_kg, split });
+    layout.slots.push(Connection { name, joint, gap_m, role, masses, split });
     if let Some(second) = scenario.train.get(1) {
         for (i, vehicle) in second.vehicles.iter().enumerate() {
             let is_last = i + 1 == second.vehicles.len();
@@ -131,8 +132,8 @@ fn joint<'a>(end: Option<CrushZone<'a>>, curve: Option<&'a str>) -> ConnectionKi
     }
 }
 
-fn equal_mass_kg(a: &VehicleTable, b: &VehicleTable) -> f64 {
-    2.0 * a.mass.0 * b.mass.0 / (a.mass.0 + b.mass.0)
+fn masses(a: &VehicleTable, b: Option<&VehicleTable>) -> Masses {
+    Masses { body_kg: a.mass.0, other_kg: b.map(|b| b.mass.0) }
 }
 
 impl<'a> Layout<'a> {
@@ -174,7 +175,7 @@ impl<'a> Layout<'a> {
                 },
                 gap_m: Some(0.0),
                 role: Role::Within,
-                mass_kg: vehicle.mass.0,
+                masses: masses(vehicle, None),
                 split: true,
             };
         let mut body = |place: usize, name: &str, mass_kg: f64| {
@@ -205,7 +206,7 @@ impl<'a> Layout<'a> {
             gap_m: ahead.gap.or(train.gap).map(|gap| gap.0),
             joint,
             role: Role::Vehicles,
-            mass_kg: equal_mass_kg(ahead, behind),
+            masses: masses(ahead, Some(behind)),
             split: ahead.rear_zone().or(behind.front_zone()).is_some(),
         });
     }

@@ -11,7 +11,8 @@ use std::sync::Arc;
 use super::layout::{Connection, End, Role};
 use super::{CurveSource, CurveTable as Table, LawName};
 use crate::curve::force_curve::ForceCurveError;
-use crate::curve::{CurveUnloading, Envelope, ForceCurve, ForceKind, Tail};
+use crate::curve::{CurveUnloading, Envelope, ForceCurve, ForceKind, Parameter, Tail};
+use crate::dataset::OTHER_MASS;
 use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{
     Damping, EnvelopeEnd, ForceLaw, Interface, RateFactor, Stopping, Unloading,
@@ -128,10 +129,15 @@ fn of_model(
     speed_m_per_s: f64,
     force: Option<ForceKind>,
 ) -> Result<(ForceCurve, Vec<String>), Error> {
+    let masses = model.masses_as_trained(slot.masses);
+    let mut parameters = table.parameters.clone();
+    if let Some(other_kg) = masses.other_kg.filter(|_| model.other_mass_kg.is_some()) {
+        parameters.entry(OTHER_MASS.into()).or_insert(Parameter::Number(other_kg));
+    }
     let query = Query {
-        mass_kg: Some(slot.mass_kg),
+        mass_kg: Some(masses.body_kg),
         rule: table.max_crush,
-        parameters: table.parameters.clone(),
+        parameters,
         // Inside a train interfaces close far more slowly than any run by itself; that is warned
         // of, but a train without their curves could not run at all.
         extrapolate: true,
@@ -410,12 +416,13 @@ pub(super) fn crush_between(
 ) -> Result<Crush, Error> {
     let (law, at) = crush_curve(model, speed_m_per_s)?;
     // Of two equal masses half is what moves along their deflection.
-    let moved_kg = if slot.role == Role::Wall { slot.mass_kg } else { 0.5 * slot.mass_kg };
+    let mass_kg = slot.masses.equal_kg();
+    let moved_kg = if slot.role == Role::Wall { mass_kg } else { 0.5 * mass_kg };
     let factor = |d: f64| per_crush_force(at.stopped_kg.force_at(d), moved_kg);
     let deflection_m = at.standing_n.deflection_m().to_vec();
     let points = deflection_m.iter().zip(at.standing_n.force_n());
     let force_n = points.map(|(&d, f)| f * scale * factor(d)).collect();
-    let stiffness = model.unloading_n_per_m(speed_m_per_s, slot.mass_kg).map(|k| k * scale);
+    let stiffness = model.unloading_n_per_m(speed_m_per_s, mass_kg).map(|k| k * scale);
     let unloading = CurveUnloading::of(stiffness);
     let curve = ForceCurve::bare(Envelope::new(deflection_m, force_n).map_err(below)?);
     let sensitivity_sqrt_s_per_m = law.sensitivity;

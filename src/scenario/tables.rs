@@ -62,7 +62,7 @@ pub(crate) struct LimitsTable {
 #[cfg_attr(test, derive(schemars::JsonSchema))]
 #[serde(deny_unknown_fields)]
 pub(crate) struct ReferenceTable {
-    /// Solver file with the nodes, such as a nodout; a case.json next to it says how long FE
+    /// Solver file with the nodes, such as a nodout, a binout or a T01; a case.json next to it says how long FE
     /// took.
     pub(crate) file: PathBuf,
     /// Units of the file, such as "mm-t-s".

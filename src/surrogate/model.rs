@@ -19,7 +19,7 @@ use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{ForceKind, Masses};
 use crate::dataset::{
     Feature, MASS, OTHER_MASS, SAME_MASS, SAME_SPEED, TrainingCase, TrainingSet, are_masses,
-    nearest, show_their_crush,
+    is_same_mass, nearest, show_their_crush,
 };
 use crate::error::{Error, error};
 use crate::forest::RegressionForest;
@@ -284,20 +284,55 @@ impl Model {
         self.speed_of_equal_energy(case.speed_m_per_s, self.moved_kg(&case.features))
     }
 
-    /// The mass in kg that moves along the deflections of a run with these features.
-    fn moved_kg(&self, features: &[f64]) -> f64 {
+    /// The masses of a run with these features.
+    fn masses_of(&self, features: &[f64]) -> Masses {
         let of = |name: &str| {
             let at = self.features.iter().position(|feature| feature.parameter == name)?;
             features.get(at).copied()
         };
         let Masses { body_kg, other_kg } = self.masses();
         let other_kg = other_kg.map(|other_kg| of(OTHER_MASS).unwrap_or(other_kg));
-        Masses { body_kg: of(MASS).unwrap_or(body_kg), other_kg }.effective_kg()
+        Masses { body_kg: of(MASS).unwrap_or(body_kg), other_kg }
     }
 
-    /// Whether the mass is among its parameters.
-    pub(super) fn has_mass(&self) -> bool {
-        self.features.iter().any(|feature| feature.parameter == MASS)
+    /// The mass in kg that moves along the deflections of such a run.
+    fn moved_kg(&self, features: &[f64]) -> f64 {
+        self.masses_of(features).effective_kg()
+    }
+
+    /// Whether a mass, [`MASS`] or [`OTHER_MASS`], is among its parameters.
+    pub(super) fn has(&self, mass: &str) -> bool {
+        self.features.iter().any(|feature| feature.parameter == mass)
+    }
+
+    /// Whether masses are among its parameters, and the two bodies of a run differ in them.
+    pub(super) fn is_of_unequal_masses(&self) -> bool {
+        let differ = |Masses { body_kg, other_kg }: Masses| {
+            other_kg.is_some_and(|other_kg| !is_same_mass(body_kg, other_kg))
+        };
+        (self.has(MASS) || self.has(OTHER_MASS))
+            && self.cases.iter().any(|case| differ(self.masses_of(&case.features)))
+    }
+
+    /// The masses at an interface as a query has them: in the order that is nearer to one of the runs if these are of unequal bodies,
+    /// else of two equal bodies with the same reduced mass.
+    pub(crate) fn masses_as_trained(&self, masses: Masses) -> Masses {
+        let equal_kg = masses.equal_kg();
+        let equal = Masses { body_kg: equal_kg, other_kg: masses.other_kg.map(|_| equal_kg) };
+        let Some(other_kg) = masses.other_kg.filter(|_| self.is_of_unequal_masses()) else {
+            return equal;
+        };
+        let swapped = Masses { body_kg: other_kg, other_kg: Some(masses.body_kg) };
+        let off = |of: Masses| {
+            let from = |run: Masses| {
+                let ratio = |a: f64, b: f64| (a / b).max(b / a);
+                let other = run.other_kg.zip(of.other_kg).map_or(1.0, |(a, b)| ratio(a, b));
+                ratio(run.body_kg, of.body_kg).max(other)
+            };
+            let runs = self.cases.iter().map(|case| from(self.masses_of(&case.features)));
+            runs.fold(f64::INFINITY, f64::min)
+        };
+        if off(swapped) < off(masses) { swapped } else { masses }
     }
 
     /// The band of a force at a query's place, or why there is none although speeds were left out.

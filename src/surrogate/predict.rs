@@ -22,7 +22,7 @@ use super::query::{Query, ResolvedQuery};
 use super::warning::is_unlike;
 use super::{Model, QueryPoint, Warning};
 use crate::curve::{EnergyAudit, Envelope, ForceCurve, ForceKind, is_beyond};
-use crate::dataset::{OTHER_MASS, grid, nearest};
+use crate::dataset::{MASS, OTHER_MASS, grid, nearest};
 use crate::error::{Error, error};
 
 /// Points of a predicted curve besides (0, 0), as in the reference data.
@@ -291,7 +291,7 @@ impl<'a> Prediction<'a> {
             && (model.contains(&asked.at()) || model.fastest_is_truncated());
         let ratio = asked.mass_kg / model.masses().effective_kg();
         let without_band = match () {
-            () if is_unlike(ratio) && !model.has_mass() => {
+            () if is_unlike(ratio) && !(model.has(MASS) || model.has(OTHER_MASS)) => {
                 Some("the mass is nowhere near the training runs'")
             }
             () if is_beyond => {

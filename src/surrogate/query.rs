@@ -10,7 +10,7 @@ use super::warning::{Warning, is_far_outside, outside_of};
 use super::{CaseCurve, Model, QueryPoint};
 use crate::curve::body::rebound_stiffness_n_per_m;
 use crate::curve::{EnergyAudit, Envelope, Masses, Parameter, above_0};
-use crate::dataset::{MASS, OTHER_MASS, SAME_MASS, feature_values};
+use crate::dataset::{MASS, OTHER_MASS, feature_values, is_same_mass};
 use crate::error::{Error, ErrorCode, KeyPath, error};
 use crate::unit::Speed;
 
@@ -113,9 +113,11 @@ impl<'a> ResolvedQuery<'a> {
             above_0("the mass", mass).map_err(|e| e.coded_as(ErrorCode::Prediction))?;
         }
         let asked_kg = query.mass_kg.or(as_parameter);
+        let is_unequal = model.is_of_unequal_masses();
         let masses = match asked_kg {
             Some(mass) => {
-                let other_kg = model.other_mass_kg.map(|_| other.unwrap_or(mass));
+                let usual = |trained| if is_unequal { trained } else { mass };
+                let other_kg = model.other_mass_kg.map(|kg| other.unwrap_or(usual(kg)));
                 Masses { body_kg: mass, other_kg }
             }
             None => Masses {
@@ -126,7 +128,8 @@ impl<'a> ResolvedQuery<'a> {
         if let Some(mass) = asked_kg {
             parameters.insert(MASS.into(), Parameter::Number(mass));
         }
-        if let Some(other) = masses.other_kg {
+        // What differs between the runs has to be stated.
+        if let Some(other) = masses.other_kg.filter(|_| !(is_unequal && model.has(OTHER_MASS))) {
             parameters.entry(OTHER_MASS.into()).or_insert(Parameter::Number(other));
         }
         let known = |name: &str| {
@@ -149,7 +152,7 @@ impl<'a> ResolvedQuery<'a> {
         let features = feature_values(&model.features, &parameters)
             .map_err(|e| e.coded_as(ErrorCode::Prediction).at_key("parameters"))?;
         let mass_kg = masses.effective_kg();
-        let same_mass = (mass_kg / model.masses().effective_kg() - 1.0).abs() <= SAME_MASS;
+        let same_mass = is_same_mass(mass_kg, model.masses().effective_kg());
         let kinetic_energy_j =
             masses.kinetic_energy_j(Speed { m_per_s: v, kind: model.speed_kind });
         Ok(Self { model, v, masses, mass_kg, same_mass, parameters, features, kinetic_energy_j })
@@ -239,7 +242,15 @@ impl<'a> ResolvedQuery<'a> {
         if unloading.is_none() {
             warnings.push(Warning::no_unloading());
         }
-        if !self.model.has_mass() && !self.same_mass {
+        let trained = self.model.masses();
+        let others = self.masses.other_kg.zip(trained.other_kg);
+        let is_as_trained = match (self.model.has(MASS), self.model.has(OTHER_MASS)) {
+            (false, false) => self.same_mass,
+            (true, true) => true,
+            (true, false) => others.is_none_or(|(a, b)| is_same_mass(a, b)),
+            (false, true) => is_same_mass(self.masses.body_kg, trained.body_kg),
+        };
+        if !is_as_trained {
             warnings.push(Warning::other_mass(self.masses, self.model.masses()));
         }
         if (energy - 1.0).abs() > EnergyAudit::TOLERANCE {
