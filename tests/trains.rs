@@ -322,6 +322,25 @@ fn the_train_set_is_compared_with_fe() {
     says(&error, "the scenario has no [reference]");
 }
 
+/// Two faster trains in FE, to which nothing was tuned, by the ends of the vehicles, which a train has if its models know them.
+#[test]
+fn faster_trains_follow_fe() {
+    let demo = demo_folder();
+    let demo = demo.path();
+    let text = std::fs::read_to_string(demo.join("train-set.toml")).unwrap();
+    for (v, speed, least) in [(48, "24km/h", 0.010), (60, "30km/h", 0.0045)] {
+        let text = text.replace("18km/h\"   #", &format!("{speed}\"   #"));
+        let text = text.replace("36kmh/nodout", &format!("{v}kmh/crashT01"));
+        std::fs::write(demo.join("fast.toml"), text).unwrap();
+        let result =
+            parsed(&crumple_ok(demo, "compare --train fast.toml --nsdm-seeds 0 --json -q"));
+        let row = result["rows"].as_array().unwrap().iter().find(|r| r["method"] == "split_ends");
+        let error = row.unwrap()["mean_velocity_l1"].as_f64().unwrap();
+        assert!(error <= least, "{v} km/h: {error}");
+        assert!(!result["warnings"].to_string().contains("FE's record ends"), "{result}");
+    }
+}
+
 /// FE's trains may go either way, reach the contact between two states, and have a gap before it or crush zones of their own: what is
 /// written of a run of crumple is that run.
 #[test]
@@ -1522,6 +1541,57 @@ fn a_contact_that_chatters_has_a_mean_deceleration() {
     assert!((mean(3) / mean(2) - 1.0).abs() < 0.02, "{} and {}", mean(3), mean(2));
     let over = run["summary"]["limits"].to_string();
     assert!(over.contains("B2"), "{over}");
+}
+
+/// Three vehicles that are pushed as one, behind forces that begin at 1 MN: 1.43 g over 120 ms, whatever the step, and peaks
+/// (CFC 60) of 2.1 g, as 0.747 MN give to 36 t, whatever the outputs.
+#[test]
+fn vehicles_that_rattle_are_over_no_limit() {
+    let text = |settings: &str| {
+        format!(
+            "[run]\nduration = \"400ms\"\n{settings}\n[curves]\n\
+             nose = {{ stages = [ {{ stroke = \"115mm\", to = \"1.34MN\" }} ], unloading = \"20MN/m\" }}\n\
+             inner = {{ stages = [ {{ stroke = \"66mm\", from = \"1MN\" }}, {{ stroke = \"481mm\", from = \"1.7MN\" }} ], unloading = \"40MN/m\" }}\n\
+             [[train]]\nname = \"A\"\nspeed = \"5km/h\"\nvehicles = [ {{ name = \"A1\", mass = \"80t\" }} ]\n\
+             [[train]]\nname = \"B\"\nspeed = \"0km/h\"\ninner = \"inner\"\n\
+             vehicles = [ {{ name = \"B1\", mass = \"12t\" }}, {{ name = \"B2\", mass = \"12t\" }}, {{ name = \"B3\", mass = \"12t\" }} ]\n\
+             [contact]\ncurve = \"nose\"\n[limits]\nstandard = \"X\"\nedition = \"1\"\nmean_deceleration_g = 3.2\n"
+        )
+    };
+    for settings in [
+        "output_interval = \"0.1ms\"",
+        "output_interval = \"1ms\"",
+        "output_interval = \"0.75ms\"\nstep = \"0.02ms\"",
+        "output_interval = \"0.75ms\"\nstep = \"0.005ms\"",
+        "output_interval = \"0.75ms\"\nmethod = \"fourth_order\"",
+    ] {
+        let summary = &run(&text(settings))["summary"];
+        assert_eq!(summary["limits"]["over"], json!([]), "{settings}");
+        for body in &summary["bodies"].as_array().unwrap()[1..] {
+            let in_g = |key: &str| body[key].as_f64().unwrap();
+            let (mean, peak) = (in_g("moving_mean_deceleration_g"), in_g("peak_deceleration_g"));
+            assert!((mean + 1.43).abs() < 0.02, "{settings}: {body}");
+            assert!((peak + 2.11).abs() < 0.12, "{settings}: {body}");
+        }
+    }
+}
+
+/// A neighbour that has flown away meets a heavy vehicle and comes back: 2.3 g until 89 ms, 4.6 g from 187 to 278 ms.
+#[test]
+fn a_vehicle_whose_neighbour_comes_back_is_not_judged() {
+    let text = "[run]\nduration = \"100ms\"\n[curves]\n\
+        nose = { stages = [ { stroke = \"600mm\", to = \"12MN\" } ], law = \"elastic\" }\n\
+        [[train]]\nname = \"A\"\nspeed = \"18km/h\"\nvehicles = [ { name = \"A1\", mass = \"80t\" } ]\n\
+        [[train]]\nname = \"B\"\nspeed = \"0km/h\"\ninner = \"nose\"\ngap = \"500mm\"\n\
+        vehicles = [ { name = \"B1\", mass = \"20t\" }, { name = \"B2\", mass = \"400t\" } ]\n\
+        [contact]\ncurve = \"nose\"\n\
+        [limits]\nstandard = \"X\"\nedition = \"1\"\nmean_deceleration_g = 4.0\ntrains = [ \"A\" ]\n";
+    for (duration, over, unknown) in
+        [("100ms", json!([]), json!(["A1"])), ("600ms", json!(["A1"]), json!([]))]
+    {
+        let limits = &run(&text.replace("100ms", duration))["summary"]["limits"];
+        assert_eq!((&limits["over"], &limits["unknown"]), (&over, &unknown), "{duration}");
+    }
 }
 
 /// Brakes slow a body that the force of its neighbour pushes forwards for some milliseconds: the pulse before and the one after are two.

@@ -181,7 +181,8 @@ fn compared(
     let time_s = &fe.time_s[..states];
     let mut warnings = fe.warnings.clone();
     let interval_s = time_s[states - 1] - time_s[states - 2];
-    if until_s < f64::MAX && until_s > time_s[states - 1] + interval_s {
+    let is_whole = states == fe.time_s.len();
+    if is_whole && until_s < f64::MAX && until_s > time_s[states - 1] + interval_s {
         warnings.push(format!(
             "reference: FE's record ends at {}, before until",
             milliseconds(time_s[states - 1])
@@ -301,7 +302,7 @@ impl FeTrain {
             components: Some(vec![reference.component.clone()]),
             ..Selection::all()
         };
-        let read = solver::read(&file, None, &selection).map_err(|error| {
+        let mut sections = solver::read_sections(&file, None, &selection).map_err(|error| {
             // Ids were selected in the order of the nodes.
             let mut nodes = reference.nodes.keys().enumerate();
             let node = nodes.find(|(k, _)| *error.key() == KeyPath::of("ids").item(*k));
@@ -312,6 +313,9 @@ impl FeTrain {
             };
             error.at(KeyPath::of("reference").then(key))
         })?;
+        // Of a binary file; a text file has one section.
+        let of_nodes = sections.iter().position(|section| section.section == "nodout");
+        let read = sections.swap_remove(of_nodes.unwrap_or(0));
         let units = reference.units;
         let contact_s = reference.contact.map_or(0.0, |t| t.0);
         let first = read.time.iter().take_while(|&&t| t * units.time_s < contact_s).count();
