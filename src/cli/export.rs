@@ -63,7 +63,7 @@ pub(super) struct Which {
     /// Speeds of a model's curves, of a database's cases, or of a measured curve, with units; repeated or separated by commas
     #[arg(long, value_parser = speed_m_per_s, value_delimiter = ',', allow_hyphen_values = true)]
     pub speed: Vec<f64>,
-    /// Mass of a model's body, or of each body of a pair, with its unit (default: the training runs')
+    /// Mass of a model's body, or of each body of a pair (the first, if masses differ between the runs), with its unit (default: the training runs')
     #[arg(long, value_parser = mass_kg, allow_hyphen_values = true)]
     pub mass: Option<f64>,
     /// Rule for a model's maximum crush [default: the model's own]

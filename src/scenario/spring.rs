@@ -11,8 +11,7 @@ use std::sync::Arc;
 use super::layout::{Connection, End, Role};
 use super::{CurveSource, CurveTable as Table, LawName};
 use crate::curve::force_curve::ForceCurveError;
-use crate::curve::{CurveUnloading, Envelope, ForceCurve, ForceKind, Parameter, Tail};
-use crate::dataset::OTHER_MASS;
+use crate::curve::{CurveUnloading, Envelope, ForceCurve, ForceKind, Tail};
 use crate::error::{Error, ErrorCode, error};
 use crate::multibody::{
     Damping, EnvelopeEnd, ForceLaw, Interface, RateFactor, Stopping, Unloading,
@@ -129,20 +128,15 @@ fn of_model(
     speed_m_per_s: f64,
     force: Option<ForceKind>,
 ) -> Result<(ForceCurve, Vec<String>), Error> {
-    let masses = model.masses_as_trained(slot.masses);
-    let mut parameters = table.parameters.clone();
-    if let Some(other_kg) = masses.other_kg.filter(|_| model.other_mass_kg.is_some()) {
-        parameters.entry(OTHER_MASS.into()).or_insert(Parameter::Number(other_kg));
-    }
     let query = Query {
-        mass_kg: Some(masses.body_kg),
         rule: table.max_crush,
-        parameters,
+        parameters: table.parameters.clone(),
         // Inside a train interfaces close far more slowly than any run by itself; that is warned
         // of, but a train without their curves could not run at all.
         extrapolate: true,
         ..Query::at(speed_m_per_s)
-    };
+    }
+    .between(model, slot.masses);
     let force = force.unwrap_or(model.force_kind);
     let (curve, warnings) =
         predict_driving(model, &query, force, table.band, slot.split).map_err(predict_error)?;

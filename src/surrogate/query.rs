@@ -24,7 +24,7 @@ const SEPARATION_SPEED_EXPONENT: f64 = 0.25;
 pub struct Query {
     /// Speed before contact in m/s, of the model's kind.
     pub speed_m_per_s: f64,
-    /// Mass of the body, or of each body of a pair; the training runs' if absent.
+    /// Mass of the body, or of each body of a pair (the first, if masses differ between the runs); the training runs' if absent.
     pub mass_kg: Option<f64>,
     /// How the maximum crush is found; the model's own way if absent.
     pub rule: Option<MaxCrushRule>,
@@ -52,6 +52,15 @@ impl Query {
     /// The same with a rule for the maximum crush.
     pub fn with_rule(self, rule: MaxCrushRule) -> Self {
         Self { rule: Some(rule), ..self }
+    }
+
+    /// The same at an interface between these masses, as [`Model::masses_as_trained`] has them.
+    pub(crate) fn between(mut self, model: &Model, masses: Masses) -> Self {
+        let Masses { body_kg, other_kg } = model.masses_as_trained(masses);
+        if let Some(other_kg) = other_kg.filter(|_| model.other_mass_kg.is_some()) {
+            self.parameters.entry(OTHER_MASS.into()).or_insert(Parameter::Number(other_kg));
+        }
+        Self { mass_kg: Some(body_kg), ..self }
     }
 
     /// The runs of a model that have the parameters of the query: all, if it sees speeds alone.
