@@ -83,6 +83,9 @@ fn other_tools_read_the_exported_points() {
     let here = folder.path();
     with_points(here, "spike.json", &spike(401));
     with_points(here, "few.json", &spike(40));
+    // Short steep flanks between long intervals.
+    let flanks = [(0.0, 0.0), (0.008, 6e6), (0.009, 8e5), (0.2, 1.5e6), (0.201, 3.5e6)];
+    with_points(here, "flanks.json", &[&flanks[..], &[(0.205, 9e5), (0.8, 2.4e6)]].concat());
     let recorded = [
         "export",
         "curves.h5",
@@ -96,7 +99,9 @@ fn other_tools_read_the_exported_points() {
     crumple_ok(here, &recorded);
     // Of a slow impact all points lie close together.
     crumple_ok(here, "predict vehicle.model --speed 5km/h -o slow.json");
-    for curve in ["lead50.json", "slow.json", "spike.json", "few.json", "recorded.json"] {
+    for curve in
+        ["lead50.json", "slow.json", "spike.json", "few.json", "flanks.json", "recorded.json"]
+    {
         for (file, more) in FILES {
             export(here, curve, file, more);
         }
@@ -127,9 +132,11 @@ fn other_tools_read_the_exported_points() {
                 assert!(of("akima").abs() < 1e-3, "{curve} {name}: energy, {seen}");
                 assert!(of("cubic").abs() < 1e-3, "{curve} {name}: energy, {seen}");
                 assert!(of("points") >= 200.0);
-                // Neither pulls before the contact.
-                let before = |spline: usize| seen["before"][spline].as_f64().unwrap();
-                assert!(before(0) < 5e-3 && before(1) < 5e-3, "{curve} {name}: {seen}");
+                // Neither pulls before the contact, nor overshoots.
+                for (place, cubic) in [("before", 5e-3), ("over", 1.5e-2)] {
+                    let share = |spline: usize| seen[place][spline].as_f64().unwrap();
+                    assert!(share(0) < 5e-3 && share(1) < cubic, "{curve} {name}: {seen}");
+                }
             }
         }
     }

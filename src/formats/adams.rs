@@ -58,7 +58,7 @@ struct Spline<'a> {
 
 impl<'a> Spline<'a> {
     fn of(curve: &'a ExportCurve, units: UnitSystem, id: u32) -> Result<Self, Error> {
-        let loading = for_splines(&curve.loading)?;
+        let loading = for_splines(&curve.loading, curve.predicted.peak_force_n())?;
         // The first as close to the kink at the contact as on its other side, each further one twice as far: otherwise a spline would pull.
         let first_m = loading.deflection_m()[1];
         let reach_m = GUARDED * loading.end_m();

@@ -121,35 +121,54 @@ pub(crate) fn set_apart(curve: &Envelope) -> Result<Envelope, Error> {
 
 /// Minimum number of points of a table that splines go through.
 const FEWEST: usize = 200;
-/// A kink is fenced by two points at this share of the intervals beside it.
-const FENCE: f64 = 0.05;
 /// A change of the force's slope over an interval that is a kink, as a share of the peak force.
 const KINK: f64 = 0.02;
+/// The first points of a fence are so close to their kink that its change of slope is this share of the peak force from there: an
+/// Akima spline deviates by 4/27 of it, whichever slope it takes at the kink.
+const NEAR: f64 = 0.03;
+/// They are at most at this share of the shorter interval, and no point of a fence is beyond the second share of its interval.
+const CLOSE: [f64; 2] = [0.25, 0.45];
+/// Each further point, twice as far from the kink, leaves two thirds of a cubic spline's swing; below this share of the peak force,
+/// as the change of slope over the interval, it may be left.
+const SWING: f64 = 0.1;
 
-/// The same function with more points, so that Akima and cubic splines through them keep its
-/// energy: at least 200, and one close to each side of a kink, where a spline would overshoot.
-pub(crate) fn for_splines(curve: &Envelope) -> Result<Envelope, Error> {
+/// The same function with more points, so that Akima and cubic splines through them keep its energy and hardly overshoot: at
+/// least 200, and fences beside each kink. These begin equally close on both sides, since beside a wide interval a spline would
+/// carry the slope of a short steep flank far into it. `peak_n` is the largest force without the tail.
+pub(crate) fn for_splines(curve: &Envelope, peak_n: f64) -> Result<Envelope, Error> {
     let (d, f) = (curve.deflection_m(), curve.force_n());
+    let last = d.len() - 2;
     let widest_m = curve.end_m() / FEWEST as f64;
+    let interval_m = |i: usize| (d[i + 1] - d[i]).min(widest_m);
     let slope = |i: usize| (f[i + 1] - f[i]) / (d[i + 1] - d[i]);
-    let mut deflection_m = vec![0.0];
-    for i in 0..d.len() - 1 {
+    let mut deflection_m = d.to_vec();
+    for i in 0..=last {
         let step = d[i + 1] - d[i];
-        let is_kink = |k: usize| {
-            let is_kink = k == 0
-                || k + 1 == d.len()
-                || (slope(k) - slope(k - 1)).abs() * step > KINK * curve.peak_force_n();
-            is_kink && FENCE * step > 2.0 * DISTINCT * d[i + 1]
-        };
-        if is_kink(i) {
-            deflection_m.push(d[i] + FENCE * step);
-        }
         let parts = (step / widest_m).ceil().max(1.0) as usize;
         deflection_m.extend((1..parts).map(|p| d[i] + step * p as f64 / parts as f64));
-        if is_kink(i + 1) {
-            deflection_m.push(d[i + 1] - FENCE * step);
+    }
+    for (k, &kink_m) in d.iter().enumerate() {
+        let beside = [k.checked_sub(1), (k <= last).then_some(k)];
+        let [before, after] = beside.map(|i| i.map_or(0.0, slope));
+        let change = (after - before).abs();
+        let widths = || beside.into_iter().flatten().map(interval_m);
+        if change * widths().fold(0.0, f64::max) <= KINK * peak_n {
+            continue;
         }
-        deflection_m.push(d[i + 1]);
+        let shorter_m = widths().fold(f64::INFINITY, f64::min);
+        let first_m = (CLOSE[0] * shorter_m).min(NEAR * peak_n / change);
+        let first_m = first_m.max(2.0 * DISTINCT * kink_m);
+        for (i, sign) in beside.into_iter().zip([-1.0, 1.0]) {
+            let Some(i) = i else { continue };
+            let (mut off_m, mut swing_n) = (first_m, change * interval_m(i));
+            while off_m < CLOSE[1] * interval_m(i) {
+                deflection_m.push(kink_m + sign * off_m);
+                (off_m, swing_n) = (2.0 * off_m, swing_n / 1.5);
+                if swing_n < SWING * peak_n {
+                    break;
+                }
+            }
+        }
     }
     deflection_m.sort_by(f64::total_cmp);
     deflection_m.dedup_by(|next, d| *next <= *d * (1.0 + DISTINCT));
@@ -319,10 +338,27 @@ mod tests {
     #[test]
     fn more_points_are_the_same_function() {
         let coarse = Envelope::new(vec![0.0, 0.01, 0.02, 1.0], vec![0.0, 6e6, 1e6, 1e6]).unwrap();
-        let fine = for_splines(&coarse).unwrap();
+        let fine = for_splines(&coarse, 6e6).unwrap();
         assert!(fine.deflection_m().len() >= 200);
         assert!((fine.work() / coarse.work() - 1.0).abs() < 1e-12);
         assert_eq!(fine.peak_force_n(), 6e6);
+    }
+
+    /// A flank of 2 mm between long intervals, and a jump.
+    #[test]
+    fn fences_are_equally_close_on_both_sides_of_a_kink() {
+        let d = vec![0.0, 0.01, 0.4, 0.402, 0.6, 0.6 * (1.0 + DISTINCT), 0.8];
+        let flank = Envelope::new(d, vec![0.0, 1.5e6, 1.5e6, 8e5, 8e5, 3e6, 3e6]).unwrap();
+        let fine = for_splines(&flank, 3e6).unwrap();
+        let d = fine.deflection_m();
+        for kink in [0.01, 0.4, 0.402] {
+            let at = d.iter().position(|d| *d == kink).unwrap();
+            let sides = [d[at] - d[at - 1], d[at + 1] - d[at], d[at + 2] - d[at + 1]];
+            assert!((sides[1] / sides[0] - 1.0).abs() < 1e-9, "{kink}: {sides:?}");
+            assert!(sides[2] < 1.1 * sides[1], "{kink}: {sides:?}");
+        }
+        assert!(d.iter().any(|d| (0.6 - 1e-7..0.6).contains(d)), "beside the jump");
+        assert!(d.len() < 300, "{}", d.len());
     }
 
     #[test]

@@ -128,6 +128,7 @@ for file in sys.argv[2:]:
         assert (numpy.diff(x) > 0).all(), f"{name}: equal abscissas"
         fine = numpy.unique(numpy.concatenate([numpy.linspace(0, end, 200_001), x[(x > 0) & (x < end)]]))
         ahead = numpy.linspace(min(x[0], 0), 0, 100_001)
+        splines = (Akima1DInterpolator, CubicSpline)
         of = lambda values: numpy.trapezoid(values, fine) / energy - 1
         found[name] = {
             "force": float(abs(numpy.interp(at, x, y) - expected).max() / force.max()),
@@ -136,6 +137,7 @@ for file in sys.argv[2:]:
             "cubic": float(of(CubicSpline(x, y)(fine))),
             "points": len(x),
             "beyond": float(x[-1] / end),
-            "before": [float(abs(spline(x, y)(ahead)).max() / force.max()) for spline in (Akima1DInterpolator, CubicSpline)],
+            "before": [float(abs(spline(x, y)(ahead)).max() / force.max()) for spline in splines],
+            "over": [float(abs(spline(x, y)(fine) - numpy.interp(fine, x, y)).max() / force.max()) for spline in splines],
         }
 json.dump(found, sys.stdout)
