@@ -469,6 +469,45 @@ fn channels_of_an_earlier_record_are_named() {
     }
 }
 
+/// What OpenRadioss' starter and LS-DYNA demand of a deck.
+#[test]
+fn decks_suit_their_solvers() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let text = |path: &str| fs::read_to_string(here.join(path)).unwrap();
+    for units in ["mm-t-s", "m-kg-s", "cm-g-us", "SI"] {
+        let recorded = " --group lead-car-wall --case 48kmh";
+        for (input, case) in [("lead50.json", ""), ("curves.h5", recorded)] {
+            let to = "--to radioss --deck -q -o deck --units";
+            crumple_ok(here, &format!("export {input}{case} {to} {units}"));
+            let name = entries(&here.join("deck")).into_iter().find(|n| n.ends_with("_0000.rad"));
+            let deck = text(&format!("deck/{}", name.unwrap()));
+            fs::remove_dir_all(here.join("deck")).unwrap();
+            let ids = deck.lines().filter(|line| line.starts_with("/TH/"));
+            let ids: Vec<&str> = ids.filter_map(|line| line.rsplit('/').next()).collect();
+            assert_eq!(ids, ["1", "2"], "numbers are unique across types");
+            let after = |key: &str| deck.split(key).nth(1).unwrap().lines().skip(1);
+            let numbers = |line: &str| -> Vec<f64> {
+                line.split_whitespace().map_while(|n| n.parse().ok()).collect()
+            };
+            let points = after("/FUNCT/").skip(2).map(numbers).take_while(|p| p.len() == 2);
+            let points: Vec<Vec<f64>> = points.collect();
+            let slopes = points.windows(2).map(|w| (w[1][1] - w[0][1]) / (w[1][0] - w[0][0]));
+            let steepest = slopes.fold(0.0, f64::max);
+            let k1 = after("#                 K1").next().map(numbers).unwrap()[0];
+            assert!(
+                points.len() > 100 && (1.0..1.0001).contains(&(k1 / steepest)),
+                "{units} {input}: {k1} {steepest}"
+            );
+        }
+    }
+    for (material, force) in [("s08", "DEFORC"), ("mat121", "ELOUT")] {
+        export(here, "lead50.json", "m.k", &["--deck", "--material", material]);
+        assert!(text("m.k").contains(&format!("*DATABASE_{force}\n")), "{material}");
+        assert_eq!(text("m.k").contains("*DATABASE_HISTORY_BEAM\n         1\n"), force == "ELOUT");
+    }
+}
+
 /// pyisomme reads the channels of a case, and those of a multi-body run.
 #[test]
 #[ignore = "needs the Python clients (tests/run installs them)"]

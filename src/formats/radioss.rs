@@ -93,9 +93,16 @@ fn property(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u32) {
     let [zero, one] = [0.0, 1.0].map(nine_digits);
     // A spring needs its own mass: a millionth of the body's.
     let mass = nine_digits(1e-6 * curve.predicted.mass_kg / units.0.mass_kg);
-    // With a softer K1 the solver would cut the rises that are steeper, and their energy.
-    let stiffness = curve.stiffness_n_per_m().max(curve.loading.max_slope());
-    let stiffness = nine_digits(units.stiffness(stiffness));
+    // With a softer K1 the solver would cut the rises that are steeper, and their energy. Its starter compares with the
+    // points as they are written, to the last digit.
+    let written = |text: String| text.parse::<f64>().unwrap_or(f64::NAN);
+    let own = written(nine_digits(units.stiffness(curve.stiffness_n_per_m())));
+    let points = curve.deflection_m().iter().zip(curve.force_n());
+    let points: Vec<(f64, f64)> =
+        points.map(|(d, f)| (written(units.length(*d)), written(units.force(*f)))).collect();
+    let slopes = points.windows(2).map(|w| (w[1].1 - w[0].1) / (w[1].0 - w[0].0));
+    let steepest = slopes.fold(0.0, f64::max);
+    let stiffness = nine_digits(if steepest > own { steepest * (1.0 + 1e-8) } else { own });
     line!(lines, "/PROP/TYPE4/{id}\n{}", title(&curve.headline(), TITLE_WIDTH));
     line!(lines, "#               MASS                               sens_ID    Isflag     Ileng");
     line!(lines, "{mass:>20}{:>30}         0         0         0", "");
@@ -148,10 +155,11 @@ fn model(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u32) {
     let along = usize::from(curve.other_mass_kg().is_none());
     for (node, along) in [(1, along), (2, 0)] {
         line!(lines, "/BCS/{node}\nguided along x\n#  Tra rot   skew_ID  grnod_ID");
+    // Numbers of such groups are unique across types.
         line!(lines, "   {along}11 111         0{node:>10}");
     }
     line!(lines, "/TH/NODE/1\nnode\n#      var\nDEF\n         1\n         2");
-    line!(lines, "/TH/SPRING/1\nspring\n#      var\nDEF\n         1\n/END");
+    line!(lines, "/TH/SPRING/2\nspring\n#      var\nDEF\n         1\n/END");
 }
 
 fn engine(curve: &ExportCurve, units: InUnits, stem: &str) -> Vec<u8> {

@@ -259,7 +259,12 @@ pub(crate) fn write_deck(
     line!(lines, "*TITLE\n{}", title(&format!("{} on {text}", curve.bodies()), TITLE_WIDTH));
     line!(lines, "*CONTROL_TERMINATION\n$#  endtim\n{:>10}", fixed(end));
     line!(lines, "*CONTROL_TIMESTEP\n$#  dtinit    tssfac\n       0.0       0.1");
-    for file in ["NODOUT", "DEFORC", "GLSTAT"] {
+    // LS-DYNA writes a beam's force to elout, for the elements that are named.
+    let (forces, element) = match material {
+        Material::S08 | Material::S06 => ("DEFORC", DISCRETE_ELEMENT),
+        Material::Mat121 => ("ELOUT", BEAM_ELEMENT),
+    };
+    for file in ["NODOUT", forces, "GLSTAT"] {
         line!(lines, "*DATABASE_{file}\n{:>10.3e}", end / NUMBER_OF_STATES);
     }
     line!(lines, "*DATABASE_HISTORY_NODE\n         1         2\n*NODE");
@@ -268,10 +273,7 @@ pub(crate) fn write_deck(
     }
     line!(lines, "*PART\n{}", title(&text, TITLE_WIDTH));
     line!(lines, "$#     pid     secid       mid\n         1         1{material_id:>10}");
-    match material {
-        Material::S08 | Material::S06 => *lines += DISCRETE_ELEMENT,
-        Material::Mat121 => *lines += BEAM_ELEMENT,
-    }
+    *lines += element;
     masses(lines, curve, units);
     supports(lines, curve, units);
 }
@@ -288,8 +290,10 @@ $#   eid     pid      n1      n2     vid               s
        1       1       1       2       0             1.0
 ";
 
-/// Section and element of MAT_121: ELFORM 6 is a discrete beam, SCOOR 2 keeps its axis along the nodes.
+/// Output, section and element of MAT_121: ELFORM 6 is a discrete beam, SCOOR 2 keeps its axis along the nodes.
 const BEAM_ELEMENT: &str = "\
+*DATABASE_HISTORY_BEAM
+         1
 *SECTION_BEAM
 $#   secid    elform      shrf   qr/irid       cst     scoor
          1         6       1.0         2         0       2.0
@@ -328,10 +332,12 @@ fn supports(lines: &mut String, curve: &ExportCurve, units: InUnits) {
     }
 }
 
-/// A number in ten columns with as many decimals as fit; it may touch the field before it.
+/// A number in ten columns, with decimals or an exponent, whichever is nearer to it; it may touch the field before it.
 fn fixed(value: f64) -> String {
-    let text = (0..9).rev().map(|digits| format!("{value:.digits$}")).find(|t| t.len() <= 10);
-    text.unwrap_or_else(|| format!("{value:.3e}"))
+    let forms = |digits| [format!("{value:.digits$}"), format!("{value:.digits$e}")];
+    let off = |text: &String| text.parse::<f64>().map_or(f64::INFINITY, |v| (v - value).abs());
+    let fitting = (0..9).rev().flat_map(forms).filter(|text| text.len() <= 10);
+    fitting.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or_else(|| format!("{value:e}"))
 }
 
 #[cfg(test)]
@@ -353,6 +359,14 @@ mod tests {
 
     #[test]
     fn numbers_fit_their_field() {
+        for (value, expected) in [
+            (-13.888_888_888, "-13.888889"),
+            (-8.333_333_333e-7, "-8.3333e-7"),
+            (8.0, "8.00000000"),
+            (1.234_567_891e12, "1.23457e12"),
+        ] {
+            assert_eq!(fixed(value), expected);
+        }
         for value in [194_123.456_789, 1.0, 1e-12, 1e300, 7.0 / 3.0] {
             let text = ten_columns(value);
             assert!(text.len() < 10, "{text}");
