@@ -1180,6 +1180,33 @@ fn the_targets_rebound_is_said() {
     let [theirs, ours] = restitutions(&own[0])[..] else { panic!("{own:?}") };
     assert_eq!(theirs, ours);
     assert!(soft.iter().any(|note| note.contains("the peak force changes from")), "{soft:?}");
+/// Of a format with several kinds of file, `--to` decides, then the file's extension, and what is usual otherwise.
+#[test]
+fn the_kind_of_file_is_that_of_to_before_that_of_the_name() {
+    let folder = demo_folder();
+    let here = folder.path();
+    for (input, to, file, head) in [
+        ("lead50.json", "spr", "spring.dat", "$ units"),
+        ("lead50.json", "spr", "a.cmd", "$ units"),
+        ("lead50.json", "adams", "B.SPR", "$ units"),
+        ("lead50.json", "adams", "b.adm", "! units"),
+        ("lead50.json", "txt", "d.mo", "#1"),
+        ("lead50.json", "mo", "c.txt", "// curve"),
+        ("lead.model", "hdf5", "tab.csv", "\u{fffd}HDF"),
+        ("lead.model", "table", "x.CSV", "#"),
+    ] {
+        export(here, input, file, &["--to", to]);
+        let bytes = fs::read(here.join(file)).unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        assert!(text.starts_with(head), "{to} {file}: {}", &text[..20]);
+    }
+    export(here, "lead.model", "run.v2", &["--to", "spr", "--speed", "36km/h,50km/h"]);
+    let names = entries(&here.join("run.v2"));
+    assert!(names.len() == 2 && names.iter().all(|name| name.ends_with(".spr")), "{names:?}");
+    let said = export_notes(here, "lead50.json", &["--to", "adams", "-o", "spring.x"]);
+    says(&said, ".x is written as an Adams View command file (.cmd)");
+}
+
     assert!(soft.iter().any(|note| note.contains(" % of their mean on average")), "{soft:?}");
     // A change that would be too large is refused.
     let arguments =

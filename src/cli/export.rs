@@ -150,8 +150,12 @@ impl Target {
         found.map_err(|e: Error| usage_error(e))
     }
 
-    /// The options for a file at `path`.
-    fn options(&self, path: Option<&Path>) -> Options {
+    /// The options for a file of `format` at `path`.
+    fn options(&self, format: &Format, path: Option<&Path>) -> Options {
+        let path = path.filter(|path| !path.is_dir());
+        let own = path.and_then(Path::extension).and_then(|e| e.to_str());
+        let by_name = || own.map(|own| format.kind(own).unwrap_or(own));
+        let kind = self.to.as_deref().and_then(|to| format.kind(to)).or_else(by_name);
         Options {
             units: self.units,
             id: self.curve_id.unwrap_or(Options::default().id),
@@ -160,15 +164,8 @@ impl Target {
             soften: self.soften,
             material: self.material.unwrap_or_default(),
             deck: self.deck,
-            extension: path
-                .and_then(Path::extension)
-                .and_then(|e| e.to_str())
-                .or(self.to.as_deref())
-                .map(Into::into),
-            stem: path
-                .filter(|path| !path.is_dir())
-                .and_then(Path::file_stem)
-                .map(|stem| stem.to_string_lossy().into_owned()),
+            extension: kind.map(Into::into),
+            stem: path.and_then(Path::file_stem).map(|stem| stem.to_string_lossy().into_owned()),
             speeds_m_per_s: Vec::new(),
             query: Query::at(0.0),
         }
@@ -189,7 +186,7 @@ impl Target {
             alone = curves.iter().map(one).collect::<Result<Vec<_>, Error>>()?;
             curves = &alone;
         }
-        format.export(curves, &self.options(path)).map_err(|error| {
+        format.export(curves, &self.options(format, path)).map_err(|error| {
             if self.force.is_none() && error.is_about("force") {
                 usage_error("the curve has no force that drives a single-mass body (its runs record no velocities, or its file states a contact force without times): use --force contact to export the force on the obstacle")
             } else {
@@ -263,7 +260,7 @@ fn export(
         args.target.check_for_model(format)?;
         args.which.check_for_model(format.over_speeds)?;
         let model = input.model(format.name)?;
-        let mut options = args.target.options(output);
+        let mut options = args.target.options(format, output);
         options.speeds_m_per_s.clone_from(&args.which.speed);
         options.query = args.which.query()?;
         return Ok(format.export_model(model, &options)?);
@@ -279,7 +276,7 @@ fn export(
                 case.curves.force_kind.name()
             ));
         }
-        let mut exported = format.export_cases(&cases, &args.target.options(output))?;
+        let mut exported = format.export_cases(&cases, &args.target.options(format, output))?;
         if let (Input::File(_), Some(case)) = (input, cases.into_iter().next()) {
             exported.notes.splice(0..0, case.quality.notes);
             exported.warnings = case.quality.warnings;
@@ -377,9 +374,8 @@ fn paths(path: &Path, format: &Format, exported: &Exported) -> Result<Vec<PathBu
         return Ok(vec![path.into()]);
     }
     // A file's name for several; what is called .mme is a folder.
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    let names_a_file = format.extensions.contains(&extension);
-    if !path.is_dir() && names_a_file && !format.takes_case() {
+    let named = path.extension().and_then(|e| format.kind(e.to_str()?));
+    if let (Some(extension), false, false) = (named, path.is_dir(), format.takes_case()) {
         return usage(format!(
             "-o {}: this export gives {} files: name a folder, as with -o {} --to {extension}",
             path.display(),

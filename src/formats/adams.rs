@@ -20,7 +20,6 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
     let usual = UnitSystem { length_m: 1e-3, mass_kg: 1e3, time_s: 1.0 };
     let units = options.units.unwrap_or(usual);
     let extension = options.extension.as_deref().unwrap_or("cmd");
-    let kind = extension.to_ascii_lowercase();
     let mut files = Vec::new();
     let mut notes = Vec::new();
     let mut together = String::new();
@@ -28,19 +27,18 @@ pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exporte
         let curve = &curve.begun_at_origin(true, &mut notes)?;
         let spline = Spline::of(curve, units, options.id + k as u32)?;
         notes.push(curve.restitution_note("Adams", TargetUnloading::Elastic));
-        match &*kind {
+        match extension {
             "spr" => files.push((format!("{}.spr", curve.file_stem()), spline.property_file()?)),
             "adm" => spline.solver_statement(&mut together),
             _ => spline.view_command(&mut together),
         }
     }
-    // Without a file's name it is that of the target.
-    if !["cmd", "adm", "spr", "adams"].contains(&&*kind) {
+    if !["cmd", "adm", "spr"].contains(&extension) {
         notes.push(format!(
             ".{extension} is written as an Adams View command file (.cmd): name it .adm for Adams Solver, .spr for a property file"
         ));
     }
-    if kind != "spr" {
+    if extension != "spr" {
         let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
         files.push((format!("{stem}.{extension}"), together.into_bytes()));
     }

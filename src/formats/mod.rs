@@ -186,7 +186,7 @@ pub const FORMATS: &[Format] = &[
     },
     Format {
         name: "table",
-        extensions: &["h5", "hdf5"],
+        extensions: &["h5", "hdf5", "csv"],
         description: "force over speed and deflection of a model, HDF5 or CSV, SI",
         over_speeds: true,
         ..of(Tail::Hold, Writer::Model(table::write))
@@ -216,7 +216,7 @@ pub struct Options {
     pub material: Material,
     /// A complete input of one mass on the spring, not only the spring.
     pub deck: bool,
-    /// Extension of the file that will be written, where a target has several kinds of file.
+    /// Extension of the kind of file that will be written, where a target has several; the usual one if absent or of none.
     pub extension: Option<String>,
     /// Name of the file that will be written, without its extension, if it is to be one.
     pub stem: Option<String>,
@@ -295,6 +295,11 @@ pub(crate) const MAX_CURVE_BYTES: u64 = 64 << 20;
 pub(crate) const MIN_POINTS: usize = 4;
 
 impl Format {
+    /// Its extension that is called `name`, in letters of either case.
+    pub(crate) fn kind(&self, name: &str) -> Option<&'static str> {
+        self.extensions.iter().find(|e| e.eq_ignore_ascii_case(name)).copied()
+    }
+
     /// Whether it takes a whole model, not its curves.
     pub fn takes_model(&self) -> bool {
         matches!(self.writer, Writer::Model(_))
@@ -492,10 +497,9 @@ pub(crate) fn names() -> String {
 pub(crate) fn by_extension(path: &Path) -> Result<&'static Format, Error> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     let known = || {
-        let mut all: Vec<String> =
-            FORMATS.iter().flat_map(|f| f.extensions).map(|e| format!(".{e}")).collect();
-        all.dedup();
-        all.join(", ")
+        let all = FORMATS.iter().flat_map(|f| f.extensions).map(|e| format!(".{e}"));
+        let mut seen = BTreeSet::new();
+        all.filter(|e| seen.insert(e.clone())).collect::<Vec<_>>().join(", ")
     };
     FORMATS.iter().find(|f| f.extensions.contains(&extension)).ok_or_else(|| {
         error!(Export, "{path}: the extension does not name an export format: use one of {known}, or name the format with --to", known = known(), path = path.display())
