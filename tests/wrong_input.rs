@@ -331,6 +331,8 @@ fn outputs_replace_no_other_kind_of_file() {
     fs::copy(&nodout, here.join("other.csv")).unwrap();
     fs::copy(here.join("lead.model"), here.join("cases.csv")).unwrap();
     fs::write(here.join("own.csv"), "t_s,a_g\n0,1\n").unwrap();
+    fs::write(here.join("model.k"), "*KEYWORD\n*END\n").unwrap();
+    fs::write(here.join("Train.mo"), "model Train\nend Train;\n").unwrap();
     let before = |name: &str| fs::read(here.join(name)).unwrap();
     for (line, name, what) in [
         (
@@ -349,6 +351,17 @@ fn outputs_replace_no_other_kind_of_file() {
         ("export lead.model --to table -o curves.h5", "curves.h5", "an HDF5 file"),
         ("export lead50.json --to lsdyna --units mm-t-s -o kept", "kept", "a solver's file"),
         ("report curves.h5 -o lead.model", "lead.model", "a model"),
+        (
+            "export lead50.json --to lsdyna -o model.k",
+            "model.k",
+            "an input that crumple did not write",
+        ),
+        (
+            "predict lead.model --speed 50km/h -o model.k",
+            "model.k",
+            "an input that crumple did not write",
+        ),
+        ("export lead50.json -o Train.mo", "Train.mo", "an input that crumple did not write"),
         ("histories fe/lead-car-wall/25kmh/rwforc -o other.csv", "other.csv", "a solver's file"),
         ("db export curves.h5 -o .", "./cases.csv", "a model"),
         ("sweep scenario.toml --restart -o curves.h5", "curves.h5", "an HDF5 file"),
@@ -364,6 +377,15 @@ fn outputs_replace_no_other_kind_of_file() {
         if name == "kept" {
             crumple_ok(here, &[&words[..], &["--overwrite"]].concat());
             fs::write(here.join(name), old).unwrap();
+        }
+    }
+    // What an earlier export wrote is.
+    for _ in 0..2 {
+        for file in ["o.k", "o.rad", "o.inp", "o.cmd", "o.adm", "o.spr", "o.mo", "o.txt", "o.fmu"] {
+            crumple_ok(here, &format!("export lead50.json -q -o {file}"));
+        }
+        for to in ["radioss -o decks", "lsdyna -o deck.k", "calculix -o deck.inp"] {
+            crumple_ok(here, &format!("export lead50.json --deck -q --to {to}"));
         }
     }
     crumple_ok(here, "sweep scenario.toml -o other.csv -q --overwrite");

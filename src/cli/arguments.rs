@@ -197,12 +197,23 @@ const HEAD: u64 = 4096;
 /// With these every HDF5 file begins.
 const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";
 
+fn head(path: &Path) -> Result<Vec<u8>, Failure> {
+    let mut head = Vec::new();
+    file::open(path)
+        .and_then(|f| f.take(HEAD).read_to_end(&mut head))
+        .map_err(|e| error!(CurveFile, "{path}: {e}", path = path.display()).caused_by(e))?;
+    Ok(head)
+}
+
+/// Whether the file at `path` is by its name an input of another tool, and does not say that crumple wrote it.
+pub(super) fn is_others_deck(path: &Path) -> Result<bool, Failure> {
+    let says = |head: Vec<u8>| String::from_utf8_lossy(&head).contains("written_by: crumple");
+    Ok(formats::is_deck(path) && !says(head(path)?))
+}
+
 impl FileKind {
     pub(super) fn of(path: &Path) -> Result<Self, Failure> {
-        let mut head = Vec::new();
-        file::open(path)
-            .and_then(|f| f.take(HEAD).read_to_end(&mut head))
-            .map_err(|e| error!(CurveFile, "{path}: {e}", path = path.display()).caused_by(e))?;
+        let head = head(path)?;
         if head.starts_with(HDF5) {
             return Ok(if sweep::is_table(path) { Self::Sweep } else { Self::Database });
         }

@@ -37,7 +37,7 @@ use crate::error::ErrorCode;
 use crate::failure::{self, DONE, DONE_WITH_WARNINGS, ErrorDocument, FAILED, USAGE};
 use crate::file::{self, is_same};
 use crate::{database, os, solver};
-use arguments::FileKind;
+use arguments::{FileKind, is_others_deck};
 use clap::{FromArgMatches, Parser, Subcommand};
 use serde::Serialize;
 
@@ -155,6 +155,7 @@ impl GlobalOptions {
         let what = match kind {
             FileKind::Scenario => "a study or scenario",
             FileKind::Solver if solver::is_output(output) => "a solver's file",
+            FileKind::Solver if is_others_deck(output)? => "an input that crumple did not write",
             FileKind::Database => "an HDF5 file",
             FileKind::Model => "a model",
             FileKind::Sweep => "a sweep's result",

@@ -493,6 +493,13 @@ pub(crate) fn names() -> String {
     FORMATS.iter().map(|f| f.name).collect::<Vec<_>>().join(", ")
 }
 
+/// Whether a file is by its extension one that users of other tools write themselves, such as a solver's deck.
+pub(crate) fn is_deck(path: &Path) -> bool {
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+    let of_ids = FORMATS.iter().filter(|f| f.ids).any(|f| f.kind(extension).is_some());
+    of_ids || extension.eq_ignore_ascii_case("mo")
+}
+
 /// The format that the file's extension names.
 pub(crate) fn by_extension(path: &Path) -> Result<&'static Format, Error> {
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();

@@ -165,6 +165,7 @@ fn model(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u32) {
 fn engine(curve: &ExportCurve, units: InUnits, stem: &str) -> Vec<u8> {
     let end = run_time_s(curve) / units.0.time_s;
     let interval = end / NUMBER_OF_STATES;
-    format!("/RUN/{stem}/1\n{end:.6}\n/VERS/2022\n/TFILE/4\n{interval:.6e}\n/PRINT/-1000\n")
+    let written_by = &curve.predicted.provenance.written_by;
+    format!("# written_by: {written_by}\n/RUN/{stem}/1\n{end:.6}\n/VERS/2022\n/TFILE/4\n{interval:.6e}\n/PRINT/-1000\n")
         .into_bytes()
 }
