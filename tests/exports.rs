@@ -422,6 +422,28 @@ fn packages_have_the_names_of_their_files() {
     }
 }
 
+/// Names of groups and cases that are too long for a file are cut, and stay apart.
+#[test]
+fn long_names_are_cut_for_files() {
+    let folder = demo_folder();
+    let here = folder.path();
+    let (group, case) = ("g".repeat(199), "c".repeat(199));
+    fs::write(here.join("legacy.csv"), "d_m,force_N\n0,0\n0.1,2e6\n0.3,1e6\n0.8,3e6\n").unwrap();
+    for case in [format!("{case}1"), format!("{case}2")] {
+        let add = "db add long.h5 legacy.csv --speed 11m/s --kind wall --mass 24t -q --group";
+        crumple_ok(here, &format!("{add} {group} --case {case}"));
+    }
+    for (to, files) in [("csv", 2), ("modelica", 2), ("fmi2", 2), ("json", 2), ("lsdyna", 1)] {
+        let into = here.join(to);
+        fs::create_dir(&into).unwrap();
+        export(here, "long.h5", to, &["--to", to]);
+        let names = entries(&into);
+        assert!(names.len() == files && names.iter().all(|n| n.len() < 100), "{to}: {names:?}");
+    }
+    export(here, "long.h5", "mme", &["--to", "iso-mme"]);
+    export(here, "long.h5", "mf4", &["--to", "mdf"]);
+}
+
 /// LS-DYNA resamples evenly: that it cannot keep an uneven curve is reported.
 #[test]
 fn uneven_curves_for_lsdyna_are_noted() {
@@ -1135,6 +1157,7 @@ fn groups_and_several_speeds_are_exported_at_once() {
         (2, &["export", "lead50.json", "--to", "table"][..], "table is made of a whole model"),
     ];
     cases.into_iter().for_each(|(code, arguments, expected)| t(code, arguments, expected));
+        (1, &["export", "lead.model", "--speed", "36km/h,50km/h", "--to", "csv", "-o", "lead50.json"][..], "lead50.json is a file, not a folder: name another"),
     // What a format has no use for is refused.
     #[rustfmt::skip]
     let cases = [

@@ -171,6 +171,9 @@ pub(super) fn explained(path: &Path, source: io::Error) -> io::Error {
                 ),
             }
         }
+        (io::ErrorKind::AlreadyExists, Ok(_)) if !path.is_dir() => {
+            format!("{} is a file, not a folder: name another", path.display())
+        }
         (io::ErrorKind::NotADirectory, Ok(meta)) if !meta.is_dir() => {
             format!("{} is a file, not a folder: name another", folder.display())
         }

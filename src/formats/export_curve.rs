@@ -519,9 +519,21 @@ impl ExportCurve {
 
 /// Group and speed of a curve as a file's name without its extension.
 pub(super) fn file_stem(curve: &PredictedCurve) -> String {
-    let group: String = curve.provenance.group.chars().map(plain).collect();
-    let name = own_name(curve).map(|name| name.chars().map(plain).collect());
-    format!("{group}-{}", name.unwrap_or_else(|| speed_name(curve)))
+    let name = own_name(curve).map_or_else(|| speed_name(curve), Into::into);
+    stem_of(&curve.provenance.group, &name)
+}
+
+/// Maximum length of a file's name without its extension: file systems take 255 bytes, Radioss names a run by it.
+const LONGEST_STEM: usize = 80;
+
+/// Group and name as a file's name without its extension. Of long ones the group's end is left out first; names that get equal
+/// by that are numbered.
+pub(super) fn stem_of(group: &str, name: &str) -> String {
+    let room = LONGEST_STEM - 1;
+    let name_room = (room / 2).max(room.saturating_sub(group.chars().count()));
+    let name: String = name.chars().map(plain).take(name_room).collect();
+    let group: String = group.chars().map(plain).take(room - name.len()).collect();
+    format!("{group}-{name}")
 }
 
 /// The speed as runs are named by it: `48kmh`.

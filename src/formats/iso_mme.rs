@@ -74,10 +74,7 @@ pub(super) fn write_case(case: &Case) -> Result<Exported, Error> {
         case.conditions.speed.kind.name()
     );
     let times = sampled.time_s();
-    let name: String = format!("{}-{}", case.id.group, case.id.name)
-        .chars()
-        .map(super::export_curve::plain)
-        .collect();
+    let name = super::export_curve::stem_of(&case.id.group, &case.id.name);
     let bodies = [(case.conditions.masses.body_kg, case.conditions.speed.m_per_s)];
     let test = Test {
         name: &name,

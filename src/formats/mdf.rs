@@ -3,7 +3,7 @@
 //! Blocks follow each other: a name such as `##CG`, the length, the number of links, the links, the data. Every record
 //! holds the time and one double per channel.
 
-use super::export_curve::plain;
+use super::export_curve::stem_of;
 use super::{Exported, sampled_note};
 use crate::curve::body::body_force_n;
 use crate::curve::{Case, ForceKind};
@@ -46,7 +46,7 @@ pub(super) fn write_case(case: &Case) -> Result<Exported, Error> {
     facts.push("contact_time_s: 0".into());
     facts.push("sign: deflection and force positive in compression, time 0 is the first contact; inertia is the force that moves the body".into());
     let bytes = file(&facts.join("\n"), &format!("{group}/{name}"), sampled.time_s(), &channels);
-    let name: String = format!("{group}-{name}").chars().map(plain).collect();
+    let name = stem_of(group, name);
     let notes = sampled_note(case).into_iter().collect();
     Ok(Exported { files: vec![(format!("{name}.mf4"), bytes)], notes, ..Exported::default() })
 }

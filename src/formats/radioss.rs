@@ -16,8 +16,6 @@ const HARDENING: u32 = 2;
 
 pub(crate) fn write(curves: &[ExportCurve], options: &Options) -> Result<Exported, Error> {
     let stem = curves.first().map_or("curves".into(), ExportCurve::file_stem);
-    // It names the run, too.
-    let stem: String = stem.chars().take(TITLE_WIDTH - 20).collect();
     let mut lines = String::new();
     let mut notes = Vec::new();
     let mut files = Vec::new();
@@ -155,9 +153,9 @@ fn model(lines: &mut String, curve: &ExportCurve, units: InUnits, id: u32) {
     let along = usize::from(curve.other_mass_kg().is_none());
     for (node, along) in [(1, along), (2, 0)] {
         line!(lines, "/BCS/{node}\nguided along x\n#  Tra rot   skew_ID  grnod_ID");
-    // Numbers of such groups are unique across types.
         line!(lines, "   {along}11 111         0{node:>10}");
     }
+    // Numbers of such groups are unique across types.
     line!(lines, "/TH/NODE/1\nnode\n#      var\nDEF\n         1\n         2");
     line!(lines, "/TH/SPRING/2\nspring\n#      var\nDEF\n         1\n/END");
 }
