@@ -469,28 +469,6 @@ fn uneven_curves_for_lsdyna_are_noted() {
     assert!(fs::read_to_string(here.join("peak.k")).unwrap().contains("         0       961\n"));
 }
 
-/// Channels of an earlier record stay in a folder that is written anew, and that is said.
-#[test]
-fn channels_of_an_earlier_record_are_named() {
-    let folder = demo_folder();
-    let here = folder.path();
-    for (command, channels, first) in [
-        ("simulate two-sets.toml -o run.mme", "run.mme/Channel", "run.001"),
-        (
-            "export curves.h5 --group lead-car-wall --case 36kmh --to iso-mme -o case",
-            "case/Channel",
-            "lead-car-wall-36kmh.001",
-        ),
-    ] {
-        let said = |command| String::from_utf8(crumple_in(here, command).stderr).unwrap();
-        crumple_ok(here, command);
-        assert!(!said(command).contains("not written now"));
-        let channels = here.join(channels);
-        fs::copy(channels.join(first), channels.join(first.replace(".001", ".099"))).unwrap();
-        says(&said(command), "Channel: holds 1 file that was not written now: remove");
-    }
-}
-
 /// What OpenRadioss' starter and LS-DYNA demand of a deck.
 #[test]
 fn decks_suit_their_solvers() {
@@ -527,6 +505,28 @@ fn decks_suit_their_solvers() {
         export(here, "lead50.json", "m.k", &["--deck", "--material", material]);
         assert!(text("m.k").contains(&format!("*DATABASE_{force}\n")), "{material}");
         assert_eq!(text("m.k").contains("*DATABASE_HISTORY_BEAM\n         1\n"), force == "ELOUT");
+    }
+}
+
+/// Channels of an earlier record stay in a folder that is written anew, and that is said.
+#[test]
+fn channels_of_an_earlier_record_are_named() {
+    let folder = demo_folder();
+    let here = folder.path();
+    for (command, channels, first) in [
+        ("simulate two-sets.toml -o run.mme", "run.mme/Channel", "run.001"),
+        (
+            "export curves.h5 --group lead-car-wall --case 36kmh --to iso-mme -o case",
+            "case/Channel",
+            "lead-car-wall-36kmh.001",
+        ),
+    ] {
+        let said = |command| String::from_utf8(crumple_in(here, command).stderr).unwrap();
+        crumple_ok(here, command);
+        assert!(!said(command).contains("not written now"));
+        let channels = here.join(channels);
+        fs::copy(channels.join(first), channels.join(first.replace(".001", ".099"))).unwrap();
+        says(&said(command), "Channel: holds 1 file that was not written now: remove");
     }
 }
 
@@ -1054,6 +1054,8 @@ fn an_imported_curve_is_exported_as_it_was() {
     .unwrap();
     crumple_ok(here, "db add legacy.h5 legacy.csv --group g --speed 11m/s --kind wall --mass 24t");
     export(here, "legacy.h5", "back.csv", &["--tail", "none"]);
+    let text = fs::read_to_string(here.join("back.csv")).unwrap();
+    assert!(!text.contains("# filter:"), "its force is the file's: {}", &text[..800]);
     let units = UnitSystem::parse("SI").ok();
     let (back, _) =
         read(&here.join("back.csv"), &ReadOptions { units, ..ReadOptions::default() }).unwrap();
@@ -1155,15 +1157,16 @@ fn groups_and_several_speeds_are_exported_at_once() {
         (1, &["export", "lead.model", "--speed", "36km/h,50km/h", "--to", "lsdyna", "--deck"][..], "one curve"),
         (2, &["export", "lead50.json", "--to", "iso-mme"][..], "iso-mme takes histories over time"),
         (2, &["export", "lead50.json", "--to", "table"][..], "table is made of a whole model"),
+        (1, &["export", "lead.model", "--speed", "36km/h,50km/h", "--to", "csv", "-o", "lead50.json"][..], "lead50.json is a file, not a folder: name another"),
     ];
     cases.into_iter().for_each(|(code, arguments, expected)| t(code, arguments, expected));
-        (1, &["export", "lead.model", "--speed", "36km/h,50km/h", "--to", "csv", "-o", "lead50.json"][..], "lead50.json is a file, not a folder: name another"),
     // What a format has no use for is refused.
     #[rustfmt::skip]
     let cases = [
         (&["export", "lead50.json", "--to", "csv", "--deck"][..], "--deck is for lsdyna, radioss, calculix"),
         (&["export", "lead50.json", "--to", "mat", "--material", "s06"][..], "--material is for lsdyna"),
-        (&["export", "lead50.json", "--to", "json", "--tail", "hold"][..], "--tail is for csv, lsdyna"),
+        (&["export", "lead50.json", "--to", "json", "--tail", "hold"][..], "--tail is for csv, lsdyna, radioss, calculix, adams, fmi2, fmi3, modelica, mat, table"),
+        (&["export", "lead.model", "--to", "table", "--soften"][..], "--soften is for csv, lsdyna, radioss, calculix, adams, fmi2, fmi3, modelica, mat\n"),
         (&["export", "lead.model", "--to", "onnx", "--speed", "50km/h"][..], "holds a whole model: remove --speed"),
         (&["export", "lead.model", "--to", "table", "--group", "x"][..], "a model has only one group"),
         (&["export", "curves.h5", "--group", "lead-car-wall", "-o", "all.spr"][..], "name a folder, as with -o all --to spr"),
@@ -1175,6 +1178,33 @@ fn groups_and_several_speeds_are_exported_at_once() {
     export(here, "lead.model", "twice.cmd", &["--speed", "36km/h,36km/h"]);
     let twice = fs::read_to_string(here.join("twice.cmd")).unwrap();
     assert!(twice.contains("lead_car_wall_36kmh ") && twice.contains("lead_car_wall_36kmh_2 "));
+}
+
+/// Of a format with several kinds of file, `--to` decides, then the file's extension, and what is usual otherwise.
+#[test]
+fn the_kind_of_file_is_that_of_to_before_that_of_the_name() {
+    let folder = demo_folder();
+    let here = folder.path();
+    for (input, to, file, head) in [
+        ("lead50.json", "spr", "spring.dat", "$ units"),
+        ("lead50.json", "spr", "a.cmd", "$ units"),
+        ("lead50.json", "adams", "B.SPR", "$ units"),
+        ("lead50.json", "adams", "b.adm", "! units"),
+        ("lead50.json", "txt", "d.mo", "#1"),
+        ("lead50.json", "mo", "c.txt", "// curve"),
+        ("lead.model", "hdf5", "tab.csv", "\u{fffd}HDF"),
+        ("lead.model", "table", "x.CSV", "#"),
+    ] {
+        export(here, input, file, &["--to", to]);
+        let bytes = fs::read(here.join(file)).unwrap();
+        let text = String::from_utf8_lossy(&bytes);
+        assert!(text.starts_with(head), "{to} {file}: {}", &text[..20]);
+    }
+    export(here, "lead.model", "run.v2", &["--to", "spr", "--speed", "36km/h,50km/h"]);
+    let names = entries(&here.join("run.v2"));
+    assert!(names.len() == 2 && names.iter().all(|name| name.ends_with(".spr")), "{names:?}");
+    let said = export_notes(here, "lead50.json", &["--to", "adams", "-o", "spring.x"]);
+    says(&said, ".x is written as an Adams View command file (.cmd)");
 }
 
 /// The command says the restitution that the target's unloading gives beside ours, and softens on request.
@@ -1203,33 +1233,6 @@ fn the_targets_rebound_is_said() {
     let [theirs, ours] = restitutions(&own[0])[..] else { panic!("{own:?}") };
     assert_eq!(theirs, ours);
     assert!(soft.iter().any(|note| note.contains("the peak force changes from")), "{soft:?}");
-/// Of a format with several kinds of file, `--to` decides, then the file's extension, and what is usual otherwise.
-#[test]
-fn the_kind_of_file_is_that_of_to_before_that_of_the_name() {
-    let folder = demo_folder();
-    let here = folder.path();
-    for (input, to, file, head) in [
-        ("lead50.json", "spr", "spring.dat", "$ units"),
-        ("lead50.json", "spr", "a.cmd", "$ units"),
-        ("lead50.json", "adams", "B.SPR", "$ units"),
-        ("lead50.json", "adams", "b.adm", "! units"),
-        ("lead50.json", "txt", "d.mo", "#1"),
-        ("lead50.json", "mo", "c.txt", "// curve"),
-        ("lead.model", "hdf5", "tab.csv", "\u{fffd}HDF"),
-        ("lead.model", "table", "x.CSV", "#"),
-    ] {
-        export(here, input, file, &["--to", to]);
-        let bytes = fs::read(here.join(file)).unwrap();
-        let text = String::from_utf8_lossy(&bytes);
-        assert!(text.starts_with(head), "{to} {file}: {}", &text[..20]);
-    }
-    export(here, "lead.model", "run.v2", &["--to", "spr", "--speed", "36km/h,50km/h"]);
-    let names = entries(&here.join("run.v2"));
-    assert!(names.len() == 2 && names.iter().all(|name| name.ends_with(".spr")), "{names:?}");
-    let said = export_notes(here, "lead50.json", &["--to", "adams", "-o", "spring.x"]);
-    says(&said, ".x is written as an Adams View command file (.cmd)");
-}
-
     assert!(soft.iter().any(|note| note.contains(" % of their mean on average")), "{soft:?}");
     // A change that would be too large is refused.
     let arguments =

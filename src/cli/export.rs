@@ -203,7 +203,7 @@ impl Target {
             ("--material", self.material.is_some(), |f| f.materials),
             ("--curve-id", self.curve_id.is_some(), |f| f.ids),
             ("--tail", self.tail.is_some(), Format::takes_tail),
-            ("--soften", self.soften, Format::takes_tail),
+            ("--soften", self.soften, |f| f.takes_tail() && !f.takes_model()),
         ] {
             if is_asked && is_of_none(takes) {
                 let those: Vec<&str> =

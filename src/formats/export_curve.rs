@@ -29,6 +29,8 @@ pub struct ExportCurve {
     /// How the target continues beyond the maximum crush.
     pub tail: Tail,
     follows_faster_runs: bool,
+    /// Whether its force is that of a recorded motion, beside another that was declared.
+    is_of_motion: bool,
     /// What was changed of the forces of `predicted`, in words.
     pub changes: Vec<String>,
     /// Ordinal among the curves of the same group and speed of one export, counted from 1.
@@ -125,6 +127,8 @@ impl ExportCurve {
             Some((low, high)) => Some((edge(low)?, edge(high)?)),
             None => None,
         };
+        // A curve without times moves by the force that was declared.
+        let has_other = curve.body_force_n.as_ref().is_some_and(|body_n| *body_n != curve.force_n);
         let is_recorded = predicted.provenance.max_crush_rule.is_none();
         Ok(Self {
             loading: continued,
@@ -133,6 +137,7 @@ impl ExportCurve {
             no_band: no_band.filter(|_| !is_recorded),
             tail,
             follows_faster_runs,
+            is_of_motion: is_recorded && force == ForceKind::Body && has_other,
             changes,
             ordinal: 1,
             predicted,
@@ -470,7 +475,7 @@ impl ExportCurve {
         if curve.data_end_m() != curve.max_deflection_m {
             facts.push(("data_end_m", nine_digits(curve.data_end_m())));
         }
-        if curve.model == RECORDED && kind == ForceKind::Body {
+        if self.is_of_motion {
             facts.push((
                 "filter",
                 "none beyond the recipe's, so that a body moves as in the run; body_force_N in the database is filtered, and its peaks are lower".into(),
