@@ -601,6 +601,25 @@ fn a_standing_body_is_as_heavy_as_it_is() {
     }
     let text = fs::read_to_string(here.join("s.toml")).unwrap();
     assert!(text.contains("shared by"), "{text}");
+    // Another run with another such body, and a pair that is nearly alike.
+    for (run, kg) in [("pair/b", 2_400.0), ("near/a", 1_180.0)] {
+        let (run, history) = (here.join(run), Crash { other_kg: Some(kg), ..crash }.run());
+        layout.nodout(&run, &history, &nodes);
+        let contact = Force { id: 2, title: "", along_n: &history.contact_n, across_n: 0.0 };
+        layout.rcforc(&run, &history, &[contact]);
+        layout.glstat(&run, &history);
+    }
+    let said = warned(here, "init pair -o two.toml");
+    says(&said, "other mass: the runs' masses differ (2, 2.4 t): do they belong to one vehicle?");
+    assert_eq!(said.matches("the runs' masses differ").count(), 1, "{said}");
+    crumple_ok(here, "init near -o exact.toml");
+    let exact = study(here, "exact.toml");
+    assert!((number(&exact["run"][0]["other_mass"], "t") / 1.18 - 1.0).abs() < 2e-3, "{exact}");
+    fs::remove_file(here.join("near/a/glstat")).unwrap();
+    crumple_ok(here, "init near -o estimated.toml");
+    let text = fs::read_to_string(here.join("estimated.toml")).unwrap();
+    assert!(!text.contains("other_mass"), "{text}");
+    says(&text, "1.18 t, is taken as equal");
 }
 
 /// Momentum alone says that two bodies meet, that they are of different mass, and that it is a

@@ -5,11 +5,13 @@ use std::path::Path;
 
 use super::UserHints;
 use super::folders::{seen_from, speed_in};
-use super::measure::{self, Impact, MassEstimates, SAME_MASS, SAME_SPEED, is_near};
+use super::measure::{
+    self, Impact, MassEstimates, SAME_EXACT_MASS, SAME_MASS, SAME_SPEED, is_near,
+};
 use super::recipe::{CommonRecipe, FOLLOWS, names_centre_of_gravity, percent};
 use super::record::Record;
 use super::sources::MOTION;
-use super::units::digits;
+use super::units::{digits, shown_mass};
 use super::write::Evidence::{Computed, Given, Guessed, Read};
 use super::write::{Proposal, Proposed, ProposedRun};
 use crate::curve::recipe::{DeflectionSource, Filter, ForceSource, RecordedMotion};
@@ -523,9 +525,9 @@ impl Facts<'_> {
             of_runs.collect()
         };
         let stated = |kg: f64, by: &str| vec![Proposed::found(kg, Given, by); self.records.len()];
-        let bodies = match mass_kg {
+        let mut bodies = match mass_kg {
             Some(kg) => stated(kg, "by --mass"),
-            None => measure::agree(&estimates(0).unwrap_or_default(), &why, warnings),
+            None => measure::agree("mass", &estimates(0).unwrap_or_default(), &why, warnings),
         };
         if let Some(given) = mass_kg {
             warnings.extend(measure::contradicts(
@@ -534,23 +536,33 @@ impl Facts<'_> {
                 given,
             ));
         }
-        warnings.extend(measure::differ(&bodies));
+        warnings.extend(measure::differ("mass", &bodies));
         if let Some(kg) = other_mass_kg {
             let of_runs = estimates(1).unwrap_or_default();
             warnings.extend(measure::contradicts(&of_runs, "--other-mass", kg));
             return (bodies, Some(stated(kg, "by --other-mass")));
         }
         if mass_kg.is_none()
-            && let Some(others) = estimates(1)
+            && let Some(estimates) = estimates(1)
         {
-            let others = measure::agree(&others, &why, &mut Vec::new());
-            let are_equal = |(a, b): (&Proposed<f64>, &Proposed<f64>)| match (a.value(), b.value())
-            {
-                (Some(a), Some(b)) => is_near(*a, *b, SAME_MASS),
+            let mut of_others = Vec::new();
+            let others = measure::agree("other mass", &estimates, &why, &mut of_others);
+            let are_near = |k: usize, same: f64| match (bodies[k].value(), others[k].value()) {
+                (Some(a), Some(b)) => is_near(*a, *b, same),
                 (a, b) => a.is_none() && b.is_none(),
             };
-            if !bodies.iter().zip(&others).all(are_equal) {
+            if !(0..bodies.len()).all(|k| are_near(k, estimates[k].1.same())) {
+                warnings.extend(of_others);
+                warnings.extend(measure::differ("other mass", &others));
                 return (bodies, Some(others));
+            }
+            for (body, other) in bodies.iter_mut().zip(&others) {
+                if let (Proposed::Found { value, from, .. }, Some(other)) = (body, other.value())
+                    && !is_near(*value, *other, SAME_EXACT_MASS)
+                {
+                    *from +=
+                        &format!("; the other body's, {}, is taken as equal", shown_mass(*other));
+                }
             }
         }
         let is_weighed = mass_kg.is_none() && bodies.iter().any(|mass| mass.value().is_some());

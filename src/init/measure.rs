@@ -89,6 +89,9 @@ impl Impact {
 const SAME_BY_ENERGY: f64 = 0.05;
 /// Masses of runs that differ by less are one: so much two runs of one model scatter.
 pub(super) const SAME_MASS: f64 = 0.03;
+/// The same for masses that the kinetic energy at the start gives: files print it with five digits or more, and before the
+/// contact, mass scaling and rotating parts add nearly the same share to all runs of one model.
+pub(super) const SAME_EXACT_MASS: f64 = 0.003;
 
 /// Largest share by which coarse records may let a mass be off.
 const MOST_COARSE: f64 = 0.03;
@@ -132,6 +135,19 @@ impl MassEstimates {
             }
             (Some(momentum), _) => Some((momentum, false)),
             (None, energy) => Some((energy?, true)),
+        }
+    }
+
+    /// Masses that differ from this one by less may be the same. An energy that two bodies share is as exact as the
+    /// ratio of their changes of velocity, which momentum after the contact confirms.
+    pub(super) fn same(&self) -> f64 {
+        let confirms =
+            |energy| self.by_momentum.is_some_and(|m| is_near(m, energy, SAME_EXACT_MASS));
+        match self.kg() {
+            Some((kg, true)) if !self.is_shared || (self.in_free_flight && confirms(kg)) => {
+                SAME_EXACT_MASS
+            }
+            _ => SAME_MASS,
         }
     }
 
@@ -195,12 +211,14 @@ pub(super) fn contradicts(
 
 /// The mass of each run: one for all runs that scatter about it.
 ///
-/// `why`: why a run has none. Warns where the two ways differ.
+/// `what`: `mass` or `other mass`. `why`: why a run has none. Warns where the two ways differ.
 pub(super) fn agree(
+    what: &str,
     runs: &[(String, MassEstimates)],
     why: &str,
     warnings: &mut Vec<String>,
 ) -> Vec<Proposed<f64>> {
+    let option = format!("--{}", what.replace(' ', "-"));
     for (name, mass) in runs {
         if let (Some(momentum), Some(energy)) = (mass.by_momentum, mass.by_energy)
             && !mass.is_explained(momentum, energy)
@@ -211,7 +229,7 @@ pub(super) fn agree(
                 "the force acts on only part of the moving mass, or more than the bodies is moving"
             };
             warnings.push(format!(
-                "mass: in {name} momentum gives {}, the kinetic energy at the start {}: {why}",
+                "{what}: in {name} momentum gives {}, the kinetic energy at the start {}: {why}",
                 shown_mass(momentum),
                 shown_mass(energy)
             ));
@@ -220,7 +238,7 @@ pub(super) fn agree(
             && mass.unexplained > UNEXPLAINED
         {
             warnings.push(format!(
-                "mass: in {name} the body's speed also changes without the force (gravity, brakes, another contact), which may change the mass from momentum by {:.0} %: give --mass",
+                "{what}: in {name} the body's speed also changes without the force (gravity, brakes, another contact), which may change the mass from momentum by {:.0} %: give {option}",
                 100.0 * mass.unexplained
             ));
         }
@@ -230,22 +248,33 @@ pub(super) fn agree(
     let are_all_late = runs.iter().all(|(_, mass)| mass.kg().is_none() || is_late(mass));
     let of = |(k, (_, mass)): (usize, &(String, MassEstimates))| {
         let (kg, by_energy) = mass.kg().filter(|_| are_all_late || !is_late(mass))?;
-        Some((k, kg, if by_energy { 0.0 } else { (0.5 * mass.coarseness).min(MOST_COARSE) }))
+        let coarse = if by_energy { 0.0 } else { (0.5 * mass.coarseness).min(MOST_COARSE) };
+        Some((k, kg, mass.same(), coarse))
     };
-    let mut by_mass: Vec<(usize, f64, f64)> = runs.iter().enumerate().filter_map(of).collect();
+    type Weighed = (usize, f64, f64, f64);
+    let mut by_mass: Vec<Weighed> = runs.iter().enumerate().filter_map(of).collect();
     by_mass.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut found: Vec<Proposed<f64>> = runs.iter().map(|_| Proposed::missing(why)).collect();
-    for one in by_mass.chunk_by(|a, b| is_near(a.1, b.1, SAME_MASS + a.2 + b.2)) {
+    // Near all of them, not only the last: of many in small steps, the ends are two masses.
+    let is_one = |a: &Weighed, b: &Weighed| is_near(a.1, b.1, a.2.max(b.2) + a.3 + b.3);
+    let mut groups: Vec<Vec<Weighed>> = Vec::new();
+    for run in by_mass {
+        match groups.last_mut().filter(|group| group.iter().all(|of| is_one(of, &run))) {
+            Some(group) => group.push(run),
+            None => groups.push(vec![run]),
+        }
+    }
+    for one in groups {
         let median = 0.5 * (one[(one.len() - 1) / 2].1 + one[one.len() / 2].1);
         let (least, most) = (one[0].1, one[one.len() - 1].1);
         if !is_near(least, most, SAME_MASS) {
             warnings.push(format!(
-                "mass: the runs' masses by momentum lie between {} and {}, which their records leave open: one mass is taken; give --mass if it is known",
+                "{what}: the runs' masses by momentum lie between {} and {}, which their records leave open: one mass is taken; give {option} if it is known",
                 shown_mass(least),
                 shown_mass(most)
             ));
         }
-        for &(k, ..) in one {
+        for &(k, ..) in &one {
             let mut from = runs[k].1.from();
             if one.len() > 1 {
                 let range = if is_near(least, most, 5e-4) {
@@ -292,15 +321,15 @@ pub(super) fn text(kg: f64) -> String {
     if kg >= 1e3 { format!("{}t", kg / 1e3) } else { format!("{kg}kg") }
 }
 
-/// That masses of the runs differ, if they do.
-pub(super) fn differ(masses: &[Proposed<f64>]) -> Option<String> {
+/// That masses of the runs differ, if they do; `what`: `mass` or `other mass`.
+pub(super) fn differ(what: &str, masses: &[Proposed<f64>]) -> Option<String> {
     let mut all: Vec<f64> = masses.iter().filter_map(|mass| mass.value().copied()).collect();
     all.sort_by(f64::total_cmp);
     all.dedup();
     (all.len() > 1).then(|| {
         let shown: Vec<String> = all.iter().map(|kg| digits(kg / 1e3)).collect();
         format!(
-            "mass: the runs' masses differ ({} t): do they belong to one vehicle? Models take a mass that differs as a parameter",
+            "{what}: the runs' masses differ ({} t): do they belong to one vehicle? Models take a mass that differs as a parameter",
             shown.join(", ")
         )
     })
@@ -401,7 +430,7 @@ mod tests {
         let runs =
             [24_010.0, 23_990.0, 24_004.4, 20_240.0].map(|kg| (format!("{kg}"), by_momentum(kg)));
         let mut warnings = Vec::new();
-        let found = agree(&runs, "unknown", &mut warnings);
+        let found = agree("mass", &runs, "unknown", &mut warnings);
         let values: Vec<f64> = found.iter().map(|m| *m.value().unwrap()).collect();
         assert_eq!(values, [24_000.0, 24_000.0, 24_000.0, 20_240.0]);
         assert_eq!(
@@ -409,24 +438,24 @@ mod tests {
             "computed: impulse of the force over the change of velocity, after the contact; median of 3 runs, 23990 to 24010 kg"
         );
         assert_eq!(warnings, [""; 0]);
-        assert!(differ(&found).unwrap().contains("(20.2, 24 t)"));
+        assert!(differ("mass", &found).unwrap().contains("(20.2, 24 t)"));
         // What is stopped before a record begins has no part in its mass.
         let late = |kg: f64| MassEstimates { is_late: true, ..by_momentum(kg) };
         let runs = [("a", by_momentum(24e3)), ("b", late(22_100.0)), ("c", by_momentum(60e3))];
-        let found = agree(&runs.map(|(name, mass)| (name.into(), mass)), "", &mut warnings);
+        let found = agree("mass", &runs.map(|(name, mass)| (name.into(), mass)), "", &mut warnings);
         assert_eq!(found[1].value(), Some(&24e3));
         assert!(found[1].to_string().ends_with("starts in contact, and momentum gives 22.1 t"));
         let runs = [("a", by_momentum(24e3)), ("b", late(30e3)), ("c", late(15e3))];
-        let found = agree(&runs.map(|(name, mass)| (name.into(), mass)), "", &mut warnings);
+        let found = agree("mass", &runs.map(|(name, mass)| (name.into(), mass)), "", &mut warnings);
         assert_eq!((found[1].value(), found[2].value()), (Some(&30e3), Some(&15e3)));
-        let found = agree(&[("b".into(), late(22_100.0))], "", &mut warnings);
+        let found = agree("mass", &[("b".into(), late(22_100.0))], "", &mut warnings);
         assert_eq!(found[0].value(), Some(&22.1e3));
         // A state every 2 ms of a crash of 60 ms leaves a few per cent open.
         let coarse = |kg: f64, coarseness| MassEstimates { coarseness, ..by_momentum(kg) };
         assert!(warnings.is_empty());
         for (coarseness, masses) in [(0.03, 1), (0.001, 2), (0.0, 2)] {
             let runs = [19_480.0, 20_440.0].map(|kg| (format!("{kg}"), coarse(kg, coarseness)));
-            let mut found: Vec<f64> = agree(&runs, "unknown", &mut warnings)
+            let mut found: Vec<f64> = agree("mass", &runs, "unknown", &mut warnings)
                 .iter()
                 .map(|mass| *mass.value().unwrap())
                 .collect();
@@ -440,15 +469,41 @@ mod tests {
     fn kinetic_energy_is_exact_where_both_agree() {
         let both = |energy| MassEstimates { by_energy: Some(energy), ..by_momentum(23_500.0) };
         let mut warnings = Vec::new();
-        let found = agree(&[("a".into(), both(24_000.0))], "", &mut warnings);
+        let found = agree("mass", &[("a".into(), both(24_000.0))], "", &mut warnings);
         assert_eq!(found[0].value(), Some(&24_000.0));
         assert_eq!(warnings, [""; 0]);
-        let found = agree(&[("a".into(), both(48_000.0))], "", &mut warnings);
+        let found = agree("mass", &[("a".into(), both(48_000.0))], "", &mut warnings);
         assert_eq!(found[0].value(), Some(&23_500.0));
         assert!(
             warnings[0].starts_with("mass: in a momentum gives 23.5 t, the kinetic"),
             "{warnings:?}"
         );
+    }
+
+    /// What momentum alone leaves open may be one mass, the kinetic energy shows how many there are.
+    #[test]
+    fn masses_are_one_within_their_accuracy() {
+        let loading = |kg| MassEstimates { in_free_flight: false, ..by_momentum(kg) };
+        let exact = |kg| MassEstimates { by_energy: Some(kg), ..by_momentum(kg) };
+        let shared = |kg| MassEstimates { is_shared: true, ..exact(kg) };
+        let guessed = |kg| MassEstimates { is_shared: true, by_energy: Some(kg), ..loading(kg) };
+        type Of<'a> = &'a dyn Fn(f64) -> MassEstimates;
+        let cases: [(Of<'_>, &[f64], &[f64]); 6] = [
+            (&exact, &[24e3, 24.6e3, 25.2e3], &[24e3, 24.6e3, 25.2e3]),
+            (&exact, &[24e3, 24.02e3, 24.05e3], &[24.02e3; 3]),
+            (&shared, &[24e3, 24.6e3], &[24e3, 24.6e3]),
+            (&guessed, &[24e3, 24.6e3], &[24.3e3; 2]),
+            (&by_momentum, &[24e3, 24.6e3], &[24.3e3; 2]),
+            // In small steps from one mass to another.
+            (&loading, &[23e3, 23.6e3, 24.2e3, 24.8e3], &[23.3e3, 23.3e3, 24.5e3, 24.5e3]),
+        ];
+        for (of, kg, expected) in cases {
+            let runs: Vec<_> = kg.iter().map(|kg| (format!("{kg}"), of(*kg))).collect();
+            let mut warnings = Vec::new();
+            let found = agree("other mass", &runs, "unknown", &mut warnings);
+            let found: Vec<f64> = found.iter().map(|mass| *mass.value().unwrap()).collect();
+            assert_eq!((&*found, warnings), (expected, Vec::new()), "{kg:?}");
+        }
     }
 
     /// A mass that falls during its impact takes up more impulse than it had; brakes take some of it away.
@@ -457,9 +512,9 @@ mod tests {
         let falling = MassEstimates { unexplained: 0.34, ..by_momentum(32_200.0) };
         let known = MassEstimates { by_energy: Some(24_000.0), ..falling };
         let mut warnings = Vec::new();
-        let found = agree(&[("a".into(), known)], "", &mut warnings);
+        let found = agree("mass", &[("a".into(), known)], "", &mut warnings);
         assert_eq!((found[0].value(), warnings.len()), (Some(&24_000.0), 0));
-        let found = agree(&[("a".into(), falling)], "", &mut warnings);
+        let found = agree("mass", &[("a".into(), falling)], "", &mut warnings);
         assert_eq!(found[0].value(), Some(&32_200.0));
         assert!(warnings[0].ends_with("by 34 %: give --mass"), "{warnings:?}");
     }
