@@ -1761,8 +1761,24 @@ fn a_late_force_is_not_taken_for_gravity() {
     let said = warned(here, "build s.toml -o s.h5");
     assert!(!said.contains("free flight"), "{said}");
     layout.rwforc(&run, &history, &[wall(&force_n)]);
-    let said = warned(here, "build s.toml -o s.h5");
-    says(&said, "in a way that neither gravity nor brakes explain: the force is recorded late");
+    let late = "in a way that neither gravity nor brakes explain: the force is recorded late";
+    says(&warned(here, "build s.toml -o s.h5"), late);
+    // A motion that is coarser than the force is interpolated across the contact, which is no flight.
+    for (states, force_n, is_late) in [(10, &force_n, true), (50, &history.contact_n, false)] {
+        let some = |values: &[f64]| values.iter().copied().step_by(states).collect::<Vec<f64>>();
+        let body = &history.bodies[0];
+        let bodies = vec![Motions {
+            displacement_m: body.displacement_m.each_ref().map(|of| some(of)),
+            velocity_m_per_s: body.velocity_m_per_s.each_ref().map(|of| some(of)),
+            section_n: Vec::new(),
+        }];
+        let coarse = History { time_s: some(&history.time_s), bodies, ..History::default() };
+        layout.nodout(&run, &coarse, &car_nodes());
+        layout.rwforc(&run, &history, &[wall(force_n)]);
+        let said = warned(here, "build s.toml -o s.h5");
+        assert_eq!(said.contains(late), is_late, "{said}");
+        assert!(is_late || !said.contains("free flight"), "{said}");
+    }
 }
 
 /// What cannot be read of a node or a force is said of it, and lets init take no other.

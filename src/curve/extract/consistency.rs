@@ -297,7 +297,11 @@ impl<'a> Motion<'a> {
 
     /// What another force than the recipe's does to the body, seen in its flight before contact.
     pub(super) fn flight(&self, record: &Record, remarks: &mut Notes) {
-        let states = record.time_s.partition_point(|&t| t < self.contact.time_s);
+        let contact_s = self.contact.time_s;
+        // A motion that is coarser than the force is interpolated from its last state before the contact on.
+        let own_s = record.motion_time_s.iter().flatten().copied();
+        let until_s = own_s.take_while(|t| *t <= contact_s).last().unwrap_or(contact_s);
+        let states = record.time_s.partition_point(|&t| t < contact_s && t <= until_s);
         let curve = &self.contact.curve;
         let crush_m = curve.deflection_m()[loading::loading_end(curve)];
         if states < FLIGHT || record.missing_velocity.is_some() {
