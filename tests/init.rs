@@ -2136,4 +2136,24 @@ fn a_prescribed_motion_is_named() {
     let error = crumple_fails(here, 1, "init tube");
     says(&error, "it terminated early: the record ends at 0.0399");
     says(&error, "(if their motion is prescribed, write a table of deflection and force");
+
+    // A wall that hits a body at rest.
+    let motion = &mut history.bodies[0];
+    for (k, time_s) in history.time_s.iter().enumerate() {
+        motion.displacement_m[4][k] = 25.0 * time_s * time_s;
+        motion.velocity_m_per_s[4][k] = 50.0 * time_s;
+    }
+    one_body(&here.join("hit/a"), &history);
+    let error = crumple_fails(here, 1, "init hit");
+    says(
+        &error,
+        "if a moving wall hits the body, write a table of deflection (the wall's way less",
+    );
+    fs::write(here.join("hit.toml"), "[study]\nname = \"hit\"\ngroup = \"hit\"\nunits = \"mm-t-s\"\nkind = \"wall\"\n[recipe]\ndeflection = { file = \"nodout\", node = 5, component = \"x_displacement\" }\nforce = { file = \"rwforc\", id = 1, component = \"x_force\" }\nfilter = \"none\"\nsampling = { states = 300, interval_ms = 0.1 }\n[[run]]\npath = \"hit/a\"\nspeed = \"40km/h\"\nmass = \"1.2t\"\n").unwrap();
+    let error = crumple_fails(here, 1, "build hit.toml");
+    says(&error, "the body does not move at first and gains speed under the force");
+    says(
+        &error,
+        "write a table of deflection and force, which crumple histories gives, and add it",
+    );
 }

@@ -333,7 +333,7 @@ pub(crate) enum Reason {
         damage: String,
     },
     #[error(
-        "nothing moves in its first state, so there is no impact speed to read: if a wall moves, write its study by hand"
+        "nothing moves in its first state, so there is no impact speed to read: if a moving wall hits the body, write a table of deflection (the wall's way less the body's) and force, which crumple histories gives, and add it with crumple db add"
     )]
     Stands,
     /// The chosen histories cannot be used.

@@ -24,6 +24,8 @@ const LATE_FORCE: (f64, f64) = (0.15, 0.02);
 /// A body that has lost less than this share of its speed, under an impulse of half its momentum,
 /// does not move by that force.
 const SLOWED: f64 = 0.05;
+/// A body whose speed at contact is less than this share of what it gains is at rest.
+const AT_REST: f64 = 0.02;
 /// Fewer output intervals up to the maximum crush than this may cut peaks.
 const STATES: usize = 100;
 /// Effect of the sampling on the curve, as a share of its mean force, that deserves a warning.
@@ -193,13 +195,19 @@ impl<'a> Motion<'a> {
         let curve = &self.contact.curve;
         let last = loading::loading_end(curve);
         let closing = &self.contact.closing_m_per_s;
+        let slowest = closing[..last].iter().copied().fold(f64::INFINITY, f64::min);
+        let fastest = closing[..last].iter().copied().fold(0.0, f64::max);
+        let impulse = integral(curve.time_s(), curve.force_n())[last];
+        let is_slowed = slowest < (1.0 - SLOWED) * closing[0];
+        if closing[0] > 0.0 && (is_slowed || impulse < 0.5 * self.momentum_ns()) {
+            return Ok(());
+        }
+        if closing[0].abs() < AT_REST * fastest {
+            let found = "the body does not move at first and gains speed under the force, as if a moving wall hit it: the deflection would be the wall's way less the body's";
+            return Err(ExtractError::Prescribed(found.into()));
+        }
         if closing[0] <= 0.0 {
             return Err(ExtractError::Standing);
-        }
-        let slowest = closing[..last].iter().copied().fold(f64::INFINITY, f64::min);
-        let impulse = integral(curve.time_s(), curve.force_n())[last];
-        if slowest < (1.0 - SLOWED) * closing[0] || impulse < 0.5 * self.momentum_ns() {
-            return Ok(());
         }
         Err(ExtractError::Prescribed(format!(
             "the motion is prescribed: the body keeps its {:.4} m/s up to the maximum deflection, although the force would have stopped it {:.1} times over",

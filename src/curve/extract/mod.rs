@@ -423,7 +423,7 @@ pub(crate) enum ExtractError {
     ImpossibleRun(#[from] energy::ImpossibleRun),
     /// The motion of the body is prescribed, whatever the force.
     #[error(
-        "{0}. No impact of this mass and speed has such a curve; crumple histories writes its force and displacement"
+        "{0}. No impact of this mass and speed has such a curve: write a table of deflection and force, which crumple histories gives, and add it with crumple db add"
     )]
     Prescribed(String),
     /// The deflection does not grow after contact.
