@@ -331,6 +331,17 @@ fn half_models_are_asked_for() {
     let output = crumple_in(&here, "init --half-model --strict");
     assert_eq!(String::from_utf8(output.stderr).unwrap(), "");
     assert_eq!(output.status.code(), Some(0));
+    // Their names may state the record's own speed, half of the closing speed, too.
+    for (from, to, looks) in [("12kmh", "a-6kmh", 0), ("25kmh", "b-13kmh", 1)] {
+        fs::rename(here.join(from), here.join(to)).unwrap();
+        let said = warned(&here, "init --half-model -o named.toml");
+        assert_eq!(said.matches("the folder's name states").count(), looks, "{said}");
+        let text = fs::read_to_string(here.join("named.toml")).unwrap();
+        let look = "the folder's name states 13 km/h, the record 12.5 km/h";
+        assert_eq!(text.matches(look).count(), looks, "{text}");
+        says(&text, "# computed: twice the x_velocity of");
+        fs::remove_file(here.join("named.toml")).unwrap();
+    }
     // Two bodies are not a half model, one body is not a pair.
     let pair = group(&fixture("fe/lead-car-pair"), TEXTS);
     let there = pair.path().join("lead-car-pair");

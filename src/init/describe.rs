@@ -387,9 +387,9 @@ impl Facts<'_> {
                 crush_m: impact.map(|impact| impact.crush_m),
                 truncated: false,
                 states: record.states,
-                notes: impact
-                    .filter(|_| !is_half)
-                    .map_or(Vec::new(), |impact| doubts_of_speed(record, impact)),
+                notes: impact.filter(|_| !is_half).map_or(Vec::new(), |impact| {
+                    doubts_of_speed(record, impact, self.hints.half_model)
+                }),
             });
         }
         sort(&mut runs);
@@ -432,7 +432,7 @@ impl Facts<'_> {
         let sampling = whole.sampling.value()?;
         let window_s = impact.contact_s + (sampling.states - 1) as f64 * sampling.interval_s;
         let of_others = |kg: f64| Proposed::found(kg, Computed, "that of the other runs");
-        let mut notes = doubts_of_speed(record, impact);
+        let mut notes = doubts_of_speed(record, impact, self.hints.half_model);
         notes.push(format!(
             "the record ends at {end}, while the bodies still close at {} % of their first speed: the curve goes up to there, and the maximum crush is larger{}",
             percent(share),
@@ -607,11 +607,16 @@ fn taken(kept: f64) -> String {
 }
 
 /// Speeds in a folder's name and the run's own deck that contradict the record.
-fn doubts_of_speed(record: &Record, impact: &Impact) -> Vec<String> {
+fn doubts_of_speed(record: &Record, impact: &Impact, half_model: bool) -> Vec<String> {
     let (run, first) = (&record.run, record.closing(impact.state.0));
     let mut notes = Vec::new();
     let named = speed_in(&run.name);
-    let is_as_named = named.is_some_and(|named| is_near(named, impact.speed_m_per_s, SAME_SPEED));
+    // Of half a model, folders may be named after the record's own speed or after the closing speed.
+    let bodies = if half_model { 2.0 } else { 1.0 };
+    let own_m_per_s = impact.speed_m_per_s / bodies;
+    let is_as_named = named.is_some_and(|named| {
+        [1.0, bodies].iter().any(|times| is_near(named, times * own_m_per_s, SAME_SPEED))
+    });
     if record.starts_in_contact() && !is_as_named {
         notes.push(
             "the record starts in contact, so the speed of its first state is not that of the impact: write the impact's speed, or provide the earlier states"
@@ -639,7 +644,7 @@ fn doubts_of_speed(record: &Record, impact: &Impact) -> Vec<String> {
         notes.push(format!(
             "the folder's name states {}, the record {}",
             km_per_h(named),
-            km_per_h(impact.speed_m_per_s)
+            km_per_h(own_m_per_s)
         ));
     }
     if let Some((path, deck)) = &run.sources.deck
