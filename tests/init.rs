@@ -749,6 +749,22 @@ fn masses_are_never_made_up() {
     let text = fs::read_to_string(here.join("both.toml")).unwrap();
     says(&text, "mass = \"1.2t\"");
     says(&text, "kinetic energy of the model at the start over ½v² (momentum gives");
+    // The energy is that of the whole speed: the car also slides along the wall, at 5 m/s.
+    let mut oblique = history;
+    oblique.kinetic_j.iter_mut().for_each(|kinetic_j| *kinetic_j += 0.5 * 1_200.0 * 25.0);
+    layout.glstat(&run, &oblique);
+    let nodout = fs::read_to_string(run.join("nodout")).unwrap();
+    let across = |line: &str| match line.len() {
+        154 if &line[46..58] != " 0.00000E+00" => {
+            format!("{} 5.00000E+03{}\n", &line[..58], &line[70..])
+        }
+        _ => format!("{line}\n"),
+    };
+    fs::write(run.join("nodout"), nodout.lines().map(across).collect::<String>()).unwrap();
+    let said = warned(&here, "init -o oblique.toml");
+    says(&said, "only 94 % of the initial speed lies along x");
+    assert!(!said.contains("kinetic energy"), "{said}");
+    assert_eq!(study(&here, "oblique.toml")["run"][0]["mass"].as_str(), Some("1.2t"));
 }
 
 /// A force that is larger than what stops the body makes no mass that is heavier than all that moves.

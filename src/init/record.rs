@@ -57,6 +57,8 @@ pub(super) struct Record {
     pub time: Vec<f64>,
     /// Of the node, and of a pair the other node.
     pub velocities: Vec<Vec<f64>>,
+    /// Squares of their first speeds, which need not be along the motion.
+    first_squares: Vec<f64>,
     /// Displacement of the node, less the other node's.
     pub travel: Vec<f64>,
     /// Empty if the recipe has no contact force, as the next three.
@@ -101,15 +103,18 @@ impl Record {
         let mut damage = damage(motion, read.problems.first());
         let damage_of_motion = bracketed(damage.first().map(String::as_str));
         let (mut velocities, mut travels) = (Vec::new(), Vec::new());
+        let mut first_squares = Vec::new();
         for node in &recipe.nodes {
             let entity = Some(EntityId::new(node.id));
             let of: Vec<History> =
                 read.histories.iter().filter(|h| h.entity == entity).cloned().collect();
             let lacks =
                 |what: &str| Reason::Unusable { why: format!("node {} has no {what}", node.id) };
-            velocities.push(
-                velocity(&of, direction, &states).ok_or_else(|| lacks(direction.velocity()))?,
-            );
+            let velocity =
+                velocity(&of, direction, &states).ok_or_else(|| lacks(direction.velocity()))?;
+            let square = run.survey.first_square(node.id).or(velocity.first().map(|v| v * v));
+            first_squares.extend(square);
+            velocities.push(velocity);
             let travel = component(&of, direction.name()).ok_or_else(|| lacks(direction.name()))?;
             travels.push(picked(&travel.values, &states));
         }
@@ -169,6 +174,7 @@ impl Record {
             run,
             time,
             velocities,
+            first_squares,
             travel,
             force_time,
             force,
@@ -479,7 +485,7 @@ impl Record {
         if self.velocities.len() > 1 {
             shares.push(self.mass_ratio()?);
         }
-        let squares = self.velocities.iter().zip(&shares).map(|(v, share)| share * v[0].powi(2));
+        let squares = self.first_squares.iter().zip(&shares).map(|(square, share)| share * square);
         let body = 2.0 * kinetic / squares.sum::<f64>();
         (kinetic > 0.0 && body.is_finite()).then(|| shares.iter().map(|s| s * body).collect())
     }

@@ -135,6 +135,12 @@ impl Survey {
         Ok(Self { direction, aligned, bodies, forces })
     }
 
+    /// The square of the first speed of a body's node.
+    pub(super) fn first_square(&self, id: i64) -> Option<f64> {
+        let node = self.bodies.iter().flat_map(|body| &body.nodes).find(|node| node.id == id)?;
+        Some(node.first_velocity.iter().map(|v| v * v).sum())
+    }
+
     pub(super) fn force(&self, file: &str, ids: &[i64]) -> Option<usize> {
         self.forces.iter().position(|f| f.file == file && f.ids == ids)
     }
