@@ -739,8 +739,13 @@ fn masses_are_never_made_up() {
     says(&text, "\n# mass =     # fill in\n");
     says(&text, "times = \"mass\"");
     assert!(crumple_fails(&here, 1, "build").contains("missing field `mass`"));
-    crumple_ok(&here, "init --mass 1.2t -o given.toml");
+    // Without a force the build finds the contact, and with it the crush.
+    let crush = |document: &str| json(document)["runs"][0]["crush_m"].as_f64();
+    assert_eq!(crush(&crumple_ok(&here, "init --json -o none.toml")), None);
+    let crush_m = crush(&crumple_ok(&here, "init --mass 1.2t --json -o given.toml"));
     crumple_ok(&here, "build given.toml -q");
+    let built = Database::read(&here.join("curves.h5")).unwrap();
+    assert_eq!(crush_m, Some(built.cases("cars")[0].max_deflection_m()));
     layout.glstat(&run, &history);
     crumple_ok(&here, "init -o energy.toml");
     assert_eq!(study(&here, "energy.toml")["run"][0]["mass"].as_str(), Some("1.2t"));

@@ -384,7 +384,8 @@ impl Facts<'_> {
                 mass_kg: bodies.get(k).cloned().unwrap_or_else(no_units),
                 other_mass_kg: others.as_ref().and_then(|others| others.get(k)).cloned(),
                 truncate_s: cuts[k].map(|s| Proposed::found(s, Computed, cut_because)),
-                crush_m: impact.map(|impact| impact.crush_m),
+                // Without a force, only the build finds the contact.
+                crush_m: impact.filter(|of| !of.force_n.is_empty()).map(|impact| impact.crush_m),
                 truncated: false,
                 states: record.states,
                 notes: impact.filter(|_| !is_half).map_or(Vec::new(), |impact| {

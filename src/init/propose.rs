@@ -295,15 +295,18 @@ fn leave_out_refused(proposal: &mut Proposal, path: &Path) -> Result<(), Error> 
         return Ok(());
     }
     let study = study::parse(path, &proposal.to_toml())?;
-    let refused: Vec<Option<Error>> = study
+    let extracted: Vec<Result<f64, Error>> = study
         .runs()
         .par_iter()
-        .map(|entry| study.locate(entry).and_then(|run| run.extract()).err())
+        .map(|entry| Ok(study.locate(entry)?.extract()?.max_deflection_m()))
         .collect();
-    for (run, refused) in std::mem::take(&mut proposal.runs).into_iter().zip(refused) {
-        match refused {
-            None => proposal.runs.push(run),
-            Some(error) => {
+    for (mut run, extracted) in std::mem::take(&mut proposal.runs).into_iter().zip(extracted) {
+        match extracted {
+            Ok(crush_m) => {
+                run.crush_m = run.crush_m.or(Some(crush_m));
+                proposal.runs.push(run);
+            }
+            Err(error) => {
                 let reason = Reason::Refused { why: error.to_string() };
                 proposal.left_out.push(LeftOut::new(run.folder, reason));
             }
