@@ -747,7 +747,7 @@ fn mean_decelerations_end_with_the_force() {
             for duration_s in [2.0, 3.0] {
                 let coarse = run(chain, &RunSettings::new(duration_s, 5e-3).with_method(method));
                 for (i, body) in chain.bodies().iter().enumerate() {
-                    let (exact, length_s) = mean_of_histories(&fine, i, body.mass_kg);
+                    let (exact, length_s) = mean_of_histories(&fine, i, body.mass_kg).unwrap();
                     assert!(length_s < 1.9, "chain {k}: body {i} over {length_s} s");
                     let found = coarse.bodies[i].mean_deceleration_m_per_s2;
                     let error = (found / exact - 1.0).abs();
@@ -804,31 +804,49 @@ fn mean_decelerations_begin_with_the_force() {
 }
 
 /// Mean deceleration by its definition from fine histories: over the first stretch of time in
-/// which the net force has one sign and exceeds 1 kN, but for at most 0.3 ms, and changes the speed
-/// by 0.5 % of the largest change; and how long that is, in s.
-fn mean_of_histories(run: &Run, body: usize, mass_kg: f64) -> (f64, f64) {
+/// which the net force has one sign and exceeds 1 kN, but for less than 1 ms, and changes the speed
+/// by 0.5 % of the range of the speeds, 5 % in less than 1 ms; and how long that is, in s. None where that depends on whether
+/// something lasts a quarter of a millisecond more.
+fn mean_of_histories(run: &Run, body: usize, mass_kg: f64) -> Option<(f64, f64)> {
+    let [one, other] = [0.75e-3, 1.25e-3].map(|s| mean_without(run, body, mass_kg, s));
+    (one == other).then_some(one)
+}
+
+/// The same, with interruptions that are shorter than that.
+fn mean_without(run: &Run, body: usize, mass_kg: f64, brief_s: f64) -> (f64, f64) {
     let (a, v, times) = (&run.bodies[body].a_m_per_s2, &run.bodies[body].v_m_per_s, &run.time_s);
     let exceeds = |t: usize, sign: f64| a[t] * sign * mass_kg > 1e3;
     let (mut from, mut stretches) = (0, Vec::new());
     while let Some(first) = (from..a.len()).find(|&t| exceeds(t, a[t].signum())) {
         let sign = a[first].signum();
-        let mut end = first;
-        while let Some(next) = (end + 1..a.len()).find(|&t| exceeds(t, sign)) {
-            let has_ended = times[next] - times[end] > 0.3e-3;
-            if has_ended || (end + 1..next).any(|t| a[t] == 0.0 || a[t] * sign * mass_kg < -1e3) {
-                break;
-            }
-            end = next;
-        }
-        let (begin, end) = (first.saturating_sub(1), (end + 1).min(a.len() - 1));
-        if end > begin {
-            stretches.push((v[begin] - v[end], times[end] - times[begin]));
+        let end = (first..a.len()).find(|&t| !exceeds(t, sign)).unwrap_or(a.len() - 1);
+        if end > first {
+            stretches.push((sign, first.saturating_sub(1), end));
         }
         from = end.max(first + 1);
     }
-    let most = stretches.iter().map(|s| s.0.abs()).fold(0.0, f64::max);
-    let first = stretches.into_iter().find(|s| s.0.abs() >= 0.005 * most);
-    first.map_or((0.0, f64::INFINITY), |(change, length_s)| (change / length_s, length_s))
+    let is_brief = |from: usize, to: usize| times[to].max(times[from]) - times[from] < brief_s;
+    let joins = |s: &[(f64, usize, usize)]| {
+        let follow = s.windows(2).all(|pair| is_brief(pair[0].2, pair[1].1));
+        follow && s[0].0 == s[s.len() - 1].0 && (s.len() == 2 || is_brief(s[1].1, s[1].2))
+    };
+    while let Some((k, n)) = (0..stretches.len()).find_map(|k| {
+        let of = |n: &usize| stretches.get(k..k + n).is_some_and(joins);
+        [2, 3].into_iter().find(of).map(|n| (k, n))
+    }) {
+        stretches[k].2 = stretches[k + n - 1].2;
+        stretches.drain(k + 1..k + n);
+    }
+    let ends = stretches.iter().flat_map(|s| [v[s.1], v[s.2]]);
+    let (low, high) =
+        ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (v.min(low), v.max(high)));
+    let counts = |(_, begin, end): &&(f64, usize, usize)| {
+        let share = if is_brief(*begin, *end) { 0.05 } else { 0.005 };
+        (v[*begin] - v[*end]).abs() >= share * (high - low)
+    };
+    let Some(&(_, begin, end)) = stretches.iter().find(counts) else { return (0.0, f64::INFINITY) };
+    let length_s = times[end] - times[begin];
+    ((v[begin] - v[end]) / length_s, length_s)
 }
 
 /// The summary has them whatever the interval between the outputs.
@@ -836,7 +854,7 @@ fn mean_of_histories(run: &Run, body: usize, mass_kg: f64) -> (f64, f64) {
 fn mean_decelerations_do_not_depend_on_the_outputs() {
     let mut random = Stream::seed_from_u64(11);
     let kind = Kind { above: false, tension: true, shapes: false, everywhere: false };
-    let mut errors = Vec::new();
+    let (mut errors, mut open) = (Vec::new(), 0);
     for _ in 0..40 {
         let chain = random_chain(&mut random, kind);
         let settings = RunSettings::new(0.24, 2e-5).with_method(Method::FourthOrder);
@@ -849,7 +867,10 @@ fn mean_decelerations_do_not_depend_on_the_outputs() {
         ] {
             let coarse = run(&chain, &RunSettings::new(0.24, output_s).with_method(method));
             for (i, body) in chain.bodies().iter().enumerate() {
-                let (exact, length_s) = mean_of_histories(&fine, i, body.mass_kg);
+                let Some((exact, length_s)) = mean_of_histories(&fine, i, body.mass_kg) else {
+                    open += 1;
+                    continue;
+                };
                 let found = coarse.bodies[i].mean_deceleration_m_per_s2;
                 let error = (found - exact).abs() / exact.abs().max(0.1);
                 // Ends fall between two looks.
@@ -863,6 +884,7 @@ fn mean_decelerations_do_not_depend_on_the_outputs() {
         }
     }
     errors.sort_by(f64::total_cmp);
+    assert!(open < errors.len() / 20, "{open} of {}", errors.len());
     let at = |share: f64| errors[(errors.len() as f64 * share) as usize];
     println!("mean decelerations, median, 9 of 10, 49 of 50: {:?}", [0.5, 0.9, 0.98].map(at));
     assert!(at(0.5) < 1e-3 && at(0.9) < 5e-3 && at(0.98) < 2e-2);

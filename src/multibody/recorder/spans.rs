@@ -295,7 +295,9 @@ impl Spans {
         let mut closed = std::mem::take(&mut self.closed);
         closed.retain(|span| self.counts(span));
         // One that is hardly larger than one before it is never the first that counts.
-        let is_new = closed.last().is_none_or(|last| span.change() >= LARGER * last.change());
+        let is_new = closed.last().is_none_or(|last| {
+            span.change() >= LARGER * last.change() || last.is_short() && !span.is_short()
+        });
         if is_new && self.counts(&span) {
             closed.push(span);
         }
