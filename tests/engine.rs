@@ -804,9 +804,9 @@ fn mean_decelerations_begin_with_the_force() {
 }
 
 /// Mean deceleration by its definition from fine histories: over the first stretch of time in
-/// which the net force has one sign and exceeds 1 kN, but for less than 1 ms, and changes the speed
-/// by 0.5 % of the range of the speeds, 5 % in less than 1 ms; and how long that is, in s. None where that depends on whether
-/// something lasts a quarter of a millisecond more.
+/// which the net force has one sign and exceeds 1 kN, but for at most 0.3 ms, beside a push of less than 1 ms for as long, and
+/// changes the speed by 0.5 % of the range of the speeds, 5 % in less than 1 ms; and how long that is, in s. None where
+/// that depends on whether something lasts a quarter of a millisecond more.
 fn mean_of_histories(run: &Run, body: usize, mass_kg: f64) -> Option<(f64, f64)> {
     let [one, other] = [0.75e-3, 1.25e-3].map(|s| mean_without(run, body, mass_kg, s));
     (one == other).then_some(one)
@@ -821,30 +821,39 @@ fn mean_without(run: &Run, body: usize, mass_kg: f64, brief_s: f64) -> (f64, f64
         let sign = a[first].signum();
         let end = (first..a.len()).find(|&t| !exceeds(t, sign)).unwrap_or(a.len() - 1);
         if end > first {
-            stretches.push((sign, first.saturating_sub(1), end));
+            stretches.push((sign, first.saturating_sub(1), end, first.saturating_sub(1)));
         }
         from = end.max(first + 1);
     }
     let is_brief = |from: usize, to: usize| times[to].max(times[from]) - times[from] < brief_s;
-    let joins = |s: &[(f64, usize, usize)]| {
-        let follow = s.windows(2).all(|pair| is_brief(pair[0].2, pair[1].1));
-        follow && s[0].0 == s[s.len() - 1].0 && (s.len() == 2 || is_brief(s[1].1, s[1].2))
+    // Sign, begin, end, and begin of the last of its pushes.
+    let joins = |s: &[(f64, usize, usize, usize)]| {
+        let (first, last) = (s[0], s[s.len() - 1]);
+        let rattles = is_brief(first.3, first.2) || is_brief(last.1, last.2);
+        let follow = |from: usize, to: usize| {
+            rattles && is_brief(from, to) || s.len() == 2 && times[to] - times[from] <= 0.3e-3
+        };
+        first.0 == last.0
+            && s.windows(2).all(|pair| follow(pair[0].2, pair[1].1))
+            && (s.len() == 2 || is_brief(s[1].1, s[1].2))
     };
     while let Some((k, n)) = (0..stretches.len()).find_map(|k| {
         let of = |n: &usize| stretches.get(k..k + n).is_some_and(joins);
         [2, 3].into_iter().find(of).map(|n| (k, n))
     }) {
-        stretches[k].2 = stretches[k + n - 1].2;
+        (stretches[k].2, stretches[k].3) = (stretches[k + n - 1].2, stretches[k + n - 1].3);
         stretches.drain(k + 1..k + n);
     }
     let ends = stretches.iter().flat_map(|s| [v[s.1], v[s.2]]);
     let (low, high) =
         ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (v.min(low), v.max(high)));
-    let counts = |(_, begin, end): &&(f64, usize, usize)| {
+    let counts = |(_, begin, end, _): &&(f64, usize, usize, usize)| {
         let share = if is_brief(*begin, *end) { 0.05 } else { 0.005 };
         (v[*begin] - v[*end]).abs() >= share * (high - low)
     };
-    let Some(&(_, begin, end)) = stretches.iter().find(counts) else { return (0.0, f64::INFINITY) };
+    let Some(&(_, begin, end, _)) = stretches.iter().find(counts) else {
+        return (0.0, f64::INFINITY);
+    };
     let length_s = times[end] - times[begin];
     ((v[begin] - v[end]) / length_s, length_s)
 }

@@ -1072,7 +1072,7 @@ fn groups_in_one_folder_are_told_apart() {
     assert_eq!(entries(folder.path()), ["lead-car-wall", "vehicle-pair"]);
     // As one group their masses show that they are none.
     let said = warned(folder.path(), "init --group all");
-    says(&said, "the runs' masses differ (20.2, 24 t): do they belong to one vehicle?");
+    says(&said, "the runs' masses differ (20.24, 24 t): do they belong to one vehicle?");
     let found = study(folder.path(), "study.toml");
     assert_eq!(found["study"]["group"].as_str(), Some("all"));
     assert_eq!(found["run"][0]["path"].as_str(), Some("vehicle-pair/25kmh"));

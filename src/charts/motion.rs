@@ -296,6 +296,10 @@ pub fn motion(
         };
         return Err(error!(Plot, "{name} has no {missing}"));
     }
+    let short = runs.iter().find(|(_, run)| run.time_s.len() < 2);
+    if let (Some((name, _)), Quantity::Acceleration) = (short, quantity) {
+        return Err(error!(Plot, "{name} has one row: an acceleration needs two or more"));
+    }
     let names = names(runs, quantity, chosen)?;
     let mut chart = match quantity {
         Quantity::Energy => {

@@ -63,7 +63,7 @@ pub(super) struct Which {
     /// Speeds of a model's curves, of a database's cases, or of a measured curve, with units; repeated or separated by commas
     #[arg(long, value_parser = speed_m_per_s, value_delimiter = ',', allow_hyphen_values = true)]
     pub speed: Vec<f64>,
-    /// Mass of a model's body, or of each body of a pair (the first, if masses differ between the runs), with its unit (default: the training runs')
+    /// Mass of a model's body, or of each body of a pair (the first, if the two bodies of a run differ), with its unit (default: the training runs')
     #[arg(long, value_parser = mass_kg, allow_hyphen_values = true)]
     pub mass: Option<f64>,
     /// Rule for a model's maximum crush [default: the model's own]
@@ -86,7 +86,7 @@ pub(super) struct Which {
 /// The target's format and what it leaves open.
 #[derive(clap::Args)]
 pub(super) struct Target {
-    /// Format, if not given by the file's extension (crumple export --list)
+    /// Format or kind of file, if not given by the file's extension (crumple export --list)
     #[arg(long)]
     to: Option<String>,
     /// Units of the file, such as mm-t-s (default: lsdyna and radioss the study's, adams mm and N, others SI)

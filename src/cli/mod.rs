@@ -71,7 +71,7 @@ pub(crate) struct GlobalOptions {
     /// Accept databases, models and unfinished sweeps that were changed after they were written
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub accept_changed: bool,
-    /// Replace an output that exists and is of another kind (a database, a model, a study, a solver file), or the study of init
+    /// Replace an output that exists and is of another kind (a database, a model, a study, a solver file, another tool's input), or the study of init
     /// (build, db add and db copy add to a database, and replace no other file)
     #[arg(long, global = true, help_heading = GLOBAL)]
     pub overwrite: bool,

@@ -30,7 +30,7 @@ pub(super) struct Args {
     /// Maximum crush with its unit, in place of the speed: the speed between the runs that gives it is found
     #[arg(long, value_parser = length_m, allow_hyphen_values = true, conflicts_with_all = ["speed", "extrapolate"])]
     crush: Option<f64>,
-    /// Mass of the body, or of each body of a pair (the first, if masses differ between the runs), with its unit (default: the training runs')
+    /// Mass of the body, or of each body of a pair (the first, if the two bodies of a run differ), with its unit (default: the training runs')
     #[arg(long, value_parser = mass_kg, allow_hyphen_values = true)]
     mass: Option<f64>,
     /// Rule for the maximum crush [default: the model's own, mostly motion]

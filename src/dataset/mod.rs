@@ -151,7 +151,7 @@ pub(crate) fn feature_values(
         if name == OTHER_MASS {
             return error!(
                 Dataset,
-                "the model needs {name}, the mass of the other body: give --parameter {name}=…"
+                "the model needs {name}, the mass of the other body: give --parameter {name}=…, or in a scenario parameters = {{ {name} = … }} of the curve"
             );
         }
         error!(

@@ -90,8 +90,9 @@ const SAME_BY_ENERGY: f64 = 0.05;
 /// Masses of runs that differ by less are one: so much two runs of one model scatter.
 pub(super) const SAME_MASS: f64 = 0.03;
 /// The same for masses that the kinetic energy at the start gives: files print it with five digits or more, and before the
-/// contact, mass scaling and rotating parts add nearly the same share to all runs of one model.
-pub(super) const SAME_EXACT_MASS: f64 = 0.003;
+/// contact, mass scaling and rotating parts add nearly the same share to all runs of one model. A model takes no smaller difference
+/// as a parameter.
+pub(super) const SAME_EXACT_MASS: f64 = 0.005;
 
 /// Largest share by which coarse records may let a mass be off.
 const MOST_COARSE: f64 = 0.03;
@@ -327,7 +328,7 @@ pub(super) fn differ(what: &str, masses: &[Proposed<f64>]) -> Option<String> {
     all.sort_by(f64::total_cmp);
     all.dedup();
     (all.len() > 1).then(|| {
-        let shown: Vec<String> = all.iter().map(|kg| digits(kg / 1e3)).collect();
+        let shown: Vec<String> = all.iter().map(|kg| (rounded(*kg) / 1e3).to_string()).collect();
         format!(
             "{what}: the runs' masses differ ({} t): do they belong to one vehicle? Models take a mass that differs as a parameter",
             shown.join(", ")
@@ -438,7 +439,7 @@ mod tests {
             "computed: impulse of the force over the change of velocity, after the contact; median of 3 runs, 23990 to 24010 kg"
         );
         assert_eq!(warnings, [""; 0]);
-        assert!(differ("mass", &found).unwrap().contains("(20.2, 24 t)"));
+        assert!(differ("mass", &found).unwrap().contains("(20.24, 24 t)"));
         // What is stopped before a record begins has no part in its mass.
         let late = |kg: f64| MassEstimates { is_late: true, ..by_momentum(kg) };
         let runs = [("a", by_momentum(24e3)), ("b", late(22_100.0)), ("c", by_momentum(60e3))];

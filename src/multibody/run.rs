@@ -117,8 +117,9 @@ pub struct BodyHistory {
     /// Acceleration by contacts at the end of the run, in m/s².
     pub(crate) final_a_m_per_s2: f64,
     /// Mean of `−a` while the body's net contact force acts for the first time, until it ends or
-    /// changes its sign for a millisecond. Up to 1 kN, of a body below 1 t 1 m/s², longer than a look of 0.25 ms, it does not act;
-    /// contacts that change the speed by less than 0.5 % of the range of the body's speeds do not count.
+    /// changes its sign. Up to 1 kN, of a body below 1 t 1 m/s², longer than a look of 0.25 ms, it does not act. Where vehicles rattle, beside
+    /// a push of less than 1 ms, it may be gone or have the other sign for as long. Contacts that change the speed by less
+    /// than 0.5 % of the range of the body's speeds (5 % in less than 1 ms) do not count.
     pub mean_deceleration_m_per_s2: f64,
     /// That net contact force still acts when the run ends: the mean is of a part.
     pub is_loaded_at_end: bool,

@@ -439,7 +439,7 @@ fn ledger(ledger: &Ledger) -> String {
 }
 
 /// What the columns of vehicles mean.
-const VEHICLES: &str = "Positive: slowed down in the direction of the first train. Mean deceleration: while the net contact force acts for the first time, until it ends or changes its sign, and then in the contact that changes the speed most, if that is a later one; limits apply to both. Secondary impact: speed of an unrestrained occupant against the interior after 0.6 m. Occupant load: deceleration that stops an occupant within 235 mm after 65 mm of slack.";
+const VEHICLES: &str = "Positive: slowed down in the direction of the first train. Mean deceleration: while the net contact force acts for the first time, until it ends or changes its sign (what rattles for less than 1 ms left aside), and then in the contact that changes the speed most, if that is a later one; limits apply to both. Secondary impact: speed of an unrestrained occupant against the interior after 0.6 m. Occupant load: deceleration that stops an occupant within 235 mm after 65 mm of slack.";
 
 /// Masses, speeds and decelerations.
 fn vehicles(summary: &Summary<'_>) -> impl Into<Table> {

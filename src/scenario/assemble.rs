@@ -479,6 +479,9 @@ impl<'a> Builder<'a> {
         speed: f64,
     ) -> Result<CachedLaw, Error> {
         let (table, source) = (&self.scenario.curves[curve], &self.sources.curves[curve]);
+        if let CurveSource::Model(model) = source {
+            self.check_kind(slot, curve, Some(model.speed_kind))?;
+        }
         let spring =
             spring(source, table, slot, speed).map_err(|error| self.no_spring(curve, error))?;
         self.check_kind(slot, curve, spring.curve.speed_kind)?;

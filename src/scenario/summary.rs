@@ -211,21 +211,24 @@ impl Prepared {
             |k: usize| self.chain.bodies().get(k).map_or(f64::INFINITY, |body| body.mass_kg);
         let closing = |k: usize| speed(k) - speed(k + 1);
         let has = |k: usize| k < run.interfaces.len();
-        // What interfaces of loaded bodies store may drive body `k` away, and what closes turn it round. Where forces balance, a
-        // train that is pressed together springs back in many small steps: that is left out.
-        let thrown = |k: usize, beyond: Range<usize>| {
+        // What closes may drive body `k` away, the next one turn it round, and what the interface to that stores push it, if it
+        // is pushed. Where forces balance, a train that is pressed together springs back in many small steps.
+        let thrown = |k: usize, next: usize, beyond: Range<usize>| {
             let speed_of = |energy_j: f64| (2.0 * energy_j / mass_kg(k)).sqrt();
             let closing_j = |k: usize| {
                 let closing = closing(k).max(0.0);
                 0.5 * closing * closing / (1.0 / mass_kg(k) + 1.0 / mass_kg(k + 1))
             };
-            let is_loaded = |k: usize| {
-                run.bodies.get(k).is_some_and(|body| body.running_and_largest_change.0.is_some())
+            let is_pushed = run.bodies[k].running_and_largest_change.0.is_some();
+            let [next_j, stored_j] = match beyond.contains(&next) {
+                true if is_pushed => [closing_j(next), run.interfaces[next].stored_at_end_j],
+                true => [closing_j(next), 0.0],
+                false => [0.0; 2],
             };
-            let unsettled = beyond.clone().filter(|k| is_loaded(*k) || is_loaded(k + 1));
-            let stored_j = unsettled.map(|k| run.interfaces[k].stored_at_end_j).sum();
-            speed_of(stored_j) + 2.0 * speed_of(beyond.map(closing_j).sum())
+            speed_of(stored_j) + speed_of(beyond.map(closing_j).sum()) + speed_of(next_j)
         };
+        // Of what it gains in a rebound, by a body that is lighter than it.
+        let share = |k: usize| mass_kg(k) / (mass_kg(k) + mass_kg(i));
         let mut behind = i;
         while behind > 0 && closing(behind - 1) > -LEAST_CLOSING_M_PER_S {
             behind -= 1;
@@ -239,12 +242,13 @@ impl Prepared {
         let goes_on = running.is_some() || i > 0 && is_hit(i - 1) || is_hit(i);
         let pushed = (speed(behind) - speed(i)).max(speed(i) - speed(ahead));
         let drive = if goes_on { running.unwrap_or(0.0) + pushed.max(0.0) } else { 0.0 };
-        let back = [
-            (i > 0).then(|| closing(i - 1) + thrown(i - 1, 0..i - 1)),
-            has(i).then(|| closing(i) + thrown(i + 1, i + 1..run.interfaces.len())),
-        ];
-        let back = back.into_iter().flatten().filter(|back| *back > LEAST_CLOSING_M_PER_S);
-        2.0 * back.fold(drive, f64::max) > largest
+        let behind =
+            (i > 0).then(|| (i - 1, closing(i - 1) + thrown(i - 1, i.wrapping_sub(2), 0..i - 1)));
+        let ahead = (i + 1 < count && has(i))
+            .then(|| (i + 1, closing(i) + thrown(i + 1, i + 1, i + 1..run.interfaces.len())));
+        let back = [behind, ahead].into_iter().flatten();
+        let back = back.filter(|(_, speed)| *speed > LEAST_CLOSING_M_PER_S);
+        2.0 * back.map(|(k, speed)| share(k) * speed).fold(drive, f64::max) > largest
     }
 
     /// What `run`, a run of this scenario, comes to.

@@ -305,21 +305,21 @@ impl Model {
         self.features.iter().any(|feature| feature.parameter == mass)
     }
 
-    /// Whether masses are among its parameters, and the two bodies of a run differ in them.
+    /// Whether the two bodies of a run differ in mass.
     pub(super) fn is_of_unequal_masses(&self) -> bool {
         let differ = |Masses { body_kg, other_kg }: Masses| {
             other_kg.is_some_and(|other_kg| !is_same_mass(body_kg, other_kg))
         };
-        (self.has(MASS) || self.has(OTHER_MASS))
-            && self.cases.iter().any(|case| differ(self.masses_of(&case.features)))
+        self.cases.iter().any(|case| differ(self.masses_of(&case.features)))
     }
 
-    /// The masses at an interface as a query has them: in the order that is nearer to one of the runs if these are of unequal bodies,
-    /// else of two equal bodies with the same reduced mass.
+    /// The masses at an interface as a query has them: in the order that is nearer to one of the runs if the curves depend on the masses of unequal
+    /// bodies, else of two equal bodies with the same reduced mass.
     pub(crate) fn masses_as_trained(&self, masses: Masses) -> Masses {
         let equal_kg = masses.equal_kg();
         let equal = Masses { body_kg: equal_kg, other_kg: masses.other_kg.map(|_| equal_kg) };
-        let Some(other_kg) = masses.other_kg.filter(|_| self.is_of_unequal_masses()) else {
+        let depends = (self.has(MASS) || self.has(OTHER_MASS)) && self.is_of_unequal_masses();
+        let Some(other_kg) = masses.other_kg.filter(|_| depends) else {
             return equal;
         };
         let swapped = Masses { body_kg: other_kg, other_kg: Some(masses.body_kg) };

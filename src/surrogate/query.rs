@@ -24,7 +24,7 @@ const SEPARATION_SPEED_EXPONENT: f64 = 0.25;
 pub struct Query {
     /// Speed before contact in m/s, of the model's kind.
     pub speed_m_per_s: f64,
-    /// Mass of the body, or of each body of a pair (the first, if masses differ between the runs); the training runs' if absent.
+    /// Mass of the body, or of each body of a pair (the first, if the two bodies of a run differ); the training runs' if absent.
     pub mass_kg: Option<f64>,
     /// How the maximum crush is found; the model's own way if absent.
     pub rule: Option<MaxCrushRule>,

@@ -7,8 +7,10 @@
 //! - A net force up to 1 kN, of a body below 1 t up to 1 m/s² of its mass, counts as none. Vehicles that touch without closing are
 //!   reached by a precursor that grows from rounding, and where neighbours come to press equally, the force dies away
 //!   without an end.
-//! - The force may fall below that for less than a look, and have the other sign for less than four.
-//! - A contact that changes the speed by less than 0.5 % of the range of the body's speeds does not count.
+//! - The force may fall below that for less than a look; beside a push of less than four looks, where vehicles rattle, it may be
+//!   gone or have the other sign for as long.
+//! - A contact that changes the speed by less than 0.5 % of the range of the body's speeds does not count, nor one shorter than four
+//!   looks by less than 5 %.
 
 mod occupant;
 mod spans;

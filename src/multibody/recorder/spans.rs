@@ -12,15 +12,16 @@ pub(super) const LEAST_N: f64 = 1e3;
 /// Of a light body less counts: what it decelerates by a tenth of g.
 pub(super) const LEAST_M_PER_S2: f64 = 1.0;
 const LEAST_SHARE: f64 = 0.005;
-/// The same of one shorter than [`INTERRUPTION_S`].
+/// The same of one shorter than [`RATTLE_S`].
 const LEAST_SHARE_OF_SHORT: f64 = 0.05;
 /// By so much a span has to be larger than those before it to be kept, so that few are.
 const LARGER: f64 = 1.1;
 /// Time between looks in s, if steps are not longer.
 pub(in super::super) const LOOK_S: f64 = 0.25e-3;
-/// A pause or a push the other way that is shorter, in s, does not end a contact: vehicles that touch behind a force that begins
-/// above zero are pushed both ways in turn. The half period of a vehicle on its buffers is ten times as long.
-const INTERRUPTION_S: f64 = 4.0 * LOOK_S;
+/// Shorter than this, in s, is a push of vehicles that rattle: those that touch behind a force that begins above zero are pushed both ways
+/// in turn. The half period of a vehicle on its buffers is ten times as long. Beside such a push, a pause or a push the other way
+/// that is as short does not end a contact.
+const RATTLE_S: f64 = 4.0 * LOOK_S;
 
 /// A time and the speed of a body at it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -183,8 +184,8 @@ impl Span {
         (self.begin.time_s, self.end.time_s)
     }
 
-    fn follows(&self, before: &Self) -> bool {
-        self.begin.time_s - before.end.time_s < INTERRUPTION_S
+    fn follows(&self, before: &Self, within_s: f64) -> bool {
+        self.begin.time_s - before.end.time_s < within_s
     }
 
     fn is_alike(&self, other: &Self) -> bool {
@@ -197,7 +198,7 @@ impl Span {
     }
 
     fn is_short(&self) -> bool {
-        self.end.time_s - self.begin.time_s < INTERRUPTION_S
+        self.end.time_s - self.begin.time_s < RATTLE_S
     }
 
     fn extend(&mut self, by: &Self) {
@@ -220,7 +221,9 @@ impl Span {
 pub(super) struct Spans {
     /// The last one, which goes on if a push in its direction follows soon: a contact that chatters is one.
     last: Option<Span>,
-    /// A push the other way since then, as long as it is an interruption.
+    /// Whether it ends in a short push.
+    rattles: bool,
+    /// A short push the other way since then.
     aside: Option<Span>,
     closed: Vec<Span>,
     /// The one with the largest change of speed so far.
@@ -236,36 +239,43 @@ impl Spans {
             let (low, high) = self.speeds.unwrap_or((v, v));
             self.speeds = Some((low.min(v), high.max(v)));
         }
-        match (&mut self.last, self.aside.take()) {
-            (Some(last), Some(aside)) if span.follows(&aside) && span.is_alike(last) => {
-                last.extend(&span);
-            }
-            (_, Some(mut aside)) if span.follows(&aside) => {
-                aside.extend(&span);
-                self.append(aside);
-            }
-            (_, Some(aside)) => {
-                self.begin_with(aside);
-                self.append(span);
-            }
-            (_, None) => self.append(span),
+        let Some(mut aside) = self.aside.take() else { return self.append(span) };
+        let is_alike = self.last.is_some_and(|last| span.is_alike(&last));
+        if span.follows(&aside, RATTLE_S) && is_alike && (self.rattles || span.is_short()) {
+            self.extend_last(&span);
+        } else if span.follows(&aside, RATTLE_S) && !is_alike {
+            aside.extend(&span);
+            self.append(aside);
+        } else {
+            self.begin_with(aside);
+            self.append(span);
         }
     }
 
     fn append(&mut self, span: Span) {
-        match &mut self.last {
-            Some(last) if span.follows(last) && span.is_alike(last) => last.extend(&span),
-            // Nothing shows that the end of the run is that of the contact.
-            Some(last) if span.follows(last) && span.is_short() && span.is_cut => {
-                last.extend(&span);
-            }
-            Some(last) if span.follows(last) && span.is_short() => self.aside = Some(span),
-            _ => self.begin_with(span),
+        let Some(last) = self.last else { return self.begin_with(span) };
+        let within_s = if self.rattles || span.is_short() { RATTLE_S } else { LOOK_S };
+        let follows = span.follows(&last, within_s);
+        // Nothing shows that the end of the run is that of the contact.
+        if follows && (span.is_alike(&last) || span.is_short() && span.is_cut) {
+            self.extend_last(&span);
+        } else if follows && span.is_short() {
+            self.aside = Some(span);
+        } else {
+            self.begin_with(span);
+        }
+    }
+
+    fn extend_last(&mut self, by: &Span) {
+        self.rattles = by.is_short();
+        if let Some(last) = &mut self.last {
+            last.extend(by);
         }
     }
 
     /// The last one has ended.
     fn begin_with(&mut self, span: Span) {
+        self.rattles = span.is_short();
         if let Some(before) = self.last.replace(span) {
             self.keep(before);
         }
