@@ -1216,6 +1216,9 @@ fn pairs_of_unequal_masses() {
         let model = train("made", &of_one(other_kg), Choice::Kind(ModelKind::linear())).unwrap();
         let curve = predict(&model, &Query::at(11.0)).unwrap();
         assert_eq!(curve.provenance.parameters.get("other_mass_kg"), shown.as_ref());
+        // The mass of the runs' first body leaves everything as it is.
+        let asked = Query { mass_kg: Some(24e3), ..Query::at(11.0) };
+        assert_eq!(predict(&model, &asked).unwrap().max_deflection_m, curve.max_deflection_m);
     }
 }
 
