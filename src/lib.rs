@@ -46,7 +46,7 @@ mod os;
 
 mod guess;
 
-mod plural;
+mod words;
 
 #[macro_use]
 mod table;

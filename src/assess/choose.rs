@@ -13,11 +13,11 @@
 use serde::Serialize;
 
 use crate::dataset::{TrainingSet, is_within, nearly_same};
-use crate::plural::counted;
 use crate::surrogate::leave_one_out::{LeftOut, Means, Validation};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{MODELS, Model, ModelKind};
 use crate::unit::km_per_h;
+use crate::words::counted;
 
 /// Fewest left-out speeds whose scatter says something.
 const LEAST_SPEEDS: usize = 3;

@@ -14,8 +14,8 @@ use crate::dataset::{
 };
 use crate::error::{Error, ErrorCode, error};
 use crate::nsdm::{self, Identifiability, Nsdm, Start};
-use crate::plural::counted;
 use crate::unit::{SpeedKind, km_per_h};
+use crate::words::counted;
 
 /// Errors of every method at one left-out speed.
 #[derive(Clone, Debug, PartialEq, Serialize)]

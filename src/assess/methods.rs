@@ -9,11 +9,11 @@ use crate::curve::{Case, Envelope, ForceCurve, ForceKind};
 use crate::dataset::{TrainingCase, TrainingSet};
 use crate::error::Error;
 use crate::nsdm::{self, Start, Target};
-use crate::plural::counted;
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
 use crate::unit::km_per_h;
+use crate::words::counted;
 
 /// A method's curve at a left-out speed.
 pub(super) struct Method {

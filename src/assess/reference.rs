@@ -65,7 +65,7 @@ impl Reference {
             return Err(error!(
                 Comparison,
                 "case \"{case}\": only {} in the window: at least 3 are needed",
-                crate::plural::counted(inside, "state"),
+                crate::words::counted(inside, "state"),
                 case = case.id.name
             ));
         }

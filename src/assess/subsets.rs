@@ -16,10 +16,10 @@ use super::validate::{
 use crate::curve::Case;
 use crate::dataset::{TrainingSet, is_within, nearly_same};
 use crate::error::Error;
-use crate::plural::counted;
 use crate::surrogate::ModelKind;
 use crate::surrogate::leave_one_out::{LeftOut, Means, Scatter};
 use crate::surrogate::max_crush::MaxCrushRule;
+use crate::words::counted;
 
 /// Numbers of speeds that a subset keeps.
 const SIZES: [u32; 2] = [4, 5];

@@ -18,13 +18,13 @@ use super::subsets::OverSubsets;
 use crate::curve::{Case, ForceKind, group};
 use crate::dataset::{TrainingSet, is_same_speed, is_within, nearly_same};
 use crate::error::Error;
-use crate::plural::counted;
 use crate::rating::acceptance::Acceptance;
 use crate::surrogate::band::{self, Band, ForceScatter, LeftOutSpeeds, Residuals};
 use crate::surrogate::forest::ForestOptions;
 use crate::surrogate::leave_one_out::{Floor, LeftOut, Means, Validation};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{MODELS, Model, ModelKind, predict};
+use crate::words::counted;
 
 /// Most speeds that are left out: each costs what all others share.
 pub(crate) const MOST_SPEEDS: usize = 20;

@@ -7,10 +7,10 @@ use crate::curve::{Case, CurveUnloading, ForceCurve, ForceKind};
 use crate::dataset::{TrainingCase, TrainingSet, is_same_speed};
 use crate::error::{Error, error};
 use crate::plot::{self, Axis, Chart, Mark, Panel, Series, Shown};
-use crate::plural::counted;
 use crate::surrogate::band::{Band, LeftOutSpeeds};
 use crate::surrogate::{ModelCase, PredictedCurve, predict};
 use crate::unit::{SpeedKind, km_per_h};
+use crate::words::counted;
 
 /// Axes of force over deflection.
 fn axes(largest_n: f64) -> Panel {

@@ -7,10 +7,10 @@ use crate::guess::hint;
 use crate::history::{TimeGap, time_gaps};
 use crate::multibody::{BodyHistory, Run, STANDARD_GRAVITY_M_PER_S2};
 use crate::plot::{Axis, Band, Chart, Panel, Series, Shown};
-use crate::plural::counted;
 use crate::rating::acceptance::StageRecord;
 use crate::scenario::{PLATES, Prepared};
 use crate::signal::{CfcError, cfc, mean_rates};
+use crate::words::counted;
 
 /// What of a run is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,8 +6,8 @@ use crate::guess::hint;
 use crate::multibody::STANDARD_GRAVITY_M_PER_S2;
 use crate::plan::{OVER_LIMITS, RESULTS, ResultName};
 use crate::plot::{Axis, Band, Cell, Chart, Panel, Series, Shown};
-use crate::plural::counted;
 use crate::sweep::{ResultColumn, SweepColumns, share_interval};
+use crate::words::counted;
 
 /// More values than this were not written down as a grid.
 const MOST_VALUES: usize = 60;

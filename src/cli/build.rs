@@ -9,8 +9,8 @@ use crate::build::{self, BuildReport, BuiltRun, RunOutcome};
 use crate::curve::group as siblings;
 use crate::database::CasePath;
 use crate::error::error;
-use crate::plural::counted;
 use crate::table::Table;
+use crate::words::counted;
 
 use super::arguments::named;
 use super::db::{case_columns, case_row};

@@ -11,12 +11,12 @@ use crate::curve::ForceKind;
 use crate::database::Database;
 use crate::dataset::TrainingSet;
 use crate::nsdm::Start;
-use crate::plural::counted;
 use crate::rating::Rating;
 use crate::rating::acceptance::{ACCEPTANCE, STANDARD};
 use crate::scenario;
 use crate::table::Table;
 use crate::unit::{Shown, km_per_h, speed_m_per_s};
+use crate::words::counted;
 
 use super::arguments::one_of;
 use super::output::{self, Bar};

@@ -10,10 +10,10 @@ use crate::curve::{ForceKind, Parameter, Tail};
 use crate::error::Error;
 use crate::file::{not_written, write_all_whole};
 use crate::formats::{self, Exported, FORMATS, Format, IDS, Material, Options};
-use crate::plural::counted;
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{PredictedCurve, Query, WarningCode};
 use crate::unit::{UnitSystem, mass_kg, speed_m_per_s};
+use crate::words::counted;
 
 /// Write curves, recorded cases or a model for another tool
 #[derive(clap::Args)]

@@ -6,10 +6,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use crate::database::check_name;
 use crate::file::write_whole;
 use crate::init::{self, GivenForce, Proposal, Proposed, UserHints};
-use crate::plural::counted;
 use crate::study::StudyKind;
 use crate::table::Table;
 use crate::unit::{Shown, UnitSystem, km_per_h, mass_kg};
+use crate::words::counted;
 
 use super::output::{self, Bar};
 use super::{CommandResult, Failure, GlobalOptions, Outcome, arguments, is_stdout, usage};

@@ -1,6 +1,6 @@
 //! `crumple predict`: the curve at a new speed.
 
-use crate::plural::counted;
+use crate::words::counted;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 

@@ -1,6 +1,6 @@
 //! `crumple sweep`: many runs of a scenario, and `crumple sweep merge`.
 
-use crate::plural::counted;
+use crate::words::counted;
 use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::ops::ControlFlow;

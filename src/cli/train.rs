@@ -1,6 +1,6 @@
 //! `crumple train`: from a group of the database to a model file.
 
-use crate::plural::counted;
+use crate::words::counted;
 use std::iter;
 use std::path::PathBuf;
 

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, error};
 use crate::file;
-use crate::plural::counted;
+use crate::words::counted;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 

@@ -16,9 +16,9 @@ use super::recipe::{Filter, Sampling};
 use super::retrace::{Impact, Table, retrace};
 use super::{Curve, EnergyAudit, Quality, RecordedCurves, above_0, contact, energy, loading};
 use crate::error::{Error, ErrorCode, error};
-use crate::plural::counted;
 use crate::signal::interpolate;
 use crate::unit::Shown;
+use crate::words::counted;
 
 /// Study of the cases that were added from files and not built of FE runs.
 pub(crate) const IMPORTED: &str = "imported";

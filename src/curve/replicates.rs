@@ -7,7 +7,7 @@
 use super::{Case, Curve, EnergyAudit};
 use crate::error::Error;
 use crate::piecewise;
-use crate::plural::counted;
+use crate::words::counted;
 
 impl Case {
     /// Whether both were measured by one recipe, so that a difference of their curves is scatter:

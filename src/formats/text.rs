@@ -91,23 +91,6 @@ pub(crate) fn identifier(name: &str) -> String {
     plain.trim_end_matches('_').to_string()
 }
 
-/// Text for XML and HTML, within quotes or not. What XML cannot hold at all becomes a space.
-pub(crate) fn escaped(text: &str) -> String {
-    let mut safe = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => safe.push_str("&amp;"),
-            '<' => safe.push_str("&lt;"),
-            '>' => safe.push_str("&gt;"),
-            '"' => safe.push_str("&quot;"),
-            '\'' => safe.push_str("&apos;"),
-            c if c.is_control() || c == '\u{fffe}' || c == '\u{ffff}' => safe.push(' '),
-            c => safe.push(c),
-        }
-    }
-    safe
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -152,13 +135,5 @@ mod tests {
         t("", "spring");
         t("äöü", "spring");
         assert_eq!(identifier(&"a".repeat(200)).len(), LONGEST);
-    }
-
-    #[test]
-    fn texts_of_xml_are_escaped() {
-        assert_eq!(
-            escaped("a<b & 'c' \"d\"\u{1b}[0m"),
-            "a&lt;b &amp; &apos;c&apos; &quot;d&quot; [0m"
-        );
     }
 }

@@ -7,6 +7,7 @@ use super::chart::{Drawing, Paint, Shape, Shows, Stroke, Text};
 use super::font::{self, Piece};
 use super::style;
 use crate::error::{Error, error};
+use crate::words::escaped;
 use tiny_skia::{
     Color, FillRule, LineJoin, Paint as Ink, Path, PathBuilder, Pixmap, StrokeDash, Transform,
 };
@@ -238,23 +239,6 @@ fn write_text(out: &mut String, text: &Text, target: SvgFor) {
         }
     }
     out.push_str("</g>\n");
-}
-
-/// A text as XML and HTML take it; control characters, which XML does not take at all, are replaced.
-fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            c if c.is_control() || ('\u{fffe}'..='\u{ffff}').contains(&c) => out.push('\u{fffd}'),
-            c => out.push(c),
-        }
-    }
-    out
 }
 
 /// Most pixels each way: 400 MB of memory.

@@ -20,9 +20,9 @@ mod signal;
 use serde::Serialize;
 
 use crate::error::Error;
-use crate::plural::counted;
 use crate::signal::l1_ratio;
 use crate::signal::peaks::{MatchedPeak, matched_peaks};
+use crate::words::counted;
 pub(crate) use differences::{Cora, Deceleration, MagnitudePhase, MaxAbs, Pointwise};
 use differences::{
     cora, integral_error, max_abs, peak_norm, pointwise, rms_ratio, russell, sprague_geers,

@@ -1,6 +1,5 @@
 //! A chart in the page: its picture, and its numbers for the script.
 
-use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::plot::{Axis, Chart, Panel, PanelPlace, Shown, SvgFor};
@@ -9,19 +8,17 @@ use crate::plot::{Axis, Chart, Panel, PanelPlace, Shown, SvgFor};
 const NARROW: f64 = 360.0;
 
 /// A chart in the page.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Figure {
     pub id: String,
-    caption: String,
-    notes: Vec<String>,
-    svg: String,
+    pub caption: String,
+    pub notes: Vec<String>,
+    pub svg: String,
     /// The same for a narrow screen, where the first would be too small to read.
-    narrow_svg: String,
+    pub narrow_svg: String,
     /// What the script needs.
-    #[serde(skip)]
     pub data: Value,
     /// How many looks it needs.
-    #[serde(skip)]
     pub looks: usize,
 }
 

@@ -15,12 +15,12 @@ use crate::charts;
 use crate::curve::{Case, ForceKind, Parameter};
 use crate::dataset::TrainingSet;
 use crate::error::Error;
-use crate::plural::counted;
 use crate::rating::acceptance::{ACCEPTANCE, Acceptance, STANDARD};
 use crate::surrogate::leave_one_out::{LeftOut, Means, Validation};
 use crate::surrogate::{Model, ModelKind, PredictedCurve, Query, predict};
 use crate::table::{Cell, Table};
 use crate::unit::{Shown, km_per_h};
+use crate::words::counted;
 
 /// Adds the section of a group under a title; gives the curve predicted for it.
 pub(super) fn add(

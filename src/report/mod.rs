@@ -6,20 +6,15 @@
 
 mod figure;
 mod group;
+mod page;
 mod side_by_side;
 mod train;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-
-use minijinja::value::{Serde, Value};
-use minijinja::{Environment, context};
-use serde::Serialize;
 
 use crate::curve::Case;
 use crate::database::Database;
 use crate::error::Error;
-use crate::plot::looks_for_pages;
 use crate::surrogate::Model;
 use crate::table::Table;
 use figure::Figure;
@@ -59,15 +54,14 @@ pub(crate) enum MethodSpeeds {
 }
 
 /// A number that stands out at the top, with its name.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct KeyFigure {
     value: String,
     name: String,
 }
 
 /// Part of a section.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Part {
     /// A heading of the third level.
     Heading(String),
@@ -75,7 +69,6 @@ pub(crate) enum Part {
     Figure(Figure),
     Table {
         caption: String,
-        #[serde(flatten)]
         table: Table,
     },
 }
@@ -93,7 +86,7 @@ impl Part {
 }
 
 /// A part of the page with a heading.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Section {
     id: String,
     title: String,
@@ -101,7 +94,7 @@ pub(crate) struct Section {
 }
 
 /// What came out, in a sentence.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Verdict {
     /// `over` or `kept` of a limit, `unknown`, or `known`: a result without a limit.
     state: &'static str,
@@ -136,21 +129,21 @@ impl ToDo {
 }
 
 /// Warnings that the reader can do the same about.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Warnings {
     what_to_do: &'static str,
     texts: Vec<Warning>,
 }
 
 /// What is warned of, and what it is said of.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Warning {
     about: Vec<String>,
     text: String,
 }
 
 /// All that the page shows.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Content {
     title: String,
     /// Date, author, command, versions and files, a line each.
@@ -245,7 +238,7 @@ pub(crate) fn report(
     };
     content.verdicts.sort_by_key(urgency);
     let warnings = content.warnings.iter().map(|of| of.texts.len()).sum();
-    Ok((html(&content), warnings))
+    Ok((page::html(&content), warnings))
 }
 
 /// Date, author, command and versions, and the files.
@@ -291,43 +284,6 @@ fn groups<'a>(
         }
     }
     Ok(groups)
-}
-
-const TEMPLATE: &str = include_str!("page.html");
-const STYLE: &str = include_str!("page.css");
-const SCRIPT: &str = include_str!("page.js");
-
-/// The whole page.
-fn html(content: &Content) -> String {
-    let mut environment = Environment::new();
-    // The name's end makes every text of the content be escaped.
-    environment.add_template("page.html", TEMPLATE).expect("the template is part of the program");
-    let parts = content.sections.iter().flat_map(|section| &section.parts);
-    let figures: Vec<&Figure> = parts
-        .filter_map(|part| match part {
-            Part::Figure(figure) => Some(figure),
-            Part::Heading(_) | Part::Text(_) | Part::Table { .. } => None,
-        })
-        .collect();
-    let looks =
-        looks_for_pages(figures.iter().map(|figure| figure.looks).max().unwrap_or(1).max(8));
-    let figures: BTreeMap<&str, &serde_json::Value> =
-        figures.into_iter().map(|figure| (&*figure.id, &figure.data)).collect();
-    let data = serde_json::json!({ "figures": figures, "looks": looks.data });
-    let page = environment.get_template("page.html").expect("it was added");
-    let style = format!("{STYLE}{}", looks.style);
-    page.render(context! {
-        content => Value::from(Serde(content)),
-        style => Value::from_safe_string(style),
-        script => Value::from_safe_string(SCRIPT.into()),
-        data => Value::from_safe_string(in_script(&data.to_string())),
-    })
-    .expect("the template asks for what the content has")
-}
-
-/// JSON that may be in a script element, whatever its strings hold.
-fn in_script(json: &str) -> String {
-    json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
 }
 
 /// The last part of a path; the whole if another one ends in the same.
@@ -395,7 +351,7 @@ mod tests {
                 ],
             }],
         };
-        let html = html(&content);
+        let html = page::html(&content);
         assert!(!html.contains("<b>"), "{html}");
         assert_eq!(html.matches("</script>").count(), 2);
     }

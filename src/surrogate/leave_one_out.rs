@@ -8,7 +8,7 @@ use super::band::{Band, ForceScatter};
 use super::max_crush::MaxCrushRule;
 use crate::curve::ForceKind;
 use crate::dataset::is_same_speed;
-use crate::plural::counted;
+use crate::words::counted;
 
 /// Errors of one model at one speed that was left out.
 ///

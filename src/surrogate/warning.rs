@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 use crate::curve::Masses;
 use crate::curve::force_curve::FULLY_CRUSHED;
 use crate::dataset::{Feature, SAME_SPEED};
-use crate::plural::counted;
 use crate::unit::{Shown, km_per_h};
+use crate::words::counted;
 
 /// A mass that differs from the training runs' by such a factor is a mistaken unit rather than another vehicle.
 const UNLIKE_MASS: f64 = 10.0;

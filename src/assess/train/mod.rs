@@ -166,7 +166,7 @@ fn compared(
     let until_s = reference.until.map_or(f64::MAX, |t| t.0);
     let states = fe.time_s.iter().take_while(|&&t| t <= until_s * (1.0 + 1e-9)).count();
     if states < 3 {
-        let states = crate::plural::counted(states, "state");
+        let states = crate::words::counted(states, "state");
         return Err(match reference.until {
             Some(_) => error!(
                 Comparison at "reference.until",

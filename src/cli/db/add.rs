@@ -1,6 +1,6 @@
 //! `crumple db add`: measured and legacy curves from files into a curve database.
 
-use crate::plural::counted;
+use crate::words::counted;
 use std::path::PathBuf;
 
 use crate::curve::{Case, ForceKind, Parameter};

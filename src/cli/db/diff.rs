@@ -7,9 +7,9 @@ use super::super::{CommandResult, GlobalOptions, Outcome, output};
 use crate::curate::{self, Difference};
 use crate::curve::{Case, Parameter};
 use crate::database::Database;
-use crate::plural::counted;
 use crate::table::Table;
 use crate::unit::km_per_h;
+use crate::words::counted;
 
 #[derive(clap::Args)]
 pub(super) struct Args {

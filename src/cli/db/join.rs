@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use crate::curate::{self, Joined, JoinedCase, OnConflict};
-use crate::plural::counted;
+use crate::words::counted;
 
 use super::super::arguments::named;
 use super::{Chosen, CommandResult, GlobalOptions, usage};

@@ -16,7 +16,7 @@ use crate::curate::{self, Selection, SpeedRange};
 use crate::curve::Case;
 use crate::database::Database;
 use crate::database::check::{self, Checked};
-use crate::plural::counted;
+use crate::words::counted;
 pub(super) use list::{case_columns, case_row};
 
 /// List, show, compare, check, add, rename, join, tag and export cases of a curve database

@@ -6,7 +6,7 @@ use super::list::{case_row, print_group};
 use super::{Chosen, CommandResult, GlobalOptions, usage};
 use crate::curate::{self, Labels, Selection};
 use crate::database::CasePath;
-use crate::plural::counted;
+use crate::words::counted;
 
 /// A database, and which of its cases are removed.
 #[derive(clap::Args)]

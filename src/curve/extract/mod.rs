@@ -16,9 +16,9 @@ use super::recipe::{Filter, RecordedMotion, Sampling};
 use super::{Curve, EnergyAudit, ForceKind, Masses, Quality, RecordedCurves, energy, loading};
 use crate::error::{Error, ErrorCode, error};
 use crate::history::History;
-use crate::plural::counted;
 use crate::signal::cfc;
 use crate::unit::{Speed, SpeedKind, UnitSystem};
+use crate::words::counted;
 use consistency::Motion;
 pub(crate) use record::Record;
 use record::sample;
@@ -385,7 +385,7 @@ pub enum StatedContact {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub(crate) enum ExtractError {
     /// A history has fewer than two states.
-    #[error("{what} holds {}: at least 2 are needed", crate::plural::counted(*states, "state"))]
+    #[error("{what} holds {}: at least 2 are needed", crate::words::counted(*states, "state"))]
     TooShort { origin: Origin, what: &'static str, states: usize },
     /// A value is not a finite number.
     #[error(

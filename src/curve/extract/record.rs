@@ -7,9 +7,9 @@ use crate::curve::recipe::{MAX_STATES, RecordedMotion};
 use crate::curve::{Curve, ForceKind, loading};
 use crate::error::error;
 use crate::history::History;
-use crate::plural::counted;
 use crate::signal::{derivative, interpolate};
 use crate::unit::UnitSystem;
+use crate::words::counted;
 
 /// Times of two files count as equal up to the six digits that solvers print.
 const SAME_TIME: f64 = 1e-5;

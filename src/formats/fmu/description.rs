@@ -1,8 +1,8 @@
 //! modelDescription.xml of FMI 2.0 and 3.0, and FMI 3's buildDescription.xml.
 
 use super::{FmiVersion, Spring};
-use crate::formats::text::escaped;
 use crate::multibody::ForceLaw;
+use crate::words::escaped;
 
 /// What a variable is.
 enum Role {

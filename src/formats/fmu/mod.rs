@@ -15,8 +15,9 @@ use zip::{CompressionMethod, DateTime, System, ZipWriter};
 
 use super::{ExportCurve, Exported};
 use crate::error::{Error, error};
-use crate::formats::text::{escaped, identifier};
+use crate::formats::text::identifier;
 use crate::multibody::ForceLaw;
+use crate::words::escaped;
 use description::{build_description, model_description};
 use table::Table;
 

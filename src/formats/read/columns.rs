@@ -401,7 +401,7 @@ impl Points {
 }
 
 pub(super) fn too_few(points: usize, of: &str) -> Error {
-    let (points, least) = (crate::plural::counted(points, "point"), MIN_POINTS);
+    let (points, least) = (crate::words::counted(points, "point"), MIN_POINTS);
     error!(CurveFile, "the curve has {points}{of}: expected at least {least}")
 }
 

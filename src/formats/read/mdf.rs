@@ -17,7 +17,7 @@ use super::{Input, tables};
 use crate::error::{Error, error};
 use crate::formats::mdf::{RUN, column_of};
 use crate::guess;
-use crate::plural::counted;
+use crate::words::counted;
 
 /// How every MDF file begins; the version and the program that wrote it follow.
 const BEGINNING: &[u8] = b"MDF     ";

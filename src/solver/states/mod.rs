@@ -16,7 +16,7 @@ use super::lsdyna::label_values::Widths;
 use super::lsdyna::line::{Field, Line, real, shown};
 use super::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::history::EntityId;
-use crate::plural::counted;
+use crate::words::counted;
 use finish::Table;
 use repeat::{Part, Trace};
 

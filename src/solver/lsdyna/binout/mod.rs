@@ -31,10 +31,10 @@ use rayon::prelude::*;
 
 use super::lsda::Header;
 use crate::history::{EntityId, History};
-use crate::plural::counted;
 use crate::solver::problem::{Diagnostics, Problem, ProblemCode};
 use crate::solver::source::Source;
 use crate::solver::{Entity, Format, NoDataReason, Selection, SolverFile, WithoutData, zeros};
+use crate::words::counted;
 use owners::{Entities, EntityList, Metadata, OwnerSearch, row_name};
 use records::{Bytes, Section, Tree};
 use states::StateReader;
