@@ -46,6 +46,8 @@ mod os;
 
 mod guess;
 
+mod parallel;
+
 mod words;
 
 #[macro_use]

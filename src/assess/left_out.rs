@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
-
 use super::reference::{MotionErrors, Reference};
 use crate::curve::force_curve::ForceCurve;
 use crate::curve::{Case, Envelope, ForceKind, Parameter};
@@ -11,6 +9,7 @@ use crate::dataset::{
     OTHER_MASS, TrainingCase, TrainingSet, are_masses, grid, is_within, nearly_same,
 };
 use crate::error::{Error, error};
+use crate::parallel;
 use crate::signal::l1_ratio;
 use crate::signal::peaks::matched_peaks;
 use crate::surrogate::band::{self, Gap, Residuals};
@@ -144,7 +143,7 @@ impl<'a> LeftOutCase<'a> {
     /// The same by all of several models.
     pub(super) fn trials(&self, kinds: &[ModelKind]) -> Vec<LeftOutRun<'_>> {
         let material = self.material();
-        kinds.par_iter().map(|kind| self.trial(*kind, &material)).collect()
+        parallel::map(kinds, |kind| self.trial(*kind, &material))
     }
 
     /// Predicts the case by a fitted model and some rules for the maximum crush.

@@ -4,7 +4,6 @@
 use std::collections::BTreeMap;
 use std::ops::RangeInclusive;
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::choose::{Purpose, physical, scores};
@@ -16,6 +15,7 @@ use super::validate::{
 use crate::curve::Case;
 use crate::dataset::{TrainingSet, is_within, nearly_same};
 use crate::error::Error;
+use crate::parallel;
 use crate::surrogate::ModelKind;
 use crate::surrogate::leave_one_out::{LeftOut, Means, Scatter};
 use crate::surrogate::max_crush::MaxCrushRule;
@@ -89,7 +89,7 @@ pub(crate) fn subsets(
         let kept = speeds.iter().enumerate().filter(|(i, _)| bits >> i & 1 == 1).map(|(_, v)| *v);
         subset(&set, &kept.collect::<Vec<_>>(), candidates, scatter.as_ref())
     };
-    let trials: Vec<Trial> = all.par_iter().filter_map(of).flatten().collect();
+    let trials: Vec<Trial> = parallel::map(&all, of).into_iter().flatten().flatten().collect();
     let names = candidates.iter().map(ModelKind::name);
     let all: Vec<OverSubsets> =
         std::iter::once("auto").chain(names).filter_map(|name| over(name, &trials)).collect();

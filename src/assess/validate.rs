@@ -7,7 +7,6 @@
 
 use std::collections::BTreeMap;
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use super::against::Against;
@@ -18,6 +17,7 @@ use super::subsets::OverSubsets;
 use crate::curve::{Case, ForceKind, group};
 use crate::dataset::{TrainingSet, is_same_speed, is_within, nearly_same};
 use crate::error::Error;
+use crate::parallel;
 use crate::rating::acceptance::Acceptance;
 use crate::surrogate::band::{self, Band, ForceScatter, LeftOutSpeeds, Residuals};
 use crate::surrogate::forest::ForestOptions;
@@ -384,7 +384,7 @@ pub(super) fn trials<'a>(
     kinds: &[ModelKind],
     left_out: &'a [LeftOutCase<'a>],
 ) -> Vec<LeftOutRun<'a>> {
-    left_out.par_iter().flat_map(|case| case.trials(kinds)).collect()
+    parallel::map(left_out, |case| case.trials(kinds)).into_iter().flatten().collect()
 }
 
 /// Results of the left-out speeds for all models.
@@ -460,10 +460,9 @@ impl Tables {
             let trial = case.trial_of(*kind, &case.fit(*kind, &case.material()), &[rule]);
             trial.judged(rule).ok().map(|score| score.residuals)
         };
-        let ends: Vec<(bool, f64)> = ends.collect();
-        let residuals: Vec<_> = ends.into_par_iter().filter_map(of_end).collect();
+        let residuals = parallel::map(ends, of_end);
         let own = self.residuals.entry(kind.name()).or_default();
-        for (force, of) in residuals.into_iter().flatten() {
+        for (force, of) in residuals.into_iter().flatten().flatten() {
             own.entry((force, LeftOutSpeeds::Ends)).or_default().push(of);
         }
         let Some(ends) = own.get(&(set.force_kind, LeftOutSpeeds::Ends)) else { return };
@@ -510,7 +509,7 @@ impl ModelTable {
         let mut rows = Vec::new();
         let mut residuals = ResidualsOf::new();
         let mut failures = Vec::new();
-        let judged: Vec<_> = trials.par_iter().map(|trial| trial.judged(rule)).collect();
+        let judged = parallel::map(trials, |trial| trial.judged(rule));
         for judged in judged {
             match judged {
                 Ok(Score { row, residuals: of }) => {
@@ -559,28 +558,25 @@ pub(crate) fn add_nested(
     // Cases that cannot be left out have been noted.
     let (mut left_out, _) = left_out_cases(&set, MOST_SPEEDS).unwrap_or_default();
     left_out.retain(|case| case.inner);
-    let trials: Vec<LeftOutRun<'_>> = left_out
-        .par_iter()
-        .map(|held| {
-            let left_out = nearly_same(&set.speeds_m_per_s(), held.own.speed_m_per_s);
-            let others: Vec<Case> = cases
-                .iter()
-                .filter(|c| !is_within(c.conditions.speed.m_per_s, left_out))
-                .cloned()
-                .collect();
-            let predicted = choose_and_fit(&group, &others, seed).and_then(|model| {
-                let curve = predict(&model, &query_of(held.case, &model))?;
-                let rule = curve.provenance.max_crush_rule;
-                let rule = rule.expect("a prediction says its rule");
-                Ok((rule, held.answer(curve)?))
-            });
-            let answer = predicted.map_or_else(
-                |error| (MaxCrushRule::Motion, Err(error.to_string())),
-                |(rule, answer)| (rule, Ok(answer)),
-            );
-            LeftOutRun { model: "auto", held, answers: Answers::from([answer]) }
-        })
-        .collect();
+    let trials = parallel::map(&left_out, |held| {
+        let left_out = nearly_same(&set.speeds_m_per_s(), held.own.speed_m_per_s);
+        let others: Vec<Case> = cases
+            .iter()
+            .filter(|c| !is_within(c.conditions.speed.m_per_s, left_out))
+            .cloned()
+            .collect();
+        let predicted = choose_and_fit(&group, &others, seed).and_then(|model| {
+            let curve = predict(&model, &query_of(held.case, &model))?;
+            let rule = curve.provenance.max_crush_rule;
+            let rule = rule.expect("a prediction says its rule");
+            Ok((rule, held.answer(curve)?))
+        });
+        let answer = predicted.map_or_else(
+            |error| (MaxCrushRule::Motion, Err(error.to_string())),
+            |(rule, answer)| (rule, Ok(answer)),
+        );
+        LeftOutRun { model: "auto", held, answers: Answers::from([answer]) }
+    });
     // Each has one rule.
     let of = |trial: &LeftOutRun<'_>| trial.answers.keys().next().copied();
     let (mut rows, mut failures) = (Vec::new(), Vec::new());

@@ -17,8 +17,6 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::path::Path;
 
-use rayon::prelude::*;
-
 use crate::clock;
 use crate::curve::from_table::IMPORTED;
 use crate::curve::{Case, Origin};
@@ -26,6 +24,7 @@ use crate::database::{CasePath, Database};
 use crate::error::{Error, ErrorCode, error};
 use crate::file::{self, WriterLock, is_file};
 use crate::guess;
+use crate::parallel;
 use crate::study::{self, LocatedRun, Study};
 
 const LISTED: usize = 3;
@@ -137,8 +136,7 @@ pub(crate) fn build_runs(
     let _lock = WriterLock::take(path)?;
     let is_there = is_file(path)?;
     let mut database = if is_there { Database::read_as_it_is(path)? } else { Database::default() };
-    let located: Vec<Result<LocatedRun<'_>, Error>> =
-        study.runs().par_iter().map(|entry| study.locate(entry)).collect();
+    let located = parallel::map(study.runs(), |entry| study.locate(entry));
     let hash = |run: &Result<LocatedRun<'_>, _>| run.as_ref().ok()?.source_hash();
     let runs = study.runs().iter().map(|entry| entry.case_name());
     let runs = runs.zip(located.iter().map(hash)).collect();
@@ -147,20 +145,16 @@ pub(crate) fn build_runs(
     let unaltered = database.all().filter(|c| !database.is_altered(&c.id.group, &c.id.name));
     let fingerprints: HashMap<CasePath, &str> =
         unaltered.map(|case| (CasePath::of(case), &*case.provenance.fingerprint)).collect();
-    let results: Vec<(String, Result<Option<Case>, Error>)> = study
-        .runs()
-        .par_iter()
-        .zip(located)
-        .filter(|(entry, _)| only.is_empty() || only.contains(&entry.case_name()))
-        .map(|(entry, located)| {
-            let name = entry.case_name();
-            let before = previous.of_run.get(&name);
-            let before = before.and_then(|(path, _)| fingerprints.get(path).copied());
-            let result = case(&study, located, before);
-            progress(&name);
-            (name, result)
-        })
-        .collect();
+    let wanted = study.runs().iter().zip(located);
+    let wanted = wanted.filter(|(entry, _)| only.is_empty() || only.contains(&entry.case_name()));
+    let results = parallel::map(wanted, |(entry, located)| {
+        let name = entry.case_name();
+        let before = previous.of_run.get(&name);
+        let before = before.and_then(|(path, _)| fingerprints.get(path).copied());
+        let result = case(&study, located, before);
+        progress(&name);
+        (name, result)
+    });
     if results.iter().all(|(_, r)| r.is_err()) {
         let reasons: Vec<String> = results
             .iter()

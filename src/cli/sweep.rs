@@ -9,6 +9,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+
 use crate::plan::OVER_LIMITS;
 use crate::sweep::{
     self, Precision, Report, Sensitivity, Shard, Sweep, WriteOptions, is_hdf5, share_interval,
@@ -207,14 +210,12 @@ fn progress(bar: &Bar, stop: Option<Arc<AtomicBool>>) -> impl FnMut(u64) -> Cont
 /// second one ends it at once, which loses that chunk only.
 fn stop_flag() -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
-    let asked = Arc::clone(&stop);
-    let handler = move || {
-        if asked.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
-        }
-    };
-    // Without a handler Ctrl-C ends the run at once, and nothing is lost either.
-    let _ = ctrlc::set_handler(handler);
+    for signal in [SIGINT, SIGTERM] {
+        // In this order: the first signal sets what the second one finds. Without the handlers Ctrl-C ends the run at
+        // once, and nothing is lost either.
+        let _ = flag::register_conditional_shutdown(signal, 130, Arc::clone(&stop));
+        let _ = flag::register(signal, Arc::clone(&stop));
+    }
     stop
 }
 

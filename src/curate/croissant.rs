@@ -5,8 +5,8 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
+use hmac_sha256::Hash;
 use serde_json::{Value, json};
-use sha2::{Digest, Sha256};
 
 use crate::curve::{Case, Parameter};
 use crate::error::Error;
@@ -112,7 +112,7 @@ fn about(set: &str) -> &'static str {
 
 /// Hexadecimal.
 fn sha256(path: &Path) -> io::Result<String> {
-    let (mut file, mut hash) = (file::open(path)?, Sha256::new());
+    let (mut file, mut hash) = (file::open(path)?, Hash::new());
     let mut block = vec![0; 1 << 16];
     loop {
         match file.read(&mut block)? {

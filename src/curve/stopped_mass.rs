@@ -6,10 +6,10 @@
 //! is not negative, and never so large that the crush force `F − λv²` would become tensile. Forces take it linear between the
 //! middles of the nodes.
 
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::Envelope;
+use crate::parallel;
 use crate::piecewise;
 use crate::signal::bounded;
 
@@ -68,7 +68,7 @@ impl StoppedMass {
         let end_m = runs.iter().map(LoadingRun::end_m).fold(0.0, f64::max);
         let node = |i: usize| end_m * libm::pow(i as f64 / SEGMENTS as f64, SHORTER_AT_TIP);
         let deflection_m: Vec<f64> = (0..=SEGMENTS).map(node).collect();
-        let states: Vec<Vec<(f64, f64)>> = runs.par_iter().map(stopped_by_momentum).collect();
+        let states = parallel::map(runs, stopped_by_momentum);
         let most_kg_per_m = most_kg_per_m(&deflection_m, runs);
         let rates = rates_kg_per_m(&deflection_m, &states, &most_kg_per_m);
         let mut stopped_kg = vec![0.0];

@@ -4,14 +4,13 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
-use rayon::prelude::*;
-
 use super::group;
 use super::{CasePath, Database};
 use crate::curve::body::body_force_n;
 use crate::curve::{Case, Curve};
 use crate::error::{Error, error};
 use crate::hdf5::{AttrValue, FileBuilder};
+use crate::parallel;
 
 /// Value of the root attribute `format`.
 pub(crate) const FORMAT: &str = "crumple curve database";
@@ -307,8 +306,7 @@ pub(crate) fn contents<'a>(
     cases: &'a [Case],
 ) -> impl Iterator<Item = (&'a Case, Result<Content<'a>, Error>)> {
     cases.chunks(HASHED_AT_ONCE).flat_map(|cases| {
-        let contents = cases.par_iter().map(|case| with_hashes(database, case));
-        cases.iter().zip(contents.collect::<Vec<_>>())
+        cases.iter().zip(parallel::map(cases, |case| with_hashes(database, case)))
     })
 }
 

@@ -5,8 +5,6 @@ use std::fmt::Display;
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use rayon::prelude::*;
-
 use super::group::CASES;
 use super::layout::{FORMAT, HASHES, OLDEST, ORIGINAL, VERSION, WRITTEN_BY, is_altered};
 use super::{CasePath, Database};
@@ -17,6 +15,7 @@ use crate::curve::{
 use crate::error::{Error, error};
 use crate::file;
 use crate::hdf5::{self, AttrValue, Fault, File, Group, OpenError, declared_bytes};
+use crate::parallel;
 use crate::unit::{Speed, SpeedKind};
 
 /// The database file of a path, whose values are read when they are asked for.
@@ -199,8 +198,8 @@ fn decode_opened(opened: &Opened<'_>) -> Result<Database, Error> {
             let FoundCase { case, hashes, .. } = opened.case(&group.name, &name, &case)?;
             found.push((case, hashes));
         }
-        let altered = found.par_iter().map(|(case, hashes)| is_altered(case, hashes));
-        let altered: Vec<bool> = altered.collect::<Result<_, Error>>()?;
+        let altered = parallel::map(&found, |(case, hashes)| is_altered(case, hashes));
+        let altered: Vec<bool> = altered.into_iter().collect::<Result<_, Error>>()?;
         let mut cases = Vec::with_capacity(found.len());
         for ((case, hashes), altered) in found.into_iter().zip(altered) {
             if altered {

@@ -7,7 +7,6 @@ use std::sync::Arc;
 
 use linfa::Dataset;
 use ndarray::{Array1, Array2};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::curve::BodyMotion;
@@ -18,6 +17,7 @@ use crate::curve::replicates::mean_of;
 use crate::curve::stopped_mass::{LoadingRun, StoppedMass};
 use crate::curve::{Case, Envelope, ForceKind, Masses, Parameter};
 use crate::error::{Error, error};
+use crate::parallel;
 use crate::unit::{SpeedKind, UnitSystem, km_per_h};
 
 /// One case as models see it: a run, or the mean of runs that differ in nothing.
@@ -423,10 +423,9 @@ impl TrainingSet {
         cases.iter().try_for_each(|case| case.check())?;
         cases.sort_by(|a, b| a.id.name.cmp(&b.id.name));
         let features = features(&cases)?;
-        let training: Vec<Result<TrainingCase, Error>> = replicates(&cases, &features)?
-            .into_par_iter()
-            .map(|(features, runs)| TrainingCase::new(&runs, features))
-            .collect();
+        let training = parallel::map(replicates(&cases, &features)?, |(features, runs)| {
+            TrainingCase::new(&runs, features)
+        });
         let mut training = training.into_iter().collect::<Result<Vec<_>, _>>()?;
         // By values, so that names and the order of the cases change nothing.
         training.sort_by(|a, b| a.key().partial_cmp(&b.key()).unwrap_or(Ordering::Equal));
@@ -639,8 +638,8 @@ impl TrainingSet {
             return None;
         }
         let fit = |cases: &[&Arc<TrainingCase>]| {
-            let runs: Option<Vec<LoadingRun>> = cases.par_iter().map(|c| loading_run(c)).collect();
-            StoppedMass::fit(&runs?)
+            let runs = parallel::map(cases, |case| loading_run(case));
+            StoppedMass::fit(&runs.into_iter().collect::<Option<Vec<_>>>()?)
         };
         let moves = |case: &&Arc<TrainingCase>| !case.case.moves_by_its_force();
         let own: Vec<_> = self.cases.iter().filter(moves).collect();

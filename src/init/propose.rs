@@ -7,9 +7,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use rayon::iter::Either;
-use rayon::prelude::*;
-
 use super::describe::{Facts, sort, units_of_decks};
 use super::folders::{Folders, LeftOut, Reason, names, no_usable_run, seen_from};
 use super::measure::{Impact, SAME_MASS, is_near};
@@ -21,6 +18,7 @@ use super::write::{Proposal, Proposed};
 use super::{GivenForce, UserHints, units};
 use crate::error::{Error, error};
 use crate::file::folder_of;
+use crate::parallel;
 use crate::study::extract::is_alike;
 use crate::study::{self, StudyKind};
 use crate::unit::UnitSystem;
@@ -45,13 +43,13 @@ pub(crate) fn propose(
     let mut left_out = folders.left_out;
     let mut runs = survey(&folders.runs, hints, &mut left_out, &progress);
     if hints.force.is_none() {
-        let mut sums: Vec<Named> =
-            runs.par_iter().filter_map(|run| sum_of_forces(&run.survey)).collect();
+        let sums = parallel::map(&runs, |run| sum_of_forces(&run.survey));
+        let mut sums: Vec<Named> = sums.into_iter().flatten().collect();
         sums.sort();
         sums.dedup();
         if !sums.is_empty() {
             // What succeeded once succeeds again.
-            runs.par_iter_mut().for_each(|Run { sources, survey, .. }| {
+            parallel::map(&mut runs, |Run { sources, survey, .. }| {
                 *survey = Survey::of(sources, &sums).unwrap_or_else(|_| survey.clone());
             });
         }
@@ -79,7 +77,7 @@ pub(crate) fn propose(
         return Err(no_usable_run(&left_out, &warnings));
     }
     if let Some(units) = units.value() {
-        records.par_iter_mut().for_each(|record| {
+        parallel::map(&mut records, |record| {
             record.impact = Some(Impact::of(record, *units, hints.half_model));
         });
     }
@@ -115,8 +113,7 @@ fn survey(
     left_out: &mut Vec<LeftOut>,
     progress: &(impl Fn(&str) + Sync),
 ) -> Vec<Run> {
-    let sources: Vec<Result<Sources, Reason>> =
-        folders.par_iter().map(|folder| Sources::of(folder)).collect();
+    let sources = parallel::map(folders, |folder| Sources::of(folder));
     let mut first: BTreeMap<String, &PathBuf> = BTreeMap::new();
     let mut unique = Vec::new();
     for ((path, name), sources) in folders.iter().zip(names(folders)).zip(sources) {
@@ -134,17 +131,15 @@ fn survey(
     }
     let named: Vec<Named> =
         hints.force.iter().map(|force| (force.file.clone(), force.ids.clone())).collect();
-    let (runs, out): (Vec<Run>, Vec<LeftOut>) =
-        unique.into_par_iter().partition_map(|(path, name, sources)| {
-            let survey = Survey::of(&sources, &named);
-            progress(&name);
-            match survey {
-                Ok(survey) => Either::Left(Run { path, name, sources, survey }),
-                Err(reason) => Either::Right(LeftOut::new(path, reason)),
-            }
-        });
-    left_out.extend(out);
-    runs
+    let surveyed = parallel::map(unique, |(path, name, sources)| {
+        let survey = Survey::of(&sources, &named);
+        progress(&name);
+        match survey {
+            Ok(survey) => Ok(Run { path, name, sources, survey }),
+            Err(reason) => Err(LeftOut::new(path, reason)),
+        }
+    });
+    usable(surveyed, left_out)
 }
 
 /// Holds what the caller says of bodies and force against what there is.
@@ -196,18 +191,18 @@ fn refuse_hints(
 
 /// Reads the histories of the recipe of every run that can take it.
 fn record(runs: Vec<Run>, recipe: &CommonRecipe, left_out: &mut Vec<LeftOut>) -> Vec<Record> {
-    let members = recipe.members.par_iter();
-    let (records, out): (Vec<Record>, Vec<LeftOut>) =
-        runs.into_par_iter().zip(members).partition_map(|(run, member)| {
-            let path = run.path.clone();
-            let other = |why: &String| Reason::OtherRecipe { why: why.clone() };
-            match member.as_ref().map_err(other).and_then(|()| Record::read(run, recipe)) {
-                Ok(record) => Either::Left(record),
-                Err(reason) => Either::Right(LeftOut::new(path, reason)),
-            }
-        });
-    left_out.extend(out);
-    records
+    let records = parallel::map(runs.into_iter().zip(&recipe.members), |(run, member)| {
+        let path = run.path.clone();
+        let other = |why: &String| Reason::OtherRecipe { why: why.clone() };
+        let record = member.as_ref().map_err(other).and_then(|()| Record::read(run, recipe));
+        record.map_err(|reason| LeftOut::new(path, reason))
+    });
+    usable(records, left_out)
+}
+
+/// The usable ones; the others are left out.
+fn usable<T>(all: Vec<Result<T, LeftOut>>, left_out: &mut Vec<LeftOut>) -> Vec<T> {
+    all.into_iter().filter_map(|one| one.map_err(|out| left_out.push(out)).ok()).collect()
 }
 
 /// Where the bodies have the mass that several forces give them together, by their kinetic energy or by the caller, these
@@ -295,11 +290,9 @@ fn leave_out_refused(proposal: &mut Proposal, path: &Path) -> Result<(), Error> 
         return Ok(());
     }
     let study = study::parse(path, &proposal.to_toml())?;
-    let extracted: Vec<Result<f64, Error>> = study
-        .runs()
-        .par_iter()
-        .map(|entry| Ok(study.locate(entry)?.extract()?.max_deflection_m()))
-        .collect();
+    let extracted = parallel::map(study.runs(), |entry| -> Result<f64, Error> {
+        Ok(study.locate(entry)?.extract()?.max_deflection_m())
+    });
     for (mut run, extracted) in std::mem::take(&mut proposal.runs).into_iter().zip(extracted) {
         match extracted {
             Ok(crush_m) => {

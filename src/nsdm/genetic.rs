@@ -5,12 +5,11 @@
 //! 26, 1996), both with their distributions cut at the bounds (Deb, Computer Methods in
 //! Applied Mechanics and Engineering 186, 2000). The best two survive.
 
-use rayon::prelude::*;
-
 use super::law::{Nsdm, PiecewiseLinear};
 use super::motion::Laws;
 use super::{DAMPING_N_S_PER_M, STIFFNESS_N_PER_M};
 use crate::error::Error;
+use crate::parallel;
 use crate::stream::Stream;
 
 const TOURNAMENT: usize = 3;
@@ -55,7 +54,7 @@ pub(super) fn minimise<const N: usize>(
         let drawn = std::array::from_fn(|_| stream.unit());
         individual(start.get(i).copied().unwrap_or(drawn))
     };
-    let mut parents: Vec<Individual<N>> = (0..population).into_par_iter().map(first).collect();
+    let mut parents = parallel::map(0..population, first);
     sort(&mut parents);
     let mut history = vec![parents[0].objective];
     let pairs = (population - ELITES).div_ceil(2);
@@ -71,7 +70,7 @@ pub(super) fn minimise<const N: usize>(
             mutate(&mut b, &mut stream);
             [individual(a), individual(b)]
         };
-        let children: Vec<[Individual<N>; 2]> = (0..pairs).into_par_iter().map(pair).collect();
+        let children = parallel::map(0..pairs, pair);
         // Of an odd number of children the last one is not needed.
         parents.truncate(ELITES);
         parents.extend(children.into_iter().flatten().take(population - ELITES));

@@ -29,10 +29,10 @@ mod law;
 mod motion;
 mod simplex;
 
-use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::error::{Error, error};
+use crate::parallel;
 use crate::signal::l1_ratio;
 use crate::stream::Stream;
 use genetic::{Genes, Scales};
@@ -294,7 +294,7 @@ pub fn fit_seeds(
     settings: &FitSettings,
     seeds: &[u64],
 ) -> Result<Vec<Fit>, Error> {
-    seeds.par_iter().map(|&seed| fit(target, settings, seed)).collect()
+    parallel::map(seeds, |&seed| fit(target, settings, seed)).into_iter().collect()
 }
 
 /// Individuals at least squares, if the settings ask for them.
@@ -310,7 +310,7 @@ fn first_individuals(target: &Target, settings: &FitSettings, seed: u64) -> Vec<
         simplex::least_squares(&mut genes, target);
         genes
     };
-    (0..count).into_par_iter().map(individual).collect()
+    parallel::map(0..count, individual)
 }
 
 fn check_mass_and_speed(mass_kg: f64, speed_m_per_s: f64) -> Result<(), Error> {

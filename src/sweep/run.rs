@@ -4,12 +4,11 @@ use std::ops::{ControlFlow, Range};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use rayon::prelude::*;
-
 use super::row::{BETWEEN, Row, Status};
 use super::{Kept, Sweep};
 use crate::error::{Error, ErrorCode};
 use crate::multibody::{BodyHistory, InterfaceHistory, Record, Run, RunSettings, simulate};
+use crate::parallel;
 use crate::plan::ResultName;
 use crate::scenario::{self, Prepared, Scenario};
 
@@ -57,22 +56,19 @@ pub(crate) fn rows(
         let begun = Instant::now();
         let piece: Vec<u64> = (at..end).collect();
         let block = (piece.len() / (BLOCKS_PER_THREAD * threads)).clamp(1, BLOCK);
-        let blocks: Vec<Vec<(Row, Vec<u8>)>> = piece
-            .par_chunks(block)
-            .map(|block| {
-                let held = || workers.lock().unwrap_or_else(PoisonError::into_inner);
-                let mut worker = held().pop().unwrap_or_else(|| Worker::new(sweep));
-                let line_of = |&item: &u64| {
-                    let row = worker.row(item);
-                    let mut line = Vec::with_capacity(24 * (row.values.len() + 2));
-                    row.write(&names, &mut line);
-                    (row, line)
-                };
-                let written = block.iter().map(line_of).collect();
-                held().push(worker);
-                written
-            })
-            .collect();
+        let blocks: Vec<Vec<(Row, Vec<u8>)>> = parallel::map(piece.chunks(block), |block| {
+            let held = || workers.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut worker = held().pop().unwrap_or_else(|| Worker::new(sweep));
+            let line_of = |&item: &u64| {
+                let row = worker.row(item);
+                let mut line = Vec::with_capacity(24 * (row.values.len() + 2));
+                row.write(&names, &mut line);
+                (row, line)
+            };
+            let written = block.iter().map(line_of).collect();
+            held().push(worker);
+            written
+        });
         let rows: Vec<(Row, Vec<u8>)> = blocks.into_iter().flatten().collect();
         if give(&rows)?.is_break() {
             return Ok(());

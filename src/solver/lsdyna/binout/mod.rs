@@ -27,10 +27,9 @@ use std::collections::{HashMap, HashSet};
 use std::io;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
 use super::lsda::Header;
 use crate::history::{EntityId, History};
+use crate::parallel;
 use crate::solver::problem::{Diagnostics, Problem, ProblemCode};
 use crate::solver::source::Source;
 use crate::solver::{Entity, Format, NoDataReason, Selection, SolverFile, WithoutData, zeros};
@@ -235,19 +234,17 @@ impl<'a> SectionReader<'a> {
         let name = &self.section.name;
         // Zeros of quantities that may vanish are recognised by the entity's other components.
         let together = zeros::may_vanish(name);
-        let read: Vec<(Vec<History>, Vec<Problem>)> = wanted
-            .into_par_iter()
-            .map(|series| {
-                let (mut histories, mut found) = series.histories(states, selection, bytes)?;
-                if !together {
-                    found.extend(zeros::suspect(name, &histories));
-                    keep_selected(&mut histories, selection);
-                }
-                Ok((histories, found))
-            })
-            .collect::<io::Result<_>>()?;
+        let all = parallel::map(wanted, |series| -> io::Result<_> {
+            let (mut histories, mut found) = series.histories(states, selection, bytes)?;
+            if !together {
+                found.extend(zeros::suspect(name, &histories));
+                keep_selected(&mut histories, selection);
+            }
+            Ok((histories, found))
+        });
         let mut histories: Vec<History> = Vec::new();
-        for (read, found) in read {
+        for read in all {
+            let (read, found) = read?;
             histories.extend(read);
             self.problems.extend(found);
         }
