@@ -46,6 +46,8 @@ mod os;
 
 mod guess;
 
+mod order;
+
 mod parallel;
 
 mod words;

@@ -13,6 +13,7 @@
 use serde::Serialize;
 
 use crate::dataset::{TrainingSet, is_within, nearly_same};
+use crate::order;
 use crate::surrogate::leave_one_out::{LeftOut, Means, Validation};
 use crate::surrogate::max_crush::MaxCrushRule;
 use crate::surrogate::{MODELS, Model, ModelKind};
@@ -114,7 +115,9 @@ pub(super) fn physical(set: &TrainingSet) -> Vec<&'static str> {
     let lightest_kg = masses.fold(f64::INFINITY, f64::min);
     let is_doubtful = set.stopped_mass().is_some_and(|m| !m.is_usual(lightest_kg));
     let mut physical: Vec<_> = MODELS.iter().filter(|entry| entry.follows_closing).collect();
-    physical.sort_by_key(|entry| (entry.needs_crush_law && is_doubtful, entry.complexity));
+    order::sort_by_key(&mut physical, |entry| {
+        (entry.needs_crush_law && is_doubtful, entry.complexity)
+    });
     physical.into_iter().map(|entry| entry.name).collect()
 }
 
@@ -237,7 +240,7 @@ pub fn gaps(set: &TrainingSet, validation: &Validation) -> Vec<Gap> {
         }
     };
     let mut gaps: Vec<Gap> = (0..ends.len().saturating_sub(1)).map(gap).collect();
-    gaps.sort_by(|a, b| {
+    order::sort(&mut gaps, |a, b| {
         let (a, b) = (a.rank(), b.rank());
         (b.0, b.1).cmp(&(a.0, a.1)).then(b.2.total_cmp(&a.2))
     });

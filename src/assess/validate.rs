@@ -17,6 +17,7 @@ use super::subsets::OverSubsets;
 use crate::curve::{Case, ForceKind, group};
 use crate::dataset::{TrainingSet, is_same_speed, is_within, nearly_same};
 use crate::error::Error;
+use crate::order;
 use crate::parallel;
 use crate::rating::acceptance::Acceptance;
 use crate::surrogate::band::{self, Band, ForceScatter, LeftOutSpeeds, Residuals};
@@ -139,7 +140,9 @@ pub fn train(group: &str, cases: &[Case], choice: Choice) -> Result<Model, Error
             let mut candidates = vec![ModelKind::nearest(), ModelKind::linear()];
             candidates.retain(|baseline| baseline.name() != kind.name());
             candidates.push(kind);
-            candidates.sort_by_key(|kind| MODELS.iter().position(|e| e.name == kind.name()));
+            order::sort_by_key(&mut candidates, |kind| {
+                MODELS.iter().position(|e| e.name == kind.name())
+            });
             let named = Selection::Named(kind.name());
             let validation = validate(group, cases, &candidates, named)?;
             train_chosen(group, cases, &[kind], validation)

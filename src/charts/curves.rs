@@ -6,6 +6,7 @@ use crate::assess::validate::{Choice, train};
 use crate::curve::{Case, CurveUnloading, ForceCurve, ForceKind};
 use crate::dataset::{TrainingCase, TrainingSet, is_same_speed};
 use crate::error::{Error, error};
+use crate::order;
 use crate::plot::{self, Axis, Chart, Mark, Panel, Series, Shown};
 use crate::surrogate::band::{Band, LeftOutSpeeds};
 use crate::surrogate::{ModelCase, PredictedCurve, predict};
@@ -76,7 +77,7 @@ pub fn group_curves(group: &str, cases: &[Case], force: ForceKind) -> Chart {
     let speed_of = |k: &usize| cases[*k].conditions.speed.m_per_s;
     let mut drawn: Vec<usize> = (0..cases.len()).collect();
     if cases.len() > MOST_CURVES {
-        drawn.sort_by(|a, b| speed_of(a).total_cmp(&speed_of(b)));
+        order::sort(&mut drawn, |a, b| speed_of(a).total_cmp(&speed_of(b)));
         let step = |k: usize| drawn[k * (cases.len() - 1) / (MOST_CURVES - 1)];
         drawn = (0..MOST_CURVES).map(step).collect();
     }
@@ -170,7 +171,7 @@ pub(crate) fn predictions<'a>(
 /// The cases below and above a speed; at an end the two nearest.
 fn beside(cases: &[ModelCase], v: f64) -> Vec<&ModelCase> {
     let mut sorted: Vec<&ModelCase> = cases.iter().collect();
-    sorted.sort_by(|a, b| a.speed_m_per_s.total_cmp(&b.speed_m_per_s));
+    order::sort(&mut sorted, |a, b| a.speed_m_per_s.total_cmp(&b.speed_m_per_s));
     let above = sorted.iter().position(|case| case.speed_m_per_s >= v).unwrap_or(sorted.len());
     let from = above.saturating_sub(1).min(sorted.len().saturating_sub(2));
     sorted.into_iter().skip(from).take(2).collect()

@@ -6,6 +6,7 @@ use crate::error::{Error, ErrorCode, error};
 use crate::guess::hint;
 use crate::history::{TimeGap, time_gaps};
 use crate::multibody::{BodyHistory, Run, STANDARD_GRAVITY_M_PER_S2};
+use crate::order;
 use crate::plot::{Axis, Band, Chart, Panel, Series, Shown};
 use crate::rating::acceptance::StageRecord;
 use crate::scenario::{PLATES, Prepared};
@@ -312,7 +313,7 @@ pub fn motion(
                 }
             }
             let mut largest: Vec<f64> = of.iter().map(|(_, most_j)| *most_j).collect();
-            largest.sort_by(|a, b| b.total_cmp(a));
+            order::sort(&mut largest, |a, b| b.total_cmp(a));
             let least_j = largest.get(MOST_AREAS - 1).copied().unwrap_or(0.0);
             let looks = of.iter().filter(|(_, most_j)| of.len() <= MOST_AREAS || *most_j > least_j);
             let looks: Vec<String> = looks.map(|(name, _)| name.to_string()).collect();
@@ -531,9 +532,9 @@ fn areas<'a>(
 ) -> (Vec<&'a InterfaceMotion>, Vec<&'a InterfaceMotion>) {
     let (mut of, mut others): (Vec<_>, Vec<_>) =
         run.interfaces.iter().enumerate().partition(|(_, of)| names.contains(&of.name));
-    of.sort_by(|(_, a), (_, b)| most(&b.taken_j).total_cmp(&most(&a.taken_j)));
+    order::sort(&mut of, |(_, a), (_, b)| most(&b.taken_j).total_cmp(&most(&a.taken_j)));
     others.extend(of.split_off(if of.len() > MOST_AREAS { MOST_AREAS - 1 } else { of.len() }));
-    of.sort_by_key(|(place, _)| *place);
+    order::sort_by_key(&mut of, |(place, _)| *place);
     others.retain(|(_, of)| most(&of.taken_j) > 0.0);
     let alone =
         |all: Vec<(usize, &'a InterfaceMotion)>| all.into_iter().map(|(_, of)| of).collect();

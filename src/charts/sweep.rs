@@ -4,6 +4,7 @@ use super::motion::SMALL;
 use crate::error::{Error, error};
 use crate::guess::hint;
 use crate::multibody::STANDARD_GRAVITY_M_PER_S2;
+use crate::order;
 use crate::plan::{OVER_LIMITS, RESULTS, ResultName};
 use crate::plot::{Axis, Band, Cell, Chart, Panel, Series, Shown};
 use crate::sweep::{ResultColumn, SweepColumns, share_interval};
@@ -199,7 +200,7 @@ fn groups(column: &ResultColumn, is_grid: bool, least: usize) -> Vec<(f64, Vec<u
     let mut rows: Vec<usize> =
         (0..column.values.len()).filter(|&k| column.values[k].is_finite()).collect();
     let of = |k: &usize| column.values[*k];
-    rows.sort_by(|a, b| of(a).total_cmp(&of(b)));
+    order::sort(&mut rows, |a, b| of(a).total_cmp(&of(b)));
     if is_grid {
         return rows.chunk_by(|a, b| of(a) == of(b)).map(|g| (of(&g[0]), g.to_vec())).collect();
     }

@@ -36,6 +36,7 @@ use std::sync::OnceLock;
 use crate::error::ErrorCode;
 use crate::failure::{self, DONE, DONE_WITH_WARNINGS, ErrorDocument, FAILED, USAGE};
 use crate::file::{self, is_same};
+use crate::order;
 use crate::{database, os, solver};
 use arguments::{FileKind, is_others_deck};
 use clap::{FromArgMatches, Parser, Subcommand};
@@ -319,7 +320,7 @@ fn flags_first(mut arguments: Vec<OsString>) -> Vec<OsString> {
     if let (Some(first), Some(second)) = (words.next(), words.next())
         && (arguments[first] == "sweep" && arguments[second] == "merge")
     {
-        arguments[first..second].sort_by_key(|word| !is_flag(word));
+        order::sort_by_key(&mut arguments[first..second], |word| !is_flag(word));
     }
     arguments
 }

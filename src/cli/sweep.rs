@@ -1,5 +1,6 @@
 //! `crumple sweep`: many runs of a scenario, and `crumple sweep merge`.
 
+use crate::order;
 use crate::words::counted;
 use std::fs::OpenOptions;
 use std::io::{self, Write};
@@ -259,7 +260,7 @@ fn say(
     }
     if report.warned > 0 {
         let mut reasons: Vec<&(String, u64)> = report.reasons.iter().collect();
-        reasons.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+        order::sort_by_key(&mut reasons, |(_, count)| std::cmp::Reverse(*count));
         let shown =
             reasons.iter().take(SHOWN_REASONS).map(|(text, count)| format!("{count} × {text}"));
         let mut shown: Vec<String> = shown.collect();

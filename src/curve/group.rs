@@ -5,6 +5,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 
 use super::from_table::IMPORTED;
 use super::{Case, Curve, ForceKind, loading};
+use crate::order;
 
 /// Energy and impulse ratios of clean runs follow a line over the speed within 1 %.
 const UNLIKE: f64 = 0.03;
@@ -171,7 +172,7 @@ fn expected(points: &[(f64, f64)], i: usize) -> Option<f64> {
     let around = i.saturating_sub(NEIGHBOURS)..(i + NEIGHBOURS + 1).min(points.len());
     let mut others: Vec<(f64, f64)> = around.filter(|k| *k != i).map(|k| points[k]).collect();
     let at = points[i].0;
-    others.sort_by(|a, b| (a.0 - at).abs().total_cmp(&(b.0 - at).abs()));
+    order::sort(&mut others, |a, b| (a.0 - at).abs().total_cmp(&(b.0 - at).abs()));
     others.truncate(NEIGHBOURS);
     let slopes = others.iter().enumerate().flat_map(|(k, a)| {
         let later = others[k + 1..].iter();

@@ -40,6 +40,7 @@ use crate::curve::{Case, CaseId, Origin, StoppedMass};
 use crate::error::{Error, error};
 use crate::file::{accepts_changed, is_file, write_at, write_whole};
 use crate::hdf5;
+use crate::order;
 use opened::FoundCase;
 
 /// The cases of one database file.
@@ -447,7 +448,7 @@ pub(crate) fn is_database(path: &Path) -> bool {
 
 /// Puts the cases of a group into their order: by speed, then name.
 fn sort(cases: &mut [Case]) {
-    cases.sort_by(|a, b| {
+    order::sort(cases, |a, b| {
         a.conditions
             .speed
             .m_per_s

@@ -17,6 +17,7 @@ use crate::curve::replicates::mean_of;
 use crate::curve::stopped_mass::{LoadingRun, StoppedMass};
 use crate::curve::{Case, Envelope, ForceKind, Masses, Parameter};
 use crate::error::{Error, error};
+use crate::order;
 use crate::parallel;
 use crate::unit::{SpeedKind, UnitSystem, km_per_h};
 
@@ -244,7 +245,9 @@ type Runs<'a> = (Vec<f64>, Vec<&'a Case>);
 /// within 0.1 %, so that a difference of their curves is scatter and not a matter of speed.
 fn replicates<'a>(cases: &[&'a Case], features: &[Feature]) -> Result<Vec<Runs<'a>>, Error> {
     let mut cases = cases.to_vec();
-    cases.sort_by(|a, b| a.conditions.speed.m_per_s.total_cmp(&b.conditions.speed.m_per_s));
+    order::sort(&mut cases, |a, b| {
+        a.conditions.speed.m_per_s.total_cmp(&b.conditions.speed.m_per_s)
+    });
     let mut found: Vec<Runs<'a>> = Vec::new();
     for case in cases {
         let values = feature_values(features, &parameters(case))?;
@@ -269,7 +272,7 @@ fn replicates<'a>(cases: &[&'a Case], features: &[Feature]) -> Result<Vec<Runs<'
             }
         }
     }
-    found.iter_mut().for_each(|(_, runs)| runs.sort_by(|a, b| a.id.name.cmp(&b.id.name)));
+    found.iter_mut().for_each(|(_, runs)| order::sort(runs, |a, b| a.id.name.cmp(&b.id.name)));
     Ok(found)
 }
 
@@ -421,14 +424,14 @@ impl TrainingSet {
         let first = *cases.first().ok_or(error!(Dataset, "the group is empty: build it first"))?;
         of_one_kind(cases.iter().copied())?;
         cases.iter().try_for_each(|case| case.check())?;
-        cases.sort_by(|a, b| a.id.name.cmp(&b.id.name));
+        order::sort(&mut cases, |a, b| a.id.name.cmp(&b.id.name));
         let features = features(&cases)?;
         let training = parallel::map(replicates(&cases, &features)?, |(features, runs)| {
             TrainingCase::new(&runs, features)
         });
         let mut training = training.into_iter().collect::<Result<Vec<_>, _>>()?;
         // By values, so that names and the order of the cases change nothing.
-        training.sort_by(|a, b| a.key().partial_cmp(&b.key()).unwrap_or(Ordering::Equal));
+        order::sort(&mut training, |a, b| a.key().partial_cmp(&b.key()).unwrap_or(Ordering::Equal));
         Ok(Self {
             group: group.into(),
             speed_kind: first.conditions.speed.kind,

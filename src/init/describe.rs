@@ -15,6 +15,7 @@ use super::units::{digits, shown_mass};
 use super::write::Evidence::{Computed, Given, Guessed, Read};
 use super::write::{Proposal, Proposed, ProposedRun};
 use crate::curve::recipe::{DeflectionSource, Filter, ForceSource, RecordedMotion};
+use crate::order;
 use crate::signal::cfc;
 use crate::solver::lsdyna::deck::Deck;
 use crate::study::StudyKind;
@@ -596,7 +597,7 @@ impl Facts<'_> {
 /// By speed, then by name.
 pub(super) fn sort(runs: &mut [ProposedRun]) {
     let speed = |run: &ProposedRun| run.speed_m_per_s.value().copied().unwrap_or_default();
-    runs.sort_by(|a, b| speed(a).total_cmp(&speed(b)).then(a.name.cmp(&b.name)));
+    order::sort(runs, |a, b| speed(a).total_cmp(&speed(b)).then(a.name.cmp(&b.name)));
 }
 
 /// Why not the usual class, which keeps so much of the work.

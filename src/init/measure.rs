@@ -7,6 +7,7 @@ use super::write::Evidence::{Computed, Guessed, Read};
 use super::write::Proposed;
 use crate::curve::contact;
 use crate::curve::recipe::{Filter, Sampling};
+use crate::order;
 use crate::signal::integral;
 use crate::unit::UnitSystem;
 
@@ -254,7 +255,7 @@ pub(super) fn agree(
     };
     type Weighed = (usize, f64, f64, f64);
     let mut by_mass: Vec<Weighed> = runs.iter().enumerate().filter_map(of).collect();
-    by_mass.sort_by(|a, b| a.1.total_cmp(&b.1));
+    order::sort(&mut by_mass, |a, b| a.1.total_cmp(&b.1));
     let mut found: Vec<Proposed<f64>> = runs.iter().map(|_| Proposed::missing(why)).collect();
     // Near all of them, not only the last: of many in small steps, the ends are two masses.
     let is_one = |a: &Weighed, b: &Weighed| is_near(a.1, b.1, a.2.max(b.2) + a.3 + b.3);

@@ -8,6 +8,7 @@ use super::UserHints;
 use super::sources::Fit;
 use super::survey::{Body, ForceCandidate, Named, NodeCandidate, STOPPED, Survey, fit};
 use crate::curve::recipe::DisplacementComponent;
+use crate::order;
 use crate::study::StudyKind;
 
 /// A node represents its body if it leaves at most this much more of the impulse than the best
@@ -396,7 +397,7 @@ fn choose(
     for tally in &mut tallies {
         tally.residual = largest(tally, if are_given { f64::INFINITY } else { RELATED });
     }
-    tallies.sort_by(|a, b| {
+    order::sort(&mut tallies, |a, b| {
         (Some(b.node.id) == given)
             .cmp(&(Some(a.node.id) == given))
             .then(b.runs.cmp(&a.runs))

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use super::folders::{Reason, unread_beside};
 use crate::curve::recipe::DisplacementComponent;
 use crate::history::{EntityId, History};
+use crate::order;
 use crate::signal::{derivative, integral, interpolate};
 use crate::solver::decks::{self, Search};
 use crate::solver::lsdyna::deck::Deck;
@@ -130,7 +131,7 @@ impl Source {
                 Some((path, sections.iter().find(is_wanted)?))
             })
             .collect();
-        holders.sort_by_key(|(path, _)| (!is_text(path), **path != folder.join(name)));
+        order::sort_by_key(&mut holders, |(path, _)| (!is_text(path), **path != folder.join(name)));
         if holders.len() > 1 && is_text(holders[0].0) && is_without_states(holders[0].0) {
             holders.remove(0);
         }

@@ -15,6 +15,7 @@ use super::sources::{
 };
 use crate::curve::recipe::DisplacementComponent;
 use crate::history::{History, Side};
+use crate::order;
 use crate::solver::{SolverFile, WantedId};
 
 /// Bodies that still close at more than this share of their first speed have not been stopped.
@@ -265,7 +266,7 @@ fn bodies(mut nodes: Vec<NodeCandidate>, direction: DisplacementComponent) -> Ve
     let first = |node: &NodeCandidate| node.first_velocity[k];
     let least = SAME_VELOCITY * nodes.iter().map(|n| first(n).abs()).fold(0.0, f64::max);
     nodes.retain(|n| first(n).abs() > least || n.largest_change[k] > least);
-    nodes.sort_by(|a, b| first(a).total_cmp(&first(b)).then(a.id.cmp(&b.id)));
+    order::sort(&mut nodes, |a, b| first(a).total_cmp(&first(b)).then(a.id.cmp(&b.id)));
     let mut bodies: Vec<Body> = nodes
         .chunk_by(|a, b| first(b) - first(a) <= least)
         .map(|group| Body {
@@ -277,8 +278,10 @@ fn bodies(mut nodes: Vec<NodeCandidate>, direction: DisplacementComponent) -> Ve
     // Of two that come at each other equally fast, the one with the smaller number.
     let least_id = |body: &Body| body.nodes.iter().map(|n| n.id).min();
     let speed = |body: &Body| (body.first_velocity / least).round().abs();
-    bodies
-        .sort_by(|a, b| speed(b).total_cmp(&speed(a)).then_with(|| least_id(a).cmp(&least_id(b))));
+
+    order::sort(&mut bodies, |a, b| {
+        speed(b).total_cmp(&speed(a)).then_with(|| least_id(a).cmp(&least_id(b)))
+    });
     bodies
 }
 
@@ -318,7 +321,7 @@ fn force_candidates(
 
 /// Keeps the forces with the largest impulses, so that thousands of contacts are not held.
 fn keep_largest(forces: &mut Vec<ForceCandidate>, named: &[Named]) {
-    forces.sort_by(|a, b| b.size().total_cmp(&a.size()).then(a.rank().cmp(&b.rank())));
+    order::sort(forces, |a, b| b.size().total_cmp(&a.size()).then(a.rank().cmp(&b.rank())));
     let mut rank = 0;
     forces.retain(|force| {
         rank += 1;

@@ -7,6 +7,7 @@
 use super::measure::is_near;
 use super::write::Evidence::{self, Computed, Given, Guessed, Read};
 use super::write::Proposed;
+use crate::order;
 use crate::unit::{UnitSystem, km_per_h};
 
 /// What of an impact depends on the units, in the file's.
@@ -229,7 +230,7 @@ fn guessed(
     if possible.is_empty() {
         possible = std::mem::take(&mut customary);
     }
-    possible.sort_by(|a, b| unusual(a).total_cmp(&unusual(b)));
+    order::sort(&mut possible, |a, b| unusual(a).total_cmp(&unusual(b)));
     let (units, less) = possible.split_first()?;
     let doubt = |other: &UnitSystem| {
         let feet = usize::from(UnitSystem::CUSTOMARY[0] != other.to_string());

@@ -9,6 +9,7 @@ use super::law::{Nsdm, PiecewiseLinear};
 use super::motion::Laws;
 use super::{DAMPING_N_S_PER_M, STIFFNESS_N_PER_M};
 use crate::error::Error;
+use crate::order;
 use crate::parallel;
 use crate::stream::Stream;
 
@@ -47,7 +48,7 @@ pub(super) fn minimise<const N: usize>(
 ) -> Evolved<N> {
     let individual = |genes| Individual { genes, objective: objective(&genes) };
     let sort = |individuals: &mut Vec<Individual<N>>| {
-        individuals.sort_by(|a, b| a.objective.total_cmp(&b.objective));
+        order::sort(individuals, |a, b| a.objective.total_cmp(&b.objective));
     };
     let first = |i: usize| {
         let mut stream = stream(seed, 0, i);

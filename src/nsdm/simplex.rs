@@ -12,6 +12,7 @@
 
 use super::genetic::{DAMPING_NODES, Genes, Individual, STIFFNESS_NODES, Scales};
 use super::{DAMPING_N_S_PER_M, STIFFNESS_N_PER_M, Target};
+use crate::order;
 
 /// Edge of the first simplex.
 const EDGE: f64 = 0.05;
@@ -62,7 +63,7 @@ fn search<const N: usize>(
     let mut simplex = first_simplex(&objective, start, edge);
     let mut used = N;
     loop {
-        simplex.sort_by(|a, b| a.objective.total_cmp(&b.objective));
+        order::sort(&mut simplex, |a, b| a.objective.total_cmp(&b.objective));
         let (best, worst) = (simplex[0], simplex[N]);
         let flat = worst.objective - best.objective <= FLAT * best.objective;
         // Reflection, contraction and a shrunken simplex are the dearest step.

@@ -3,6 +3,7 @@
 
 use serde::Serialize;
 
+use crate::order;
 use crate::signal::integral;
 
 /// The edition in force; its text is not public, so the rule is stated here as practice quotes it.
@@ -222,7 +223,7 @@ pub(crate) fn accept(
         let mut order = counting.clone();
         order.retain(|stage| begin(stage).is_some());
         let time = |stage: &StageAcceptance| begin(stage).unwrap_or(f64::INFINITY);
-        order.sort_by(|a, b| time(a).total_cmp(&time(b)));
+        order::sort(&mut order, |a, b| time(a).total_cmp(&time(b)));
         order.into_iter().map(|stage| stage.stage.clone()).collect::<Vec<String>>()
     };
     let sequences = [order(|s| s.reference.begin_s), order(|s| s.prediction.begin_s)];

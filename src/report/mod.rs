@@ -15,6 +15,7 @@ use std::path::{Path, PathBuf};
 use crate::curve::Case;
 use crate::database::Database;
 use crate::error::Error;
+use crate::order;
 use crate::surrogate::Model;
 use crate::table::Table;
 use figure::Figure;
@@ -236,7 +237,7 @@ pub(crate) fn report(
         "kept" => 2,
         _ => 3,
     };
-    content.verdicts.sort_by_key(urgency);
+    order::sort_by_key(&mut content.verdicts, urgency);
     let warnings = content.warnings.iter().map(|of| of.texts.len()).sum();
     Ok((page::html(&content), warnings))
 }

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::{PLATES, Prepared};
 use crate::multibody::{BodyHistory, InterfaceHistory, Run};
+use crate::order;
 
 /// Something that happened at an interface.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -90,7 +91,7 @@ pub(super) fn sequence<'a>(prepared: &'a Prepared, run: &Run) -> Vec<Event<'a>> 
             add(history.max_deflection_time_s, Happening::LargestCrush);
         }
     }
-    events.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    order::sort(&mut events, |a, b| a.time_s.total_cmp(&b.time_s));
     events
 }
 

@@ -13,6 +13,7 @@ use super::{Access, Problem};
 use crate::error::{Error, KeyPath, error};
 use crate::guess;
 use crate::history::{EntityId, History, Side};
+use crate::order;
 
 /// Which entity is wanted: an id, on both sides of an interface unless one is named.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -151,7 +152,7 @@ fn near_ids(file: &SolverFile, id: i64) -> String {
         return "it holds no ids".into();
     }
     let mut entities: Vec<&Entity> = file.entities.iter().collect();
-    entities.sort_by_key(|e| (e.id.id.abs_diff(id), e.id));
+    order::sort_by_key(&mut entities, |e| (e.id.id.abs_diff(id), e.id));
     let shown: Vec<String> = entities
         .iter()
         .take(SHOWN)

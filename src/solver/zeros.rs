@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use super::problem::{Problem, ProblemCode};
 use crate::history::{EntityId, History};
+use crate::order;
 
 /// Sections whose quantities may really vanish for one state, such as a contact's force.
 const MAY_VANISH: [&str; 12] = [
@@ -44,7 +45,7 @@ pub(crate) fn may_vanish(section: &str) -> bool {
 /// there in that state, because a lost contact loses all.
 pub(crate) fn suspect(section: &str, histories: &[History]) -> Vec<Problem> {
     let mut found = runs_of_zeros(section, histories);
-    found.sort_by_key(|run| run.state);
+    order::sort_by_key(&mut found, |run| run.state);
     found.iter().map(|run| run.problem(section, histories)).collect()
 }
 
@@ -172,7 +173,7 @@ fn longest_outside(run: &Range<usize>, around: [&Zeros; 2]) -> usize {
         all[from..to].to_vec()
     };
     let mut others: Zeros = around.iter().flat_map(overlapping).collect();
-    others.sort_by_key(|other| other.start);
+    order::sort_by_key(&mut others, |other| other.start);
     let (mut from, mut longest) = (run.start, 0);
     for other in others {
         longest = longest.max(other.start.saturating_sub(from));

@@ -30,6 +30,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::dataset::is_same_speed;
+use crate::order;
 
 /// The level that bands are made for.
 pub(crate) const LEVEL: f64 = 0.9;
@@ -498,7 +499,7 @@ pub(crate) fn coverage(
 /// The integral over all levels of the difference between a level and the weight of the points that its band covers; each
 /// point with the least level that covers it.
 fn calibration_error(mut points: Vec<(f64, f64)>) -> f64 {
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    order::sort(&mut points, |a, b| a.0.total_cmp(&b.0));
     let whole: f64 = points.iter().map(|(_, weight)| weight).sum();
     let (mut error, mut from, mut covered) = (0.0, 0.0, 0.0);
     // |level − covered| over an interval of levels in which nothing more is covered.

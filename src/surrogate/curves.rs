@@ -5,6 +5,7 @@ use std::borrow::Cow;
 use crate::curve::Envelope;
 use crate::dataset::is_same_speed;
 use crate::error::{Error, ErrorCode};
+use crate::order;
 
 /// One force of one training case over its loading branch.
 #[derive(Clone, Debug, PartialEq)]
@@ -233,7 +234,7 @@ pub(super) fn answering_at<'a>(cases: &'a [CaseCurve], at: (f64, &[f64])) -> Cow
 /// Points in order of x, with one mean of those of equal x.
 pub(super) fn mean_points(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut points: Vec<(f64, f64)> = points.collect();
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    order::sort(&mut points, |a, b| a.0.total_cmp(&b.0));
     let mut known: Vec<(f64, f64, f64)> = Vec::new();
     for (x, y) in points {
         match known.last_mut() {

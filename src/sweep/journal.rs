@@ -15,6 +15,7 @@ use super::to_hdf5::{self, is_hdf5};
 use super::{Report, Shard, Sweep, foreign};
 use crate::error::{Error, error};
 use crate::file::{self, WriterLock, accepts_changed, not_written, target_of, write_by_path};
+use crate::order;
 
 /// How a sweep is written.
 #[derive(Clone, Copy, Debug)]
@@ -304,7 +305,7 @@ fn ordered(files: &mut [ShardFile]) -> Result<ShardHeader, Error> {
             ));
         }
     }
-    files.sort_by_key(|file| file.head.shard.index());
+    order::sort_by_key(files, |file| file.head.shard.index());
     for pair in files.windows(2) {
         let (a, b) = (&pair[0], &pair[1]);
         let index = a.head.shard.index();

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::Report;
 use super::row::{BETWEEN, Line, Row, ShardHeader, Status};
+use crate::order;
 use crate::plan::{OVER_LIMITS, RESULTS, ResultName};
 use crate::stream::mix;
 
@@ -149,7 +150,7 @@ fn sensitivities(columns: &[Column], choices: &[Choice]) -> Vec<Sensitivity> {
 /// The rank of each value; equal ones share the mean of theirs.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
-    order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
+    order::sort(&mut order, |&a, &b| values[a].total_cmp(&values[b]));
     let mut ranks = vec![0.0; values.len()];
     let mut from = 0;
     for equal in order.chunk_by(|&a, &b| values[a] == values[b]) {
@@ -176,7 +177,7 @@ fn correlation(x: &[f64], y: &[f64]) -> Option<f64> {
 /// Natl. Acad. Sci. 21, 1935); `None` if there is one group, or `y` does not vary.
 fn correlation_ratio(x: &[f64], y: &[f64]) -> Option<f64> {
     let mut pairs: Vec<(f64, f64)> = x.iter().copied().zip(y.iter().copied()).collect();
-    pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
+    order::sort(&mut pairs, |a, b| a.0.total_cmp(&b.0));
     let about_mean = |values: &mut dyn Iterator<Item = f64>| {
         let values: Vec<f64> = values.collect();
         let mean = values.iter().sum::<f64>() / values.len() as f64;

@@ -7,6 +7,7 @@ use super::curve::{Place, expected, shown};
 use super::label::{Label, Quantity, name_and_unit, no_unit};
 use super::table::{Purpose, Row, Table, names_all, unit_of};
 use crate::error::{Error, error};
+use crate::order;
 use crate::unit::UnitSystem;
 
 /// A chosen or candidate column.
@@ -145,7 +146,7 @@ pub(super) fn layout(
         let left: Vec<String> =
             free.clone().take(LISTED).map(|(_, (_, n))| format!("\"{}\"", shown(n))).collect();
         let line_left = free.map(|(_, (line, _))| *line).next().unwrap_or(table.line());
-        found.sort_by_key(Named::fit);
+        order::sort_by_key(&mut found, Named::fit);
         let best = found.first().map(Named::fit);
         let alike = found.iter().filter(|column| Some(column.fit()) == best);
         let alike: Vec<String> = alike.map(|c| format!("\"{}\"", shown(&c.name))).collect();

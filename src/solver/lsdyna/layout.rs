@@ -12,6 +12,7 @@ use std::ops::Range;
 
 use super::e12;
 use super::line::{integer, is_whole_real, real};
+use crate::order;
 use crate::solver::source::Window;
 use crate::solver::states::repeat::{Part, Zone};
 
@@ -123,7 +124,7 @@ impl Layout {
     ) -> Option<Self> {
         let mut zones: Vec<(usize, &Zone)> =
             zones.iter().map(|zone| ((zone.at - start) as usize, zone)).collect();
-        zones.sort_by_key(|(at, _)| *at);
+        order::sort_by_key(&mut zones, |(at, _)| *at);
         let mut zones = zones.into_iter().peekable();
         let mut layout = Self {
             expected: bytes,
@@ -180,7 +181,7 @@ impl Layout {
         }
         layout.tail = at - last;
         let mut classes: Vec<(Class, u32)> = known.into_iter().collect();
-        classes.sort_by_key(|(_, number)| *number);
+        order::sort_by_key(&mut classes, |(_, number)| *number);
         layout.classes = classes.into_iter().map(|(class, _)| class).collect();
         time.filter(|_| zones.next().is_none())?;
         Some(layout)

@@ -5,6 +5,7 @@ use std::io;
 use std::sync::Arc;
 
 use super::records::{Bytes, Component, DataRecord, LISTS, Section};
+use crate::order;
 use crate::solver::problem::{Diagnostics, Place, Problem, ProblemCode};
 use crate::solver::states::finish::{resolve, take};
 
@@ -85,7 +86,7 @@ impl Timed {
     /// The states without damage, in order of their numbers, and why others are left out.
     fn of(section: &Section, bytes: Bytes<'_>) -> io::Result<(Self, Diagnostics)> {
         let mut order: Vec<usize> = (0..section.states.len()).collect();
-        order.sort_by_key(|&i| section.states[i]);
+        order::sort_by_key(&mut order, |&i| section.states[i]);
         let last = order.last().copied();
         let before = order.len().checked_sub(2).map(|k| order[k]);
         let (mut states, mut time, mut problems) = (Vec::new(), Vec::new(), Diagnostics::default());
