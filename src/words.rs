@@ -7,7 +7,7 @@ pub(crate) fn counted(count: impl TryInto<u64> + Copy, one: &str) -> String {
     format!("{count} {one}{}", if count == 1 { "" } else { "s" })
 }
 
-/// A text as XML and HTML take it, within quotes or not; what XML cannot hold at all is replaced.
+/// A text as XML and HTML take it, within quotes or not: in one line, and what XML cannot hold at all is replaced.
 pub(crate) fn escaped(text: &str) -> String {
     let mut safe = String::with_capacity(text.len());
     for c in text.chars() {
@@ -17,6 +17,7 @@ pub(crate) fn escaped(text: &str) -> String {
             '>' => safe.push_str("&gt;"),
             '"' => safe.push_str("&quot;"),
             '\'' => safe.push_str("&#39;"),
+            '\n' | '\r' | '\t' => safe.push(' '),
             c if c.is_control() || ('\u{fffe}'..='\u{ffff}').contains(&c) => safe.push('\u{fffd}'),
             c => safe.push(c),
         }
@@ -31,8 +32,8 @@ mod tests {
     #[test]
     fn texts_of_markup_are_escaped() {
         assert_eq!(
-            escaped("a<b & 'c' \"d\"\u{1b}[0m"),
-            "a&lt;b &amp; &#39;c&#39; &quot;d&quot;\u{fffd}[0m"
+            escaped("a<b & 'c' \"d\"\n\u{1b}[0m"),
+            "a&lt;b &amp; &#39;c&#39; &quot;d&quot; \u{fffd}[0m"
         );
     }
 

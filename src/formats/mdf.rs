@@ -9,7 +9,6 @@ use crate::curve::body::body_force_n;
 use crate::curve::{Case, ForceKind};
 use crate::error::Error;
 use crate::unit::km_per_h;
-use crate::words::escaped;
 
 /// A quantity over time: name, SI unit, one value per time.
 pub(crate) struct Channel<'a> {
@@ -163,4 +162,9 @@ impl Blocks {
         data.resize(72, 0);
         self.block(b"CN", &[next, 0, name, 0, 0, 0, unit, 0], &data)
     }
+}
+
+/// Unlike names, comments have lines.
+fn escaped(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

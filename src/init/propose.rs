@@ -134,10 +134,7 @@ fn survey(
     let surveyed = parallel::map(unique, |(path, name, sources)| {
         let survey = Survey::of(&sources, &named);
         progress(&name);
-        match survey {
-            Ok(survey) => Ok(Run { path, name, sources, survey }),
-            Err(reason) => Err(LeftOut::new(path, reason)),
-        }
+        (path.clone(), survey.map(|survey| Run { path, name, sources, survey }))
     });
     usable(surveyed, left_out)
 }
@@ -194,15 +191,17 @@ fn record(runs: Vec<Run>, recipe: &CommonRecipe, left_out: &mut Vec<LeftOut>) ->
     let records = parallel::map(runs.into_iter().zip(&recipe.members), |(run, member)| {
         let path = run.path.clone();
         let other = |why: &String| Reason::OtherRecipe { why: why.clone() };
-        let record = member.as_ref().map_err(other).and_then(|()| Record::read(run, recipe));
-        record.map_err(|reason| LeftOut::new(path, reason))
+        (path, member.as_ref().map_err(other).and_then(|()| Record::read(run, recipe)))
     });
     usable(records, left_out)
 }
 
 /// The usable ones; the others are left out.
-fn usable<T>(all: Vec<Result<T, LeftOut>>, left_out: &mut Vec<LeftOut>) -> Vec<T> {
-    all.into_iter().filter_map(|one| one.map_err(|out| left_out.push(out)).ok()).collect()
+fn usable<T>(all: Vec<(PathBuf, Result<T, Reason>)>, left_out: &mut Vec<LeftOut>) -> Vec<T> {
+    let one = |(path, one): (PathBuf, Result<T, Reason>)| {
+        one.map_err(|reason| left_out.push(LeftOut::new(path, reason))).ok()
+    };
+    all.into_iter().filter_map(one).collect()
 }
 
 /// Where the bodies have the mass that several forces give them together, by their kinetic energy or by the caller, these
