@@ -1,12 +1,12 @@
-//! Stable sorting, compiled once: the standard library's is compiled anew, some thousand instructions of it, for every type
-//! and every order. For lists that are not long.
+//! Stable sorting, compiled once: the standard library's sort is compiled again for every type and every order. For lists
+//! that are not long.
 
 use std::cmp::Ordering;
 
 /// Sorts by an order; items that are equal in it stay as they are.
 pub(crate) fn sort<T>(items: &mut [T], by: impl Fn(&T, &T) -> Ordering) {
     let mut from = order(items.len(), &|a, b| by(&items[a], &items[b]));
-    // Along each cycle of the permutation.
+    // Swaps along each cycle of the permutation; what is in its place is marked by its own index.
     for first in 0..from.len() {
         let mut to = first;
         while from[to] != first {

@@ -1,4 +1,4 @@
-//! Work on all processors, compiled once: an iterator of rayon is compiled anew, in full, wherever it stands.
+//! Work on all processors, compiled once: a parallel iterator of rayon is compiled again wherever it is used.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
