@@ -4,7 +4,7 @@
 //! CRUMPLE_PYTHON_FMU names a Python with tests/python/requirements-fmu.txt, as tests/run sets it.
 
 use std::collections::BTreeMap;
-use std::io::{Cursor, Read};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -18,6 +18,7 @@ use crumple::multibody::{
 };
 use crumple::surrogate::ForestOptions;
 use crumple::surrogate::{Model, ModelKind, Query, predict};
+use flate2::bufread::DeflateDecoder;
 use serde_json::{Value, json};
 
 const VERSIONS: [(&str, FmiVersion); 2] = [("2", FmiVersion::Fmi2), ("3", FmiVersion::Fmi3)];
@@ -118,15 +119,21 @@ fn write(folder: &Path, name: &str, law: &ForceLaw, version: FmiVersion) -> Path
 }
 
 fn files(fmu: Vec<u8>) -> BTreeMap<String, Vec<u8>> {
-    let mut archive = zip::ZipArchive::new(Cursor::new(fmu)).unwrap();
-    let names = archive.file_names().map(|name| name.unwrap().into_owned());
-    let names: Vec<String> = names.collect();
-    let mut read = |name: &String| {
+    let archive = rawzip::ZipArchive::from_slice(&fmu).unwrap();
+    let mut files = BTreeMap::new();
+    let mut entries = archive.entries();
+    while let Some(entry) = entries.next_entry().unwrap() {
+        let name = entry.file_path().try_normalize().unwrap().as_ref().to_string();
+        let packed = archive.get_entry(entry.wayfinder()).unwrap();
         let mut bytes = Vec::new();
-        archive.by_name(name).unwrap().read_to_end(&mut bytes).unwrap();
-        bytes
-    };
-    names.iter().map(|name| (name.clone(), read(name))).collect()
+        // Its size and checksum are verified as it is read.
+        packed
+            .verifying_reader(DeflateDecoder::new(packed.data()))
+            .read_to_end(&mut bytes)
+            .unwrap();
+        files.insert(name, bytes);
+    }
+    files
 }
 
 /// Numbers as text of their bits: JSON would round them.

@@ -186,7 +186,14 @@ fn stream_csv(
     };
     let written = match output {
         Some(path) => write_at(path, |mut file| write(&mut file))?,
-        // What is printed cannot be taken back.
+        // What is printed cannot be taken back: little is held until all of it is there.
+        None if blocks.file.time.len().saturating_mul(blocks.values()) <= HELD => {
+            let mut text = Vec::new();
+            match write(&mut text) {
+                Ok(Some(())) => output::print_data(|out| out.write_all(&text).map(Some))?,
+                _ => None,
+            }
+        }
         None if !blocks.are_whole().map_err(|error| Error::io(input, error))? => return Ok(None),
         None => {
             let written = output::print_data(write)?;
@@ -201,6 +208,9 @@ fn stream_csv(
     }
     Ok(written.map(|()| blocks.file))
 }
+
+/// Values whose text is held until all of it is known to be whole.
+const HELD: usize = 1 << 18;
 
 /// Values of states that one thread writes at once.
 const TOGETHER: usize = 1 << 16;

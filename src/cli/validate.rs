@@ -160,7 +160,7 @@ fn earlier(path: &Path) -> Result<Vec<Validation>, Error> {
         error!(Validation, "{path}: {detail}: give what crumple validate --json has printed")
     };
     let text = file::read_text(path, MOST_BYTES).map_err(|source| Error::io(path, source))?;
-    let document: Value = serde_json::from_str(&text).map_err(|e| wrong(e.to_string()))?;
+    let document: Value = text.parse().map_err(|e: serde_json::Error| wrong(e.to_string()))?;
     let groups = document.get("groups").and_then(Value::as_array);
     let groups = groups.ok_or_else(|| wrong("there are no groups in it".into()))?;
     let validated = groups.iter().filter(|group| group.get("error").is_none());

@@ -392,7 +392,7 @@ impl Case {
     /// Units of the solver files, as the recipe has them; `None` in databases of earlier
     /// versions.
     pub(crate) fn units(&self) -> Option<UnitSystem> {
-        let recipe: serde_json::Value = serde_json::from_str(&self.provenance.recipe).ok()?;
+        let recipe: serde_json::Value = self.provenance.recipe.parse().ok()?;
         UnitSystem::parse(recipe.get("units")?.as_str()?).ok()
     }
 
@@ -408,7 +408,7 @@ impl Case {
     }
 
     fn imported(&self, key: &str) -> bool {
-        let recipe: Option<serde_json::Value> = serde_json::from_str(&self.provenance.recipe).ok();
+        let recipe: Option<serde_json::Value> = self.provenance.recipe.parse().ok();
         recipe.is_some_and(|recipe| recipe["imported"][key] == true)
     }
 
@@ -464,7 +464,7 @@ pub(crate) fn source_hash<'a>(
     recipe: &str,
     files: impl Iterator<Item = &'a str>,
 ) -> Option<String> {
-    let mut recipe: serde_json::Value = serde_json::from_str(recipe).ok()?;
+    let mut recipe: serde_json::Value = recipe.parse().ok()?;
     let run = recipe.get_mut("run")?.as_object_mut()?;
     run.remove("path");
     run.remove("deck");

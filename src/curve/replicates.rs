@@ -18,14 +18,14 @@ impl Case {
 
     /// The filter of its recipe; none of a curve from a table.
     pub(crate) fn filter(&self) -> Option<String> {
-        let whole = serde_json::from_str::<serde_json::Value>(&self.provenance.recipe).ok()?;
+        let whole = self.provenance.recipe.parse::<serde_json::Value>().ok()?;
         Some(whole["recipe"]["filter"].as_str()?.to_string())
     }
 }
 
 /// What of a recipe decides how force and deflection were measured.
 fn measured(recipe: &str) -> serde_json::Value {
-    let Ok(whole) = serde_json::from_str::<serde_json::Value>(recipe) else {
+    let Ok(whole) = recipe.parse::<serde_json::Value>() else {
         return recipe.into();
     };
     let imported = &whole["imported"];

@@ -230,8 +230,8 @@ pub(crate) fn is_altered(case: &Case, hashes: &BTreeMap<String, String>) -> Resu
 }
 
 pub(crate) fn hash_of(values: &[f64]) -> String {
-    let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
-    blake3::hash(&bytes).to_hex().to_string()
+    let bytes: Vec<[u8; 8]> = values.iter().map(|value| value.to_le_bytes()).collect();
+    blake3::hash(bytes.as_flattened()).to_hex().to_string()
 }
 
 /// The attributes of a case as they are written, its hashes among them: those it was read with

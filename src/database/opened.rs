@@ -174,7 +174,7 @@ impl<'a> Opened<'a> {
     /// The hashes that are stored with a case, if they are there and can be read.
     pub(crate) fn hashes(&self, case: &Group) -> Option<BTreeMap<String, String>> {
         let attributes = case.attrs().ok()?;
-        serde_json::from_str(attributes.get(HASHES)?.as_str()?).ok()
+        serde_json::from_slice(attributes.get(HASHES)?.as_str()?.as_bytes()).ok()
     }
 
     /// Reads one case from its group.
@@ -274,7 +274,7 @@ impl Attrs<'_> {
     }
 
     fn json<T: serde::de::DeserializeOwned>(&self, name: &str) -> Result<T, Error> {
-        serde_json::from_str(self.text(name)?)
+        serde_json::from_slice(self.text(name)?.as_bytes())
             .map_err(|e| self.place.damaged(format!("attribute {name}: {e}")))
     }
 

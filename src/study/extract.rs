@@ -257,7 +257,7 @@ impl LocatedRun<'_> {
     }
 
     fn recipe_in(&self, units: UnitSystem) -> String {
-        let Ok(mut recipe) = serde_json::from_str::<serde_json::Value>(&self.recipe) else {
+        let Ok(mut recipe) = self.recipe.parse::<serde_json::Value>() else {
             return self.recipe.clone();
         };
         recipe["units"] = units.to_string().into();

@@ -333,7 +333,7 @@ impl LocatedRun<'_> {
         let path = self.study.folder.join(&self.entry.path).join("case.json");
         let text = file::if_there(file::read_text(&path, MAX_CASE_BYTES));
         let stated = |text: String| {
-            let case: serde_json::Value = serde_json::from_str(&text).ok()?;
+            let case: serde_json::Value = text.parse().ok()?;
             case.get("engine_wall_time_s")?.as_f64().filter(|t| *t > 0.0 && t.is_finite())
         };
         Ok(text.map_err(|e| Error::io(&path, e))?.and_then(stated))

@@ -346,7 +346,7 @@ fn fitted_of(kind: &ModelKind, raw: &RawValue) -> Result<Arc<dyn Surrogate>, ser
         serde_json::Error::custom(format!("options name the model {expected}, fitted {found}"))
     };
     if raw.get().starts_with('"') {
-        let name: String = serde_json::from_str(raw.get())?;
+        let name: String = serde_json::from_slice(raw.get().as_bytes())?;
         return if name == kind.name() { (kind.entry.load)(None) } else { Err(other(&name)) };
     }
     // As this program writes a forest: it is large, and so read once. What follows it would be an error of its own.
@@ -357,7 +357,7 @@ fn fitted_of(kind: &ModelKind, raw: &RawValue) -> Result<Arc<dyn Surrogate>, ser
     {
         return Ok(found);
     }
-    let named: BTreeMap<String, &RawValue> = serde_json::from_str(raw.get())?;
+    let named: BTreeMap<String, &RawValue> = serde_json::from_slice(raw.get().as_bytes())?;
     match named.first_key_value() {
         Some((name, parameters)) if name == kind.name() => {
             (kind.entry.load)(Some(parameters.get()))

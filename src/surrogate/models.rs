@@ -83,7 +83,7 @@ pub(super) fn loaded<T>(parameters: Option<&str>) -> Result<Arc<dyn Surrogate>, 
 where
     T: Surrogate + DeserializeOwned + 'static,
 {
-    Ok(Arc::new(serde_json::from_str::<T>(parameters.unwrap_or("null"))?))
+    Ok(Arc::new(serde_json::from_slice::<T>(parameters.unwrap_or("null").as_bytes())?))
 }
 
 /// Most trees of a forest that is judged with many runs.

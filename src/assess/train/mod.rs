@@ -343,7 +343,7 @@ impl FeTrain {
         }
         let case = file::read_text(&file.with_file_name("case.json"), 1 << 20).ok();
         let wall_time_s = case
-            .and_then(|text| serde_json::from_str::<serde_json::Value>(&text).ok())
+            .and_then(|text| text.parse::<serde_json::Value>().ok())
             .and_then(|case| case.get("engine_wall_time_s")?.as_f64());
         let warnings = read.problems.iter().map(|p| format!("{}: {p}", file.display())).collect();
         Ok(Self { time_s, velocities, wall_time_s, warnings })

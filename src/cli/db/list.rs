@@ -157,7 +157,7 @@ pub(crate) fn case_row(case: &Case) -> impl Serialize {
 pub(super) fn full_case(case: &Case) -> Result<impl Serialize, Failure> {
     let (sampled, original) = (&case.curves.sampled, &case.curves.original);
     let provenance = &case.provenance;
-    let recipe: serde_json::Value = serde_json::from_str(&provenance.recipe)?;
+    let recipe: serde_json::Value = provenance.recipe.parse()?;
     Ok(document! {
         #[serde(flatten)]
         row: case_row(case),

@@ -8,10 +8,12 @@
 mod description;
 mod table;
 
-use std::io::{Cursor, Write};
+use std::io::Write;
 
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, System, ZipWriter};
+use flate2::Compression;
+use flate2::write::DeflateEncoder;
+use rawzip::time::UtcDateTime;
+use rawzip::{CompressionMethod, ZipArchiveWriter};
 
 use super::{ExportCurve, Exported};
 use crate::error::{Error, error};
@@ -154,6 +156,9 @@ pub(crate) fn write(curve: &ExportCurve, version: FmiVersion) -> Result<Exported
 /// Name of the generated C file.
 const TABLE_SOURCE: &str = "table.c";
 
+/// Date of the files in the archive, 1980-01-01: the same input always gives the same bytes.
+const DATED_UNIX_S: i64 = 315_532_800;
+
 fn pack(
     spring: &Spring<'_>,
     version: FmiVersion,
@@ -169,16 +174,17 @@ fn pack(
     let compiled: Vec<&str> =
         sources.iter().map(|(file, _)| *file).filter(|file| file.ends_with(".c")).collect();
 
-    // A fixed date and system, so that the same input always gives the same bytes.
-    let options = SimpleFileOptions::default()
-        .system(System::Unix)
-        .compression_method(CompressionMethod::Deflated)
-        .last_modified_time(DateTime::default())
-        .unix_permissions(0o644);
-    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    let mut archive = ZipArchiveWriter::new(Vec::new());
     let mut add = |path: &str, bytes: &[u8]| -> Result<(), Error> {
-        archive.start_file(path, options).map_err(not_packed)?;
-        archive.write_all(bytes).map_err(not_packed)
+        let entry = archive.new_file(path).compression_method(CompressionMethod::DEFLATE);
+        let entry =
+            entry.unix_permissions(0o644).last_modified(UtcDateTime::from_unix(DATED_UNIX_S));
+        let (mut entry, config) = entry.start().map_err(not_packed)?;
+        let mut writer = config.wrap(DeflateEncoder::new(&mut entry, Compression::default()));
+        writer.write_all(bytes).map_err(not_packed)?;
+        let (encoder, descriptor) = writer.finish().map_err(not_packed)?;
+        encoder.finish().map_err(not_packed)?;
+        entry.finish(descriptor).map(drop).map_err(not_packed)
     };
     let model = model_description(spring, version, &name, token, &compiled);
     add("modelDescription.xml", model.as_bytes())?;
@@ -195,7 +201,7 @@ fn pack(
     }
     add("documentation/index.html", documentation(spring).as_bytes())?;
     add("extra/crumple/facts.json", facts(spring)?.as_bytes())?;
-    Ok(archive.finish().map_err(not_packed)?.into_inner())
+    archive.finish().map_err(not_packed)
 }
 
 fn not_packed(error: impl std::error::Error + Send + Sync + 'static) -> Error {

@@ -232,12 +232,14 @@ fn record<'a>(
             }
         }
         DATA => {
-            let Some(head) = window.get(from, near.min(2 + 255), 0)? else { return Ok(Err(None)) };
-            let [kind, name_length, rest @ ..] = head else {
+            // The length of the name first: what is read ahead holds all of a real one, and no more is needed.
+            let Some(head) = window.get(from, near.min(2), 0)? else { return Ok(Err(None)) };
+            let [kind, name_length] = *head else {
                 return Ok(Err(Some("expected a type and a name".into())));
             };
-            let kind = Kind(*kind);
-            let name = rest.get(..usize::from(*name_length)).and_then(text);
+            let (kind, end) = (Kind(kind), 2 + usize::from(name_length));
+            let Some(head) = window.get(from, near.min(end), 0)? else { return Ok(Err(None)) };
+            let name = head.get(2..end).and_then(text);
             let (Some(name), Some(item)) = (name.filter(|n| !n.is_empty()), kind.size()) else {
                 return Ok(Err(Some(format!(
                     "expected a type from 1 to 10 and a name, found type {}",

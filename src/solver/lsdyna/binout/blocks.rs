@@ -12,13 +12,12 @@ use super::states::StateReader;
 use super::values::{Pick, Series};
 use super::{Contents, SectionReader, sort};
 use crate::history::History;
-use crate::solver::blocks::{Blocks, MIN_VALUES, ReadState, States, columns};
+use crate::solver::blocks::{Blocks, ReadState, States, columns};
 use crate::solver::source::Source;
 use crate::solver::zeros::{Zeros, may_be_suspect, zeros_of_state};
 use crate::solver::{Selection, problem};
 
-/// Opens the only section that is selected. `None` if anything in it needs a look at the whole, or if it has too
-/// few values to be worth it.
+/// Opens the only section that is selected. `None` if anything in it needs a look at the whole.
 pub(super) fn open(
     parts: Vec<Box<dyn Source>>,
     selection: &Selection,
@@ -46,8 +45,7 @@ pub(super) fn open(
     }
     sort(&mut histories, &entities);
     let (mut file, problems) = reader.file(entities, components, histories);
-    let count = file.time.len().saturating_mul(file.histories.len());
-    let found = columns(&file).filter(|_| problems.is_empty() && count >= MIN_VALUES);
+    let found = columns(&file).filter(|_| problems.is_empty());
     let Some((columns, order)) = found else { return Ok(None) };
     // Component by component, each with its entities in the order of its records.
     let mut sorted = Vec::with_capacity(values.len());
