@@ -104,6 +104,39 @@ fn sections_without_states_and_with_them() {
     has(&path, "glstat", 88);
 }
 
+/// What is read state by state, or as a whole, such as a section without states or with times alone.
+#[test]
+fn every_section_is_written_as_it_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let here = folder.path();
+    let mut without = 0;
+    for name in ["lasso_r12_smp_s_sph_rwforc", "lasso_r7.1.2_smp_s_sph_rwforc"] {
+        let path = fixture("samples/lasso-python/binout").join(name);
+        for file in read_sections(&path, None, &Selection::all()).unwrap() {
+            let of = format!("{name} {}", file.section);
+            let arguments = ["histories", path.to_str().unwrap(), "--section", &file.section, "-q"];
+            let text = crumple_ok(here, &arguments);
+            let mut lines = text.lines();
+            let labels: Vec<String> = file.histories.iter().map(|h| h.label()).collect();
+            let head = [&["time".to_string()][..], &labels].concat().join(",");
+            assert_eq!(lines.next(), Some(&*head), "{of}");
+            for (k, line) in lines.clone().enumerate() {
+                let values = file.histories.iter().map(|h| h.values[k]);
+                let found: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
+                let equal = |(a, b): (&f64, f64)| *a == b || a.is_nan() && b.is_nan();
+                assert!(found[1..].iter().zip(values).all(equal), "{of}: {line}");
+            }
+            assert_eq!(lines.count(), file.time.len(), "{of}");
+            for output in ["out.csv", "out.h5"] {
+                crumple_ok(here, &[&arguments[..], &["-o", output]].concat());
+            }
+            assert!(fs::read_to_string(here.join("out.csv")).unwrap() == text, "{of}");
+            without += usize::from(file.histories.is_empty());
+        }
+    }
+    assert_eq!(without, 4, "sections without histories");
+}
+
 #[test]
 #[ignore = "needs ../shared (the real files)"]
 fn sections_states_and_ids_of_every_sample() {
@@ -611,6 +644,29 @@ fn damaged_samples_never_panic() {
         let bytes = fs::read(path).unwrap();
         damage(&bytes[..bytes.len().min(60_000)]);
     }
+}
+
+/// A component that incomplete states alone have is judged by its first record, each time.
+#[test]
+fn a_component_of_incomplete_states_gives_the_same_each_time() {
+    let mut out = Written::new();
+    out.ids("gceout", &[4, 5]);
+    for state in 1..9 {
+        out.cd(&format!("/gceout/d{state:06}"));
+        out.reals("x_force", &[1.0, 2.0, 3.0][..2 + state % 2]);
+    }
+    out.cd("/gceout/d000009");
+    out.reals("time", &[1.0]);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("binout0000");
+    fs::write(&path, &out.bytes).unwrap();
+    let problems = || {
+        let problems = section(&path, "gceout").problems;
+        problems.iter().map(|p| p.to_string()).collect::<Vec<_>>()
+    };
+    let first = problems();
+    says(&first.concat(), "x_force has 3 values per state but a different number of ids");
+    assert!((0..20).all(|_| problems() == first));
 }
 
 /// A section is read whatever its name; what has no states is named.

@@ -899,6 +899,8 @@ fn a_file_beyond_the_limit_of_the_session_is_said() {
     build_fixture(here, WALL);
     let nodout = fixture("fe/lead-car-wall/36kmh/nodout");
     let nodout = nodout.to_str().unwrap();
+    let binout = fixture("samples/lasso-python/binout/lasso_r12_smp_s_sph_rwforc");
+    let binout = binout.to_str().unwrap();
     let pair = fixture("fe/lead-car-pair/study.toml");
     fs::write(here.join("out.csv"), "old").unwrap();
     fs::write(here.join("out.h5"), "old").unwrap();
@@ -916,6 +918,7 @@ fn a_file_beyond_the_limit_of_the_session_is_said() {
     for (arguments, path) in [
         (vec!["histories", nodout, "-o", "out.csv"], "out.csv"),
         (vec!["histories", nodout, "-o", "out.h5"], "out.h5"),
+        (vec!["histories", binout, "--section", "glstat", "-o", "out.h5"], "out.h5"),
         (vec!["build", pair.to_str().unwrap(), "-o", "curves.h5"], "curves.h5"),
     ] {
         let output = limited(&arguments);

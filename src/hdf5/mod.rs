@@ -252,7 +252,10 @@ impl Skeleton {
     ) -> io::Result<Option<Vec<u64>>> {
         let offsets = vec![None; self.lengths.len()];
         let mut sink = Sink { lengths: &self.lengths, file, at: 0, offsets, others: Vec::new() };
-        write_to(builder, &mut sink).map_err(io::Error::other)?;
+        write_to(builder, &mut sink).map_err(|error| match error {
+            Error::Io(error) => error,
+            error => io::Error::other(error),
+        })?;
         for (number, offset) in sink.offsets.iter_mut().enumerate() {
             let find = |(at, bytes): &(u64, Vec<u8>)| {
                 memchr::memmem::find(bytes, &mark(number)).map(|found| at + found as u64)

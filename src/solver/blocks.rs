@@ -6,10 +6,7 @@ use std::io;
 use super::SolverFile;
 use crate::history::EntityId;
 
-/// Values of a file below which reading state by state saves nothing.
-pub(super) const MIN_VALUES: usize = 1 << 19;
-
-/// An undamaged file whose states can be read in any order, from several threads.
+/// An undamaged file whose states can be read in any order, from several threads. It has histories.
 pub struct Blocks {
     pub(super) states: Box<dyn States>,
     /// What the file says of itself, with the times of all states and no history.

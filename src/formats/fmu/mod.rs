@@ -178,7 +178,7 @@ fn pack(
     let mut add = |path: &str, bytes: &[u8]| -> Result<(), Error> {
         let entry = archive.new_file(path).compression_method(CompressionMethod::DEFLATE);
         let entry =
-            entry.unix_permissions(0o644).last_modified(UtcDateTime::from_unix(DATED_UNIX_S));
+            entry.unix_permissions(0o100_644).last_modified(UtcDateTime::from_unix(DATED_UNIX_S));
         let (mut entry, config) = entry.start().map_err(not_packed)?;
         let mut writer = config.wrap(DeflateEncoder::new(&mut entry, Compression::default()));
         writer.write_all(bytes).map_err(not_packed)?;

@@ -10,10 +10,13 @@ use std::sync::Arc;
 use super::ascii::{AsciiReader, Body};
 use super::layout::{Layout, Plan};
 use super::leap::{Leaps, read};
-use crate::solver::blocks::{Blocks, MIN_VALUES, ReadState, States, columns};
+use crate::solver::blocks::{Blocks, ReadState, States, columns};
 use crate::solver::source::{Source, Window};
 use crate::solver::states::finish::restarts;
 use crate::solver::{Format, Selection, problem};
+
+/// Values of a text file below which reading state by state saves nothing.
+const MIN_VALUES: usize = 1 << 19;
 
 /// States that may have another layout than those that follow.
 const MAX_LEAD: usize = 32;

@@ -17,7 +17,8 @@ use crate::solver::source::Source;
 use crate::solver::zeros::{Zeros, may_be_suspect, zeros_of_state};
 use crate::solver::{Selection, problem};
 
-/// Opens the only section that is selected. `None` if anything in it needs a look at the whole.
+/// Opens the only section that is selected. `None` if anything in it needs a look at the whole, or if it has
+/// no histories.
 pub(super) fn open(
     parts: Vec<Box<dyn Source>>,
     selection: &Selection,
@@ -45,7 +46,7 @@ pub(super) fn open(
     }
     sort(&mut histories, &entities);
     let (mut file, problems) = reader.file(entities, components, histories);
-    let found = columns(&file).filter(|_| problems.is_empty());
+    let found = columns(&file).filter(|(columns, _)| problems.is_empty() && !columns.is_empty());
     let Some((columns, order)) = found else { return Ok(None) };
     // Component by component, each with its entities in the order of its records.
     let mut sorted = Vec::with_capacity(values.len());

@@ -47,7 +47,7 @@ impl Entities {
         bytes: Bytes<'_>,
     ) -> io::Result<OwnerSearch> {
         let first = states.whole.iter().find_map(|state| component.records.get(state));
-        let any = first.or_else(|| component.records.values().next());
+        let any = first.or_else(|| component.first());
         let Some(width) = any.filter(|p| !p.payload.kind.is_text()).map(DataRecord::width) else {
             return Ok(OwnerSearch::NoValues);
         };

@@ -247,7 +247,12 @@ impl DataRecord {
 
 impl Component {
     pub(crate) fn is_real(&self) -> bool {
-        self.records.values().next().is_some_and(|p| p.payload.kind.is_real())
+        self.first().is_some_and(|p| p.payload.kind.is_real())
+    }
+
+    /// The record that was written first.
+    pub(crate) fn first(&self) -> Option<&DataRecord> {
+        self.records.values().min_by_key(|record| record.order())
     }
 }
 
