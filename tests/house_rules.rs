@@ -231,7 +231,7 @@ fn functions_are_the_same_on_every_platform() {
 
 /// What src/ may hold. Growth is a decision: the commit that raises a number says why.
 const BUDGET: [(&str, usize); 4] =
-    [("lines", 89110), ("files", 303), ("public types", 164), ("error types", 9)];
+    [("lines", 89128), ("files", 303), ("public types", 164), ("error types", 9)];
 
 #[test]
 fn the_source_keeps_its_budget() {

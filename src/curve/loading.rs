@@ -18,8 +18,13 @@ pub struct Loading {
 
 /// Index of the maximum deflection: the end of the loading branch.
 pub(crate) fn loading_end(curve: &Curve) -> usize {
-    let deflection = curve.deflection_m();
-    (1..deflection.len()).fold(0, |best, i| if deflection[i] > deflection[best] { i } else { best })
+    let mut best = (0, f64::NEG_INFINITY);
+    for (i, &d) in curve.deflection_m().iter().enumerate() {
+        if d > best.1 {
+            best = (i, d);
+        }
+    }
+    best.0
 }
 
 /// The samples up to the maximum deflection whose deflection advances, begun at 0. A record

@@ -4,6 +4,8 @@
 //! force, maximum crush, rebound) are those of one motion and fit together. A mean of forces over deflection would not:
 //! each run ends at a crush of its own.
 
+use serde::Deserialize;
+
 use super::{Case, Curve, EnergyAudit};
 use crate::error::Error;
 use crate::piecewise;
@@ -18,8 +20,16 @@ impl Case {
 
     /// The filter of its recipe; none of a curve from a table.
     pub(crate) fn filter(&self) -> Option<String> {
-        let whole = self.provenance.recipe.parse::<serde_json::Value>().ok()?;
-        Some(whole["recipe"]["filter"].as_str()?.to_string())
+        #[derive(Deserialize)]
+        struct Whole {
+            recipe: Recipe,
+        }
+        #[derive(Deserialize)]
+        struct Recipe {
+            filter: String,
+        }
+        let whole = serde_json::from_slice::<Whole>(self.provenance.recipe.as_bytes()).ok()?;
+        Some(whole.recipe.filter)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{self, Write};
+use std::mem::ManuallyDrop;
 use std::path::PathBuf;
 
 use serde::Serialize;
@@ -24,7 +25,8 @@ pub(super) struct Args {
 }
 
 pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
-    let database = Database::read(&args.database)?;
+    // Given back with the process: to free thousands of cases piece by piece takes a tenth of the time.
+    let database = ManuallyDrop::new(Database::read(&args.database)?);
     let selection = args.chosen.selection();
     // A database without cases has nothing to list, which is not an error.
     let cases: Vec<&Case> = if selection.is_all() {
@@ -52,7 +54,8 @@ pub(super) fn run(args: &Args, options: GlobalOptions) -> CommandResult {
     }
     let outcome = options.warn_all(warnings.iter().chain(&of_cases));
     let stopped_mass = database.stopped_masses(&args.database, groups.keys().copied());
-    let rows = groups.iter().map(|(group, cases)| {
+    // A text has tables instead.
+    let rows = groups.iter().filter(|_| options.json).map(|(group, cases)| {
         (*group, cases.iter().map(|case| case_row(case)).collect::<Vec<_>>())
     });
     let document = document! {
